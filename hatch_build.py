@@ -1,9 +1,9 @@
-"""Builds the page of the studio and the documentation for wheels of armblocks, which contain both.
+"""Build hooks: the front end of the studio and the documentation, which wheels of armblocks contain.
 
 An editable installation builds neither: ``armblocks studio`` and ``armblocks docs`` build them at the first
-use. Nothing is built if the result is up to date or the sources are missing. A source distribution contains
-the built page and the sources of the documentation. ``ARMBLOCKS_SKIP_WEB=1`` omits the page of the studio,
-``ARMBLOCKS_SKIP_DOCS=1`` the documentation; everything else works without them.
+use. The hooks build nothing if the result is up to date or the sources are missing. A source distribution
+contains the built front end and the sources of the documentation. ``ARMBLOCKS_SKIP_WEB=1`` omits the front
+end, ``ARMBLOCKS_SKIP_DOCS=1`` the documentation; everything else works without them.
 """
 
 from __future__ import annotations
@@ -23,31 +23,34 @@ DOCS_IN_WHEEL = "armblocks/shipped/docs"
 sys.path[:0] = [str(FRONTEND), str(DOCS)]
 
 
-class PageBuild(BuildHookInterface):
-    """The hook of hatchling for all wheels, including editable ones, and for source distributions."""
+class FrontEndAndDocsHook(BuildHookInterface):
+    """Build hook of hatchling for wheels, including editable ones, and for source distributions."""
 
     PLUGIN_NAME = "custom"
 
     def dependencies(self) -> list[str]:
         """Build dependencies: Node.js as a wheel if the system has none, Sphinx, and those of armblocks."""
-        # This method has no argument for editable builds; pip calls the hook with this name.
+        # The method has no argument for editable builds; pip calls the build back end with this command.
         if "get_requires_for_build_editable" in sys.argv:
             return []
-        needed: list[str] = []
-        if _page_needed():
+        requirements: list[str] = []
+        if _front_end_needed():
             from node import NODE_WHEEL, system_npm
 
-            needed += [] if system_npm() else [NODE_WHEEL]
+            requirements += [] if system_npm() else [NODE_WHEEL]
         if self.target_name == "wheel" and _docs_needed():
             # The pages are generated from the imported code and from runs of the blocks' examples.
-            needed += [*self.metadata.core.dependencies, *self.metadata.core.optional_dependencies["docs"]]
-        return needed
+            requirements += [
+                *self.metadata.core.dependencies,
+                *self.metadata.core.optional_dependencies["docs"],
+            ]
+        return requirements
 
     def initialize(self, version: str, build_data: dict[str, dict[str, str]]) -> None:
-        """Build what is missing or outdated, and add the documentation to the wheel."""
+        """Build the missing or outdated files, and add the documentation to the wheel."""
         if version == "editable":
             return
-        if _page_needed():
+        if _front_end_needed():
             from build_page import build
 
             build()
@@ -60,8 +63,8 @@ class PageBuild(BuildHookInterface):
                 build_data["force_include"]["docs/_build/html"] = DOCS_IN_WHEEL
 
 
-class ReadmeOfThePackage(MetadataHookInterface):
-    """The hook that hatchling calls for the metadata of a package: it sets the text for a package index."""
+class PackageReadme(MetadataHookInterface):
+    """Metadata hook of hatchling: it sets the description for a package index."""
 
     PLUGIN_NAME = "custom"
 
@@ -72,9 +75,9 @@ class ReadmeOfThePackage(MetadataHookInterface):
 
 
 def for_package_index(readme: str) -> str:
-    """The README without pictures and links to files of the repository, which a package index does not have.
+    """Return the README without pictures and without links to files, which a package index does not have.
 
-    The text of a link stays. Links to web sites are unchanged.
+    The text of a removed link remains. Links to web sites are unchanged.
     """
     without_pictures = re.sub(
         r"<picture>.*?</picture>\n+|!\[[^\]]*\]\([^)]*\)\n+", "", readme, flags=re.DOTALL
@@ -82,13 +85,13 @@ def for_package_index(readme: str) -> str:
     return re.sub(r"\[([^\]]+)\]\((?!https?:)[^)]*\)", r"\1", without_pictures)
 
 
-def _page_needed() -> bool:
-    """Whether the page of the studio must be built."""
+def _front_end_needed() -> bool:
+    """Whether the front end of the studio must be built."""
     if os.environ.get("ARMBLOCKS_SKIP_WEB") == "1" or not FRONTEND.is_dir():
         return False
-    from build_page import needed
+    from build_page import is_outdated
 
-    return needed()
+    return is_outdated()
 
 
 def _docs_wanted() -> bool:

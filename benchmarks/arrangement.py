@@ -1,8 +1,9 @@
-"""Automatic places of blocks, compared with places by hand and with those of elkjs.
+"""Automatic layout of diagrams, compared with manual layouts and with elkjs.
 
-Twenty textbook diagrams (`textbook/`) and the shipped examples, each with its stored places and arranged by
-this package. With `ARMBLOCKS_ELKJS`, a folder in which `npm install elkjs` was run, elkjs places them too.
-The lines are laid by this package's router in all cases, so that the table compares places only.
+Twenty textbook diagrams (`textbook/`) and the shipped examples, each with its stored layout and with the
+layout of armblocks. With `ARMBLOCKS_ELKJS`, a folder in which `npm install elkjs` was run, also with that
+of elkjs. The router of armblocks draws the lines in all cases, so that the table compares positions of
+blocks only.
 """
 
 # pyright: basic
@@ -21,7 +22,7 @@ from pathlib import Path
 import armblocks as ab
 from armblocks import blocks as kinds
 from armblocks.diagram import Diagram, DiagramBuilder, Placement
-from armblocks.drawing.block_boxes import standing_box
+from armblocks.drawing.block_boxes import box_at_placement
 from armblocks.drawing.diagram_drawing import drawn_bends, obstacle, wire_nets
 from armblocks.drawing.diagram_layout import arranged_layout, boxes
 from armblocks.drawing.wire_routing import route
@@ -43,11 +44,12 @@ ELK_OPTIONS = {
 
 
 def measured(diagram: Diagram) -> dict[str, float]:
-    """What is counted in the drawing of a diagram at its places.
+    """Measures of the drawing of a diagram, by the names of ``COLUMNS``.
 
-    crossings: of lines of different sources. bends, length: of all lines (px). leftward: connections whose
-    target is left of their source. straight: connections without a bend. area: of all blocks' bounding box
-    (1000 px squared). labels: connections without room for a line.
+    crossings: between lines of different sources. bends: of all lines. length: of all lines (px). leftward:
+    connections whose target is left of their source. straight: connections without a bend. area, aspect: of
+    the bounding box of all blocks (1000 px squared; width to height). labels: connections drawn as labels,
+    because there is no space for a line. overlaps: pairs of blocks.
     """
     placed = boxes(diagram)
     nets, _ = wire_nets(diagram.connections, drawn_bends(diagram), placed)
@@ -66,7 +68,8 @@ def measured(diagram: Diagram) -> dict[str, float]:
         "bends": sum(max(len(path) - 2, 0) for path in paths),
         "length": sum(abs(a[0] - b[0]) + abs(a[1] - b[1]) for _, a, b in segments),
         "leftward": sum(
-            placed[wire.target.block].x <= placed[wire.source.block].x for wire in diagram.connections
+            placed[connection.target.block].x <= placed[connection.source.block].x
+            for connection in diagram.connections
         ),
         "straight": sum(len(path) == 2 for path in paths),
         "area": width * height / 1e3,
@@ -89,12 +92,12 @@ def cross(one, other) -> bool:
 
 
 def arranged(diagram: Diagram) -> Diagram:
-    """The diagram at the places of this package."""
+    """The diagram with the automatic layout of armblocks."""
     return dataclasses.replace(diagram, layout=arranged_layout(diagram), bends={})
 
 
 def with_elk(diagrams: list[Diagram], elkjs: str) -> list[Diagram]:
-    """The diagrams at the places of elkjs: the second input of a round sum is on its lower edge."""
+    """The diagrams with the layout of elkjs."""
     script = Path(__file__).with_name("elk.mjs")
     completed = subprocess.run(
         ["node", script],
@@ -117,12 +120,12 @@ def with_elk(diagrams: list[Diagram], elkjs: str) -> list[Diagram]:
 
 
 def elk_graph(diagram: Diagram) -> dict:
-    """The graph of a diagram, with ports at fixed places."""
+    """The graph of a diagram for elkjs, with ports at fixed positions."""
     upright = {name: Placement(x=0, y=0) for name in diagram.blocks}
     placed = boxes(dataclasses.replace(diagram, layout=upright, bends={}))
     children = []
     for name in diagram.blocks:
-        box = standing_box(name, placed[name].block, upright[name])
+        box = box_at_placement(name, placed[name].block, upright[name])
         sides = {-1: "NORTH", 0: "WEST", 1: "SOUTH"}
         ports = [
             {"id": f"{name}/{spot.name}", "x": spot.x, "y": spot.y, "width": 0, "height": 0}
@@ -140,14 +143,14 @@ def elk_graph(diagram: Diagram) -> dict:
             }
         )
     edges = [
-        {"id": str(k), "sources": [str(wire.source)], "targets": [str(wire.target)]}
-        for k, wire in enumerate(diagram.connections)
+        {"id": str(k), "sources": [str(connection.source)], "targets": [str(connection.target)]}
+        for k, connection in enumerate(diagram.connections)
     ]
     return {"id": "root", "layoutOptions": ELK_OPTIONS, "children": children, "edges": edges}
 
 
 def many_loops(count: int) -> Diagram:
-    """Control loops in series, of eight blocks each."""
+    """A draft diagram of control loops in series, each with eight blocks."""
     draw = random.Random(0)
     builder = DiagramBuilder("many loops")
     before = None
@@ -183,7 +186,7 @@ def main() -> None:
     textbook = [ab.load_diagram(path) for path in sorted(TEXTBOOK.glob("*.json"))]
     examples = [ab.load_diagram(name) for name in ab.list_examples()]
     for title, diagrams in (("Twenty textbook diagrams", textbook), ("Shipped examples", examples)):
-        groups = {"by hand": diagrams, "arranged": [arranged(diagram) for diagram in diagrams]}
+        groups = {"manual": diagrams, "arranged": [arranged(diagram) for diagram in diagrams]}
         if elkjs:
             groups["elkjs"] = with_elk(diagrams, elkjs)
         print(f"\n{title}, sums:\n")

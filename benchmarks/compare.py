@@ -2,10 +2,10 @@
 
     python benchmarks/compare.py OLD NEW [--turns 40] [--only multirate]
 
-``OLD`` and ``NEW`` are folders of checkouts. Each has its own process, which compiles every model once. The
-processes then work in alternation, about 20 ms each. Times are processor time (user and system, all threads),
-so that other load on the machine affects them only through caches and clock frequency. Compare the minimum
-and the lower quartile; the ratio is old over new, so above 1 the new one is faster.
+``OLD`` and ``NEW`` are folders of checkouts. One process for each checkout compiles every model once. The
+processes then run in alternation, about 20 ms each. Times are processor time (user and system, all threads),
+so that other load on the machine affects them only through caches and clock frequency. The output contains
+the minimum, the lower quartile and their ratios, old to new. Above 1, the new checkout is faster.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ TURN_SECONDS = 0.02
 
 
 def five_blocks() -> ab.Diagram:
-    """A second-order system. The imports are those of the measured checkout."""
+    """Return the diagram of a second-order system."""
+    # Imported here: the measured checkout provides armblocks.
     import armblocks as ab
     from armblocks.blocks import Gain, Integrator, Step, Sum
 
@@ -41,8 +42,8 @@ def five_blocks() -> ab.Diagram:
     return builder.build()
 
 
-def works() -> dict[str, Callable[[], object]]:
-    """The measured functions by name, compiled."""
+def measured_functions() -> dict[str, Callable[[], object]]:
+    """Return the measured functions by name. Each was called once, so that it is compiled."""
     import numpy as np
 
     import armblocks as ab
@@ -67,37 +68,37 @@ def works() -> dict[str, Callable[[], object]]:
     functions["puma560 rne, 100 000"] = lambda: arm.rne(q, qd, qdd, out=out)
     functions["puma560 jacob0, 100 000, new array"] = lambda: arm.jacob0(q)
     functions["puma560 inertia, 100 000, new array"] = lambda: arm.inertia(q)
-    few = [part[:8].copy() for part in (q, qd, qdd)]
-    one = [part[0].copy() for part in (q, qd, qdd)]
+    few = [array[:8].copy() for array in (q, qd, qdd)]
+    one = [array[0].copy() for array in (q, qd, qdd)]
     functions["puma560 rne, 8 samples"] = lambda: arm.rne(*few)
     functions["puma560 rne, one sample"] = lambda: arm.rne(*one)
-    for work in functions.values():
-        work()
+    for function in functions.values():
+        function()
     return functions
 
 
 def serve() -> None:
-    """The process of one checkout: measure one turn of each function named on standard input."""
+    """Measure one turn of each function named on standard input, in the process of a checkout."""
     import armblocks
 
-    functions = works()
+    functions = measured_functions()
     counts: dict[str, int] = {}
     print(json.dumps([str(Path(armblocks.__file__).parents[2]), list(functions)]), flush=True)
     for line in sys.stdin:
         name = json.loads(line)
-        work = functions[name]
+        function = functions[name]
         if name not in counts:
             start = time.perf_counter()
-            work()
+            function()
             counts[name] = max(1, round(TURN_SECONDS / (time.perf_counter() - start)))
         start = time.process_time()
         for _ in range(counts[name]):
-            work()
+            function()
         print(json.dumps((time.process_time() - start) / counts[name]), flush=True)
 
 
 class Checkout:
-    """The process of a checkout, as seen by the comparing process."""
+    """Connection to the process of a checkout."""
 
     def __init__(self, folder: Path) -> None:
         command = [sys.executable, str(Path(__file__).resolve()), "--serve"]
@@ -105,20 +106,20 @@ class Checkout:
         self._process = subprocess.Popen(
             command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
-        self.place, self.names = self._answer()
+        self.folder, self.names = self._reply()
 
     def turn(self, name: str) -> float:
-        """Return the seconds of one call, measured in one turn."""
+        """Return the processor time of one call in s, as a mean over one turn."""
         assert self._process.stdin is not None
         self._process.stdin.write(json.dumps(name) + "\n")
         self._process.stdin.flush()
-        return self._answer()
+        return self._reply()
 
-    def _answer(self) -> Any:
+    def _reply(self) -> Any:
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
         if not line:
-            raise SystemExit(f"a checkout ended with {self._process.wait()}")
+            raise SystemExit(f"the process of a checkout ended with exit code {self._process.wait()}")
         return json.loads(line)
 
     def close(self) -> None:
@@ -131,7 +132,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("checkouts", nargs="*", type=Path)
     parser.add_argument("--turns", type=int, default=40)
-    parser.add_argument("--only", default="", help="names that contain this text")
+    parser.add_argument("--only", default="", help="measure only functions whose names contain this text")
     parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.serve:
@@ -139,7 +140,7 @@ def main() -> None:
         return
     checkouts = [Checkout(folder.resolve()) for folder in arguments.checkouts]
     for checkout in checkouts:
-        print(checkout.place)
+        print(checkout.folder)
     print(f"{'µs, smallest / lower quartile':36}" + "".join(f"{k + 1:>22}" for k in range(len(checkouts))))
     for name in checkouts[0].names:
         if arguments.only not in name:
@@ -149,7 +150,7 @@ def main() -> None:
             for row, checkout in zip(seconds, checkouts):
                 row.append(checkout.turn(name))
         cells = [(1e6 * min(row), 1e6 * statistics.quantiles(row, n=4)[0]) for row in seconds]
-        text = "".join(f"{least:>12.2f} /{quartile:>8.2f}" for least, quartile in cells)
+        text = "".join(f"{minimum:>12.2f} /{quartile:>8.2f}" for minimum, quartile in cells)
         ratios = [f"{cells[0][k] / cells[-1][k]:.2f}" for k in (0, 1)]
         print(f"{name:36}{text}   {' / '.join(ratios)}", flush=True)
     for checkout in checkouts:

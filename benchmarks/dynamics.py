@@ -18,9 +18,9 @@ SINGLE = 2_000
 
 @dataclass(frozen=True)
 class Comparison:
-    """One row: name, time of the other library, time of armblocks, in seconds per evaluation."""
+    """One row of a table: the times of another program and of armblocks, in seconds per evaluation."""
 
-    what: str
+    name: str
     peer: str
     theirs: Timing
     ours: Timing
@@ -33,7 +33,9 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Agreement:
-    what: str
+    """Largest relative difference between the results of armblocks and Pinocchio."""
+
+    name: str
     error: float
 
 
@@ -68,7 +70,7 @@ class Case:
         return pin.computeFrameJacobian(self.model, self.data, q, self.tip, pin.LOCAL_WORLD_ALIGNED)
 
     def agreement(self) -> list[Agreement]:
-        """Largest difference over 200 states, relative to the largest entry."""
+        """Compare 200 states: the largest difference, relative to the largest entry."""
         arm, k = self.arm, 200
         q, qd, qdd, tau = (x[:k] for x in (self.q, self.qd, self.qdd, self.tau))
         pairs = {
@@ -144,7 +146,7 @@ class Case:
             rows.append(
                 Comparison(
                     f"{self.name} {name}, batch, 2 threads",
-                    "itself with 1 thread",
+                    "armblocks, 1 thread",
                     one.per(N),
                     two.per(N),
                     1.8,
@@ -154,7 +156,7 @@ class Case:
 
     def _row(
         self,
-        what: str,
+        name: str,
         peer: str,
         theirs: Callable[[], object],
         ours: Callable[[], object],
@@ -162,7 +164,7 @@ class Case:
         repeats: int,
     ) -> Comparison:
         a, b = in_turn([theirs, ours], repeats)
-        return Comparison(f"{self.name} {what}", peer, a.per(N), b.per(N), target)
+        return Comparison(f"{self.name} {name}", peer, a.per(N), b.per(N), target)
 
     # ---- single calls ----------------------------------------------------------------------------------
     def singles(self, repeats: int) -> list[Comparison]:
@@ -192,8 +194,8 @@ class Case:
             for x in q:
                 fkine(x)
 
-        works = [their_rne, our_rne, their_fkine, their_tip, our_fkine]
-        a, b, c, d, e = (timing.per(SINGLE) for timing in in_turn(works, repeats, warm=2))
+        functions = [their_rne, our_rne, their_fkine, their_tip, our_fkine]
+        a, b, c, d, e = (timing.per(SINGLE) for timing in in_turn(functions, repeats, warm=2))
         return [
             Comparison(f"{self.name} rne, single call", "pinocchio.rnea", a, b, 3),
             Comparison(
@@ -206,7 +208,7 @@ class Case:
 
 
 def share(case: Case, name: str, peak: float, repeats: int) -> list[str]:
-    """Operations of one kernel, its batch time per evaluation, and its fraction of the arithmetic peak."""
+    """Table cells of one kernel: operations, batch time per evaluation, fraction of the arithmetic peak."""
     kernel = getattr(case.arm, name)
     count = case.arm.operation_count(name)
     inputs = {

@@ -1,4 +1,4 @@
-// Places blocks with elkjs: reads a list of graphs from standard input, writes them with places.
+// Reads a list of graphs from standard input and writes them with the node positions of elkjs.
 import { createRequire } from 'node:module'
 import { readFileSync } from 'node:fs'
 

@@ -1,4 +1,4 @@
-"""Measurement: alternating repeats, medians, and a description of the machine."""
+"""Timing of functions in alternation, medians, and a description of the machine."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 TURN_SECONDS = 0.03
-"""Duration of one turn, s; short functions are repeated, so that cold caches affect only the first call."""
+"""Duration of one turn, s. Short functions are called many times, so that cold caches affect one call."""
 
 
 @dataclass(frozen=True)
 class Timing:
-    """Seconds per call in each turn."""
+    """Seconds per call in each turn (one uninterrupted sequence of calls)."""
 
     turns: tuple[float, ...]
 
@@ -38,35 +38,35 @@ class Timing:
         return Timing(tuple(turn / count for turn in self.turns))
 
     def times_faster_than(self, other: Timing) -> float:
-        """Median of the ratios of the turns; both times of a ratio are from the same fraction of a second."""
+        """Median over the turns of the time of ``other`` divided by the time of this function."""
         return statistics.median(b / a for a, b in zip(self.turns, other.turns, strict=True))
 
 
 def in_turn(
-    works: Sequence[Callable[[], object]], repeats: int, warm: int = 1, turn_seconds: float = TURN_SECONDS
+    functions: Sequence[Callable[[], object]], repeats: int, warm: int = 1, turn_seconds: float = TURN_SECONDS
 ) -> list[Timing]:
-    """Time the functions in the order A B A B …, so that a drift of the machine affects all equally."""
-    runs: list[int] = []
-    for work in works:
+    """Time the functions in the order A B A B …, so that changes of the clock rate affect all equally."""
+    calls: list[int] = []
+    for function in functions:
         for _ in range(warm):
-            work()
+            function()
         start = time.perf_counter()
-        work()
-        runs.append(max(1, round(turn_seconds / (time.perf_counter() - start))))
-    seconds: list[list[float]] = [[] for _ in works]
+        function()
+        calls.append(max(1, round(turn_seconds / (time.perf_counter() - start))))
+    seconds: list[list[float]] = [[] for _ in functions]
     for _ in range(repeats):
-        for place, work in enumerate(works):
+        for index, function in enumerate(functions):
             start = time.perf_counter()
-            for _ in range(runs[place]):
-                work()
-            seconds[place].append((time.perf_counter() - start) / runs[place])
+            for _ in range(calls[index]):
+                function()
+            seconds[index].append((time.perf_counter() - start) / calls[index])
     return [Timing(tuple(row)) for row in seconds]
 
 
 def process_in_turn(
     commands: Sequence[Sequence[str]], repeats: int, env: dict[str, str] | None = None
 ) -> list[Timing]:
-    """Wall time of complete processes, in alternation."""
+    """Time complete processes in alternation (wall time)."""
 
     def run(command: Sequence[str]) -> Callable[[], object]:
         return lambda: subprocess.run(
@@ -77,7 +77,10 @@ def process_in_turn(
 
 
 def reachable_peak() -> float:
-    """Multiplications and additions per second of one core in a large matrix product (a fma is two)."""
+    """Multiplications and additions per second of one core in a large matrix product.
+
+    A fused multiply-add counts as two operations.
+    """
     n = 1024
     a, b = (np.random.default_rng(seed).standard_normal((n, n)) for seed in (0, 1))
     with threadpool_limits(1):
@@ -94,7 +97,7 @@ def cpu_name() -> str:
 
 
 def machine_lines(packages: Sequence[str]) -> list[str]:
-    """Description of the machine and the package versions, for the head of the results."""
+    """Description of the machine and the package versions, for the first lines of the results."""
     versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in packages)
     return [
         f"{cpu_name()}, {os.cpu_count()} cores, {platform.system()} {platform.release()}, "

@@ -1,9 +1,10 @@
-"""The diagram of the paper compared with Drake: the same signals, each in the best form of its program.
+"""The diagram of the paper compared with Drake: the same signals, with native systems where available.
 
-Drake: TrajectorySource, InverseDynamics and filters are native systems; forward kinematics is a Python leaf
-system around MultibodyPlant, because Drake has no native one. runge_kutta5, accuracy 1e-3, steps of at most
-10 ms, torque and filtered derivative logged every 10 ms. armblocks: the shipped example, 10 ms, all of its
-signals recorded; its derivatives are exact, so no filter state is integrated.
+Drake: TrajectorySource, InverseDynamics and the filters are native systems. Forward kinematics is a Python
+leaf system that calls MultibodyPlant, because Drake has no native one. The integrator is runge_kutta5 with
+accuracy 1e-3 and steps of at most 10 ms. Torque and filtered derivative are logged every 10 ms. armblocks:
+the shipped example with steps of 10 ms, all signals recorded. Its derivatives are exact, so it has no
+filter states.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import armblocks as ab
 
 
 def drake_run() -> float:
-    """Build Drake's diagram and return the seconds of AdvanceTo(10 s)."""
+    """Build Drake's diagram and return the wall time of AdvanceTo(10 s), in s."""
     logging.getLogger("drake").setLevel(logging.ERROR)
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
@@ -101,7 +102,7 @@ def drake_run() -> float:
 
 
 def compare(repeats: int) -> tuple[Timing, Timing]:
-    """Seconds of the 10 s run without compilation: Drake, and armblocks through the public ``simulate``."""
+    """Wall times of the 10 s run without compilation: Drake, then armblocks through ``simulate``."""
     diagram = ab.load_diagram("kr180model")
     ab.simulate(diagram)
     theirs: list[float] = []

@@ -1,10 +1,11 @@
-"""Runs of bdsim and PathSim in a separate process and environment, controlled through standard input.
+"""Run bdsim and PathSim in a separate process and environment, on requests from standard input.
 
     python -m venv peers && peers/bin/pip install bdsim==1.4.0 pathsim==0.27.1 roboticstoolbox-python==1.5.0
     ARMBLOCKS_PEERS=peers/bin/python python benchmarks/run.py
 
-For each line `TOOL MODEL` of the input, a JSON line is printed: the seconds of the run alone, its number of
-steps and its final states. The model is built again for each line; graphics and progress output are disabled.
+Each line `TOOL MODEL` of the input gives one JSON line: wall time of the run in s, number of steps, final
+states. The program builds the model again for each line, outside the measured time. Graphics and progress
+output are off.
 
 - `computed_torque`: Puma 560 without friction, quintic reference in 10 s, computed torque (KP 100, KD 20),
   initial error 0.1 rad; Runge-Kutta 5(4), rtol 1e-6, atol 1e-8.
@@ -13,8 +14,8 @@ steps and its final states. The model is built again for each line; graphics and
 - `five_blocks`: step, sum, gain, second-order plant of two integrators, 10 s; fixed steps of 1 ms, RK4.
 - `multirate`: the first 0.1 s of the shipped `puma560_multirate`: computed torque at 1 kHz (KP 900, KD 60)
   around PI control of the currents at 10 kHz, windings of six motors, the arm with viscous friction;
-  Runge-Kutta 5(4), rtol 1e-6, atol 1e-9. A sampled block of bdsim outputs at a tick its input of the
-  previous tick, so the P part is corrected by the contribution of this tick to the integral.
+  Runge-Kutta 5(4), rtol 1e-6, atol 1e-9. At a tick, a sampled block of bdsim outputs its input of the
+  previous tick. The proportional gain is therefore reduced by the contribution of one tick to the integral.
 """
 
 # bdsim and PathSim have no type annotations.
@@ -36,22 +37,22 @@ QF = np.array([0.5, 0.9, -0.8, 0.6, -0.4, 1.0])
 KP, KD, T = 100.0, 20.0, 10.0
 
 
-class _MendedBdsim(MetaPathFinder):
-    """Corrects one line of bdsim 1.4.0 at import, which otherwise fails with roboticstoolbox 1.5.0."""
+class _PatchedBdsimFinder(MetaPathFinder):
+    """Import finder that corrects one line of bdsim 1.4.0, which fails with roboticstoolbox 1.5.0."""
 
     def find_spec(self, name: str, path: Sequence[str] | None, target: Any = None) -> Any:
         if name != "bdsim.run_sim":
             return None
         spec = importlib.machinery.PathFinder.find_spec(name, path)
         if spec is not None and spec.origin is not None:
-            spec.loader = _MendedSource(name, spec.origin)
+            spec.loader = _PatchedSourceLoader(name, spec.origin)
         return spec
 
 
-class _MendedSource(importlib.machinery.SourceFileLoader):
+class _PatchedSourceLoader(importlib.machinery.SourceFileLoader):
     def get_data(self, path: str) -> bytes:
         if not path.endswith(".py"):
-            raise OSError("compiled again, because the source is corrected")
+            raise OSError("no bytecode: the source is patched")
         return super().get_data(path).replace(b'dict["type"].get', b'dict.get("type", {}).get')
 
 
@@ -250,13 +251,13 @@ PATHSIM: dict[str, Callable[[], tuple[Any, ...]]] = {
 
 
 def main() -> None:
-    sys.meta_path.insert(0, _MendedBdsim())
-    answers, sys.stdout = sys.stdout, sys.stderr  # other output goes to standard error
+    sys.meta_path.insert(0, _PatchedBdsimFinder())
+    replies, sys.stdout = sys.stdout, sys.stderr  # other output goes to standard error
     for line in sys.stdin:
         tool, model = line.split()
         run = {"bdsim": bdsim_run, "pathsim": pathsim_run}[tool]
-        answers.write(json.dumps(run(model)) + "\n")
-        answers.flush()
+        replies.write(json.dumps(run(model)) + "\n")
+        replies.flush()
 
 
 if __name__ == "__main__":

@@ -1,11 +1,12 @@
-"""Run all measurements in comparison with other programs and write RESULTS.md.
+"""Compare armblocks with other programs and write RESULTS.md.
 
     python benchmarks/run.py [--quick]
         [--only dynamics,diagram,simulations,multirate,growth,stiff,startup,studio]
 
-Needs the extras ``test`` and ``benchmark`` (Pinocchio, Drake, bdsim, PathSim; the latter two optionally in a
-separate environment, see `python_peers.py`). armblocks and the other programs run in alternation. With
-``--only`` the other sections of the file are unchanged; the new ones state their date and load.
+Needs the extras ``test`` and ``benchmark`` (Pinocchio, Drake, bdsim, PathSim; the latter two optionally in
+a separate environment, see `python_peers.py`). armblocks and the other programs run in alternation. With
+``--only`` the other sections of the file are unchanged. Each new section states its date and the load
+average.
 """
 
 # pyright: basic
@@ -40,7 +41,7 @@ def nanoseconds(seconds: float) -> str:
 def comparison_rows(rows: Sequence[dynamics.Comparison]) -> list[list[str]]:
     return [
         [
-            row.what,
+            row.name,
             row.peer,
             nanoseconds(row.theirs.median),
             nanoseconds(row.ours.median),
@@ -52,27 +53,27 @@ def comparison_rows(rows: Sequence[dynamics.Comparison]) -> list[list[str]]:
     ]
 
 
-def dynamics_part(repeats: int) -> list[str]:
+def dynamics_section(repeats: int) -> list[str]:
     lines = ["## Robot kernels", ""]
     comparisons, agreements, counts = [], [], []
     peak = reachable_peak()
     for name in ("puma560", "kr180"):
         case = dynamics.Case(name)
-        agreements += [[row.what, f"{row.error:.1e}"] for row in case.agreement()]
+        agreements += [[row.name, f"{row.error:.1e}"] for row in case.agreement()]
         comparisons += case.batches(repeats) + case.singles(4 * repeats)
         counts += [[f"{name} {kernel}", *dynamics.share(case, kernel, peak, repeats)] for kernel in KERNELS]
-    head = ["what", "peer", "peer's time", "armblocks", "faster", "target", ""]
+    head = ["measurement", "other program", "its time", "armblocks", "speed-up", "target", ""]
     lines += table(head, comparison_rows(comparisons))
     lines += [
         "",
-        "Per evaluation: medians over the turns, and the median of the ratios of the turns. The robots are "
-        "frictionless here, because Pinocchio has no friction.",
+        "Time of one evaluation, median of the repetitions. The speed-up is the median of their ratios. The "
+        "robots have no friction, because Pinocchio does not model it.",
     ]
     lines += [
         "",
         "### Agreement of the results",
         "",
-        *table(["what", "largest difference to Pinocchio, relative"], agreements),
+        *table(["kernel", "largest difference to Pinocchio, relative"], agreements),
     ]
     lines += ["", "### Operations per evaluation, and the share of the core's arithmetic peak", ""]
     lines += table(
@@ -88,7 +89,7 @@ def dynamics_part(repeats: int) -> list[str]:
     return lines
 
 
-def diagram_part(repeats: int) -> list[str]:
+def diagram_section(repeats: int) -> list[str]:
     theirs, ours = paper_model.compare(repeats)
     ratio = ours.times_faster_than(theirs)
     row = [
@@ -100,7 +101,7 @@ def diagram_part(repeats: int) -> list[str]:
         "500 x",
         "met" if ratio >= 500 else "missed",
     ]
-    head = ["what", "peer", "peer's time", "armblocks", "faster", "target", ""]
+    head = ["measurement", "other program", "its time", "armblocks", "speed-up", "target", ""]
     return [
         "## Block diagrams",
         "",
@@ -113,7 +114,7 @@ def diagram_part(repeats: int) -> list[str]:
 def compared_table(group: str, repeats: int) -> list[str]:
     compared = [
         [
-            row.what,
+            row.name,
             row.peer,
             f"{row.theirs.median * 1e3:,.1f} ms",
             f"{row.ours.median * 1e3:.3f} ms",
@@ -124,38 +125,47 @@ def compared_table(group: str, repeats: int) -> list[str]:
         ]
         for row in simulations.rows(group, repeats)
     ]
-    head = ["what", "peer", "peer's time", "armblocks", "faster", "target", "", "final values differ by"]
+    head = [
+        "measurement",
+        "other program",
+        "its time",
+        "armblocks",
+        "speed-up",
+        "target",
+        "",
+        "final values differ by",
+    ]
     return table(head, compared)
 
 
-def simulations_part(repeats: int) -> list[str]:
+def simulations_section(repeats: int) -> list[str]:
     message = (simulations.__doc__ or "").split("Multirate: ")[0].strip().splitlines()[2:]
     return ["## Whole simulations", "", *compared_table("simulations", repeats), "", *message]
 
 
-def multirate_part(repeats: int) -> list[str]:
+def multirate_section(repeats: int) -> list[str]:
     message = "Multirate: " + (simulations.__doc__ or "").split("Multirate: ")[1].strip()
     compared = compared_table("multirate", max(1, repeats // 3))
     return ["## A multirate simulation", "", *compared, "", *message.splitlines()]
 
 
-def growth_part(repeats: int) -> list[str]:
+def growth_section(repeats: int) -> list[str]:
     grown = simulations.growth(max(1, repeats // 3))
-    head = ["chain", "build", "trace", "compile", "run 10 s", "all, s", "median of turns, s"]
+    head = ["chain", "build", "trace", "compile", "run 10 s", "total, s", "median of repetitions, s"]
     return [
         "## Diagrams of many blocks",
         "",
         *table(head, grown),
         "",
-        "Seconds, each in a new process without a cache, minimum of the turns. `mixed`: gains, first-order "
-        "transfer functions, unit delays at 10 ms, saturations in turn.",
+        "Seconds, minimum of the repetitions, each in a new process without a cache. `mixed`: gains, "
+        "first-order transfer functions, unit delays at 10 ms and saturations in alternation.",
     ]
 
 
-def startup_part(repeats: int) -> list[str]:
+def startup_section(repeats: int) -> list[str]:
     numpy, armblocks = startup.imports(3 * repeats)
     cold, warm = startup.first_result(repeats)
-    report = startup.whole_report(repeats)
+    report = startup.complete_report(repeats)
     extra = armblocks.median - numpy.median
     rows = [
         ["`import armblocks`, beyond `import numpy`", f"{extra:.3f} s", "0.10 s", extra <= 0.10],
@@ -172,26 +182,27 @@ def startup_part(repeats: int) -> list[str]:
         "## Start-up",
         "",
         *table(
-            ["what", "armblocks", "target", ""], [[a, b, c, "met" if d else "missed"] for a, b, c, d in rows]
+            ["measurement", "armblocks", "target", ""],
+            [[a, b, c, "met" if d else "missed"] for a, b, c, d in rows],
         ),
     ]
-    return [*lines, "", f"`import numpy` alone: {numpy.median:.3f} s. Whole processes, medians."]
+    return [*lines, "", f"`import numpy` alone: {numpy.median:.3f} s. Complete processes, medians."]
 
 
-PARTS = {
-    "dynamics": dynamics_part,
-    "diagram": diagram_part,
-    "simulations": simulations_part,
-    "multirate": multirate_part,
-    "growth": growth_part,
-    "stiff": stiff.stiff_part,
-    "startup": startup_part,
-    "studio": studio.studio_part,
+SECTIONS = {
+    "dynamics": dynamics_section,
+    "diagram": diagram_section,
+    "simulations": simulations_section,
+    "multirate": multirate_section,
+    "growth": growth_section,
+    "stiff": stiff.stiff_section,
+    "startup": startup_section,
+    "studio": studio.studio_section,
 }
 
 
-def replaced(text: str, section: Sequence[str]) -> str:
-    """Return ``text`` with the section of that heading replaced or added."""
+def with_section(text: str, section: Sequence[str]) -> str:
+    """Return ``text`` with ``section`` in place of the section with the same heading, or at the end."""
     parts = text.split("\n## ")
     heading = section[0].removeprefix("## ")
     body = "\n".join([heading, *section[1:]]).rstrip() + "\n"
@@ -205,31 +216,34 @@ def replaced(text: str, section: Sequence[str]) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="fewer repeats, result printed and not written")
-    parser.add_argument("--only", default=",".join(PARTS), help="parts, separated by commas")
+    parser.add_argument(
+        "--quick", action="store_true", help="fewer repetitions; the result is printed and not written"
+    )
+    parser.add_argument("--only", default=",".join(SECTIONS), help="sections, separated by commas")
     arguments = parser.parse_args()
     repeats = 3 if arguments.quick else 15
     names = arguments.only.split(",")
     machine = machine_lines(["armblocks", "numpy", "casadi", "llvmlite", "pin", "drake"])
     today = datetime.date.today().isoformat()
-    sections = {name: PARTS[name](repeats) for name in names}
+    sections = {name: SECTIONS[name](repeats) for name in names}
     for section in sections.values():
         print("\n".join(section), "\n")
     if arguments.quick:
         return
     results = HERE / "RESULTS.md"
-    if set(names) == set(PARTS) or not results.exists():
-        lines = ["# Measured", "", f"{today}, by `python benchmarks/run.py`.", ""]
+    notes = (HERE / "NOTES.md").read_text().rstrip() + "\n"
+    if set(names) == set(SECTIONS) or not results.exists():
+        lines = ["# Benchmark results", "", f"{today}, by `python benchmarks/run.py`.", ""]
         lines += [f"- {line}" for line in machine]
         for section in sections.values():
             lines += ["", *section]
-        text = "\n".join(lines) + "\n\n" + (HERE / "NOTES.md").read_text().rstrip() + "\n"
+        text = "\n".join(lines) + "\n\n" + notes
     else:
-        text = results.read_text().split("\n## What was missed")[0].rstrip() + "\n"
+        text = results.read_text().split("\n" + notes.splitlines()[0])[0].rstrip() + "\n"
         for section in sections.values():
             message = ["", f"Measured separately on {today}: {machine[-1]}."]
-            text = replaced(text, [*section, *message])
-        text += "\n" + (HERE / "NOTES.md").read_text().rstrip() + "\n"
+            text = with_section(text, [*section, *message])
+        text += "\n" + notes
     results.write_text(text)
 
 

@@ -1,15 +1,15 @@
-"""Complete simulations compared with Drake, bdsim and PathSim, and run times of diagrams of many blocks.
+"""Simulations compared with Drake, bdsim and PathSim, and run times of large diagrams.
 
-Computed torque: the shipped `puma560_computed_torque`; bdsim uses Robotics Toolbox blocks (its inverse
-dynamics in C), Drake InverseDynamicsController, TrajectorySource and MultibodyPlant, all native. Van der Pol:
-the shipped `van_der_pol_pid`, 100 s; in Drake the plant is a SymbolicVectorSystem. All runs use adaptive
-methods of order 5 at rtol 1e-6 (Drake: accuracy 1e-6), without compilation; armblocks records 1001 and 2001
-instants of all signals. Five blocks: step, sum, gain and two integrators, 10 s in steps of 1 ms; RK4, except
-for bdsim, which has only SciPy's adaptive methods (5(4) with a maximum step of 1 ms), and Drake
-(runge_kutta3, fixed).
-Multirate: the shipped `puma560_multirate`, 10 s, 100 000 ticks; bdsim would need minutes, so it runs the
-first 0.1 s, 1000 ticks, and its time is multiplied by 100. The states at 0.1 s are compared; where both
-clocks tick, bdsim's current loop reads the new torque one tick later.
+Computed torque: the shipped `puma560_computed_torque`. bdsim uses blocks of the Robotics Toolbox with
+inverse dynamics in C. Drake uses InverseDynamicsController, TrajectorySource and MultibodyPlant, all
+native. Van der Pol: the shipped `van_der_pol_pid`, 100 s. In Drake the plant is a SymbolicVectorSystem.
+Both models: adaptive methods of order 5 at rtol 1e-6 (Drake: accuracy 1e-6), time without compilation.
+armblocks records 1001 and 2001 samples of all signals. Five blocks: step, sum, gain and two integrators, 10
+s in steps of 1 ms. The method is RK4, with two exceptions: SciPy's 5(4) method with a maximum step of 1 ms
+in bdsim, which has no fixed step, and runge_kutta3 with fixed steps in Drake.
+Multirate: the shipped `puma560_multirate`, 10 s, 100 000 ticks. bdsim would need minutes for it. It
+therefore simulates the first 0.1 s (1000 ticks), and its time is multiplied by 100. The states at 0.1 s are
+compared. At common ticks of both clocks, the current loop of bdsim reads the new torque one tick later.
 """
 
 # Drake's type stubs do not match its functions.
@@ -42,7 +42,7 @@ QF = np.array([0.5, 0.9, -0.8, 0.6, -0.4, 1.0])
 
 @dataclass(frozen=True)
 class Run:
-    """One run of one program: seconds without compilation, steps, and final values."""
+    """One run of one program: wall time without compilation in s, number of steps, final values."""
 
     seconds: float
     steps: int
@@ -51,7 +51,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Row:
-    what: str
+    name: str
     peer: str
     theirs: Timing
     ours: Timing
@@ -129,8 +129,8 @@ def drake_computed_torque() -> Run:
     diagram = builder.Build()
     context = diagram.CreateDefaultContext()
     start = np.concatenate([np.full(6, 0.1), np.zeros(6)])
-    own = arm.GetMyMutableContextFromRoot(context)
-    arm.SetPositionsAndVelocities(own, start)
+    arm_context = arm.GetMyMutableContextFromRoot(context)
+    arm.SetPositionsAndVelocities(arm_context, start)
     return _drake_run(diagram, context, T, "runge_kutta5", 1e-6, 0.1)
 
 
@@ -157,32 +157,32 @@ def drake_van_der_pol() -> Run:
     plant = builder.AddSystem(SymbolicVectorSystem(state=x, input=v, dynamics=rates, output=[x[0], x[1]]))
     split = builder.AddSystem(Demultiplexer(2, 1))
 
-    def wire(source: Any, target: Any, entry: int = 0, port: int = 0) -> None:
+    def connect(source: Any, target: Any, entry: int = 0, port: int = 0) -> None:
         builder.Connect(source.get_output_port(port), target.get_input_port(entry))
 
-    wire(wave, error, 0)
-    wire(plant, split)
-    wire(split, minus)
-    wire(minus, error, 1)
-    wire(error, kp)
-    wire(error, integral)
-    wire(integral, ki)
-    wire(split, kd, 0, 1)
-    wire(kp, u, 0)
-    wire(ki, u, 1)
-    wire(kd, u, 2)
-    wire(u, plant)
+    connect(wave, error, 0)
+    connect(plant, split)
+    connect(split, minus)
+    connect(minus, error, 1)
+    connect(error, kp)
+    connect(error, integral)
+    connect(integral, ki)
+    connect(split, kd, 0, 1)
+    connect(kp, u, 0)
+    connect(ki, u, 1)
+    connect(kd, u, 2)
+    connect(u, plant)
     LogVectorOutput(split.get_output_port(0), builder, 0.05)
     diagram = builder.Build()
     context = diagram.CreateDefaultContext()
     plant.GetMyMutableContextFromRoot(context).SetContinuousState([1.0, 0.0])
     run = _drake_run(diagram, context, 100.0, "runge_kutta5", 1e-6, 1.0)
-    return Run(run.seconds, run.steps, plant_end(plant, context))
+    return Run(run.seconds, run.steps, plant_states(plant, context))
 
 
-def plant_end(plant: Any, context: Any) -> list[float]:
-    own = plant.GetMyContextFromRoot(context)
-    return own.get_continuous_state_vector().CopyToVector().tolist()
+def plant_states(plant: Any, context: Any) -> list[float]:
+    plant_context = plant.GetMyContextFromRoot(context)
+    return plant_context.get_continuous_state_vector().CopyToVector().tolist()
 
 
 def drake_five_blocks() -> Run:
@@ -204,16 +204,16 @@ def drake_five_blocks() -> Run:
     diagram = builder.Build()
     context = diagram.CreateDefaultContext()
     run = _drake_run(diagram, context, 10.0, "runge_kutta3", None, 1e-3)
-    return Run(run.seconds, run.steps, [*plant_end(place, context), *plant_end(speed, context)])
+    return Run(run.seconds, run.steps, [*plant_states(place, context), *plant_states(speed, context)])
 
 
 def _drake_run(
-    diagram: Any, context: Any, stop: float, method: str, accuracy: float | None, longest: float
+    diagram: Any, context: Any, stop: float, method: str, accuracy: float | None, max_step: float
 ) -> Run:
     from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
     simulator = Simulator(diagram, context)
-    ResetIntegratorFromFlags(simulator, method, longest)
+    ResetIntegratorFromFlags(simulator, method, max_step)
     integrator = simulator.get_mutable_integrator()
     if accuracy is None:
         integrator.set_fixed_step_mode(True)
@@ -232,22 +232,26 @@ FIXED = {"stop_time": 10.0, "step": 1e-3, "solver": "rk4", "sample_time": 0.01}
 
 @dataclass(frozen=True)
 class Peer:
-    """Another program's run of the same model. ``ends``: the compared final values; ``times``: factor by
-    which its run time is multiplied."""
+    """The same model in another program.
+
+    ``final``: indices of the compared final values; ``factor``: multiplies the run time.
+    """
 
     name: str
     run: Callable[[], Run]
     target: float
-    ends: Any
-    times: float = 1.0
+    final: Any
+    factor: float = 1.0
 
 
 @dataclass(frozen=True)
 class Case:
-    """A model: run of armblocks, compared signals, other programs; ``compared``: the run whose values are
-    compared, if it differs from the timed one."""
+    """A model with its run in armblocks, the compared signals and the other programs.
 
-    what: str
+    ``compared`` is the run whose final values are compared, unless this is the timed run.
+    """
+
+    name: str
     ours: Callable[[], ab.SimulationResult]
     signals: Sequence[str]
     peers: Sequence[Peer]
@@ -255,7 +259,7 @@ class Case:
 
 
 def cases(peers: PythonPeers) -> dict[str, list[Case]]:
-    """The models by group."""
+    """Return the models of each group."""
     torque, oscillator = ab.load_diagram("puma560_computed_torque"), ab.load_diagram("van_der_pol_pid")
     multirate, five = ab.load_diagram("puma560_multirate"), five_blocks()
 
@@ -299,7 +303,7 @@ def cases(peers: PythonPeers) -> dict[str, list[Case]]:
                 "multirate Puma 560, 1 and 10 kHz, 10 s",
                 lambda: ab.simulate(multirate),
                 ("arm/q", "arm/qd"),
-                [Peer("bdsim, 0.1 s times 100", of("bdsim", "multirate"), 200.0, slice(0, 12), times=100.0)],
+                [Peer("bdsim, 0.1 s times 100", of("bdsim", "multirate"), 200.0, slice(0, 12), factor=100.0)],
                 compared=lambda: ab.simulate(multirate, stop_time=0.1),
             )
         ],
@@ -307,7 +311,7 @@ def cases(peers: PythonPeers) -> dict[str, list[Case]]:
 
 
 def rows(group: str, repeats: int) -> list[Row]:
-    """Every comparison of a group, in the order A B C A B C …"""
+    """Compare all models of a group; the programs run in alternation."""
     logging.getLogger("drake").setLevel(logging.ERROR)
     peers = PythonPeers()
     rows_of_group: list[Row] = []
@@ -321,11 +325,11 @@ def rows(group: str, repeats: int) -> list[Row]:
         for _ in range(repeats):
             for k, peer in enumerate(case.peers):
                 run = peer.run()
-                times[k].append(run.seconds * peer.times)
-                worst[k] = max(worst[k], float(np.abs(np.asarray(run.final)[peer.ends] - end).max()))
+                times[k].append(run.seconds * peer.factor)
+                worst[k] = max(worst[k], float(np.abs(np.asarray(run.final)[peer.final] - end).max()))
             mine += in_turn([case.ours], 1)[0].turns
         rows_of_group += [
-            Row(case.what, peer.name, Timing(tuple(times[k])), Timing(tuple(mine)), peer.target, worst[k])
+            Row(case.name, peer.name, Timing(tuple(times[k])), Timing(tuple(mine)), peer.target, worst[k])
             for k, peer in enumerate(case.peers)
         ]
     peers.close()
@@ -364,7 +368,7 @@ print(json.dumps([spent[0], spent[1], spent[2] - result.run.wall_time, result.ru
 
 
 def growth(repeats: int, counts: Sequence[int] = (10, 100, 1000, 10_000)) -> list[list[str]]:
-    """Seconds to build, trace, compile and run chains of blocks, each in a new process without a cache."""
+    """Table of times to build, trace, compile and run chains of blocks, s; each in a new process."""
     table: list[list[str]] = []
     for kinds in ("gains", "mixed"):
         for count in counts:

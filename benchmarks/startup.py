@@ -13,7 +13,7 @@ FIRST_RNE = "import armblocks as ab; arm = ab.load_robot('puma560'); arm.rne([0]
 
 
 def imports(repeats: int) -> tuple[Timing, Timing]:
-    """Complete processes: ``import numpy``, and the same with ``armblocks``."""
+    """Times of the processes that import ``numpy``, and ``numpy`` with ``armblocks``."""
     numpy, armblocks = process_in_turn(
         [[PYTHON, "-c", "import numpy"], [PYTHON, "-c", "import numpy, armblocks"]], repeats
     )
@@ -21,25 +21,25 @@ def imports(repeats: int) -> tuple[Timing, Timing]:
 
 
 def first_result(repeats: int) -> tuple[Timing, Timing]:
-    """Process start to first rne of the Puma: with an empty cache each time, and with a filled one."""
+    """Times from process start to the first rne of the Puma 560, with an empty and with a filled cache."""
     cold = []
     for _ in range(repeats):
         with tempfile.TemporaryDirectory() as folder:
-            cold.append(first_use(folder))
+            cold.append(cold_first_result(folder))
     with tempfile.TemporaryDirectory() as folder:
         [warm] = process_in_turn([[PYTHON, "-c", FIRST_RNE]], repeats, env={"ARMBLOCKS_CACHE_DIR": folder})
     return Timing(tuple(cold)), warm
 
 
-def first_use(folder: str) -> float:
-    """Seconds of one process with an empty cache."""
+def cold_first_result(folder: str) -> float:
+    """Wall time of one process with an empty cache, s."""
     start = time.perf_counter()
     subprocess.run([PYTHON, "-c", FIRST_RNE], check=True, env={**os.environ, "ARMBLOCKS_CACHE_DIR": folder})
     return time.perf_counter() - start
 
 
-def whole_report(repeats: int) -> Timing:
-    """``armblocks run kr180model`` with all figures, from process start to the end, with filled caches."""
+def complete_report(repeats: int) -> Timing:
+    """Wall time of ``armblocks run kr180model`` with all figures and filled caches."""
     with tempfile.TemporaryDirectory() as folder:
         command = [PYTHON, "-m", "armblocks", "run", "kr180model", "--out", f"{folder}/report"]
         [timing] = process_in_turn([command], repeats)

@@ -2,11 +2,11 @@
 
     python benchmarks/stiff.py [--quick]
 
-All solvers use the exact Jacobian: SciPy as a function (sparse if the problem is), CVODES in CasADi by
-CasADi's differentiation and with its sparse linear solver, all in C. scikit-sundae's CVODE, if it is
-installed, calls Python for the derivatives, which are the compiled ones of this package. The error is the
-largest relative error at the end, with `rodas5p` at 1e-11 as reference (which agrees with Radau at 1e-10 to 8
-digits or more). Wall time is that of a run without compilation, the minimum of the turns.
+All solvers use the exact Jacobian. SciPy calls it as a function, sparse for the Brusselator. CVODES in
+CasADi gets it from CasADi and uses a sparse linear solver; all of its code is C. CVODE of scikit-sundae, an
+optional package, calls the compiled derivatives of armblocks through Python. The error is the largest
+relative error at the end. Its reference is `rodas5p` at rtol 1e-11, which agrees with Radau at 1e-10 to at
+least 8 digits. The time is the wall time of a run without compilation, minimum of the repetitions.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ RTOL = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class Problem:
-    """``y' = rates(y)`` from ``start`` to ``stop`` s; all solvers use ``atol`` and ``RTOL``."""
+    """``y' = rates(y)`` with ``y(0) = start``, up to ``stop`` s. All solvers use ``atol`` and ``RTOL``."""
 
     name: str
     rates: Callable[[ca.SX], ca.SX]
@@ -43,8 +43,8 @@ class Problem:
 
 
 def robertson(y: ca.SX) -> ca.SX:
-    slow, fast, back = 0.04 * y[0], 3e7 * y[1] ** 2, 1e4 * y[1] * y[2]
-    return ca.vertcat(back - slow, slow - back - fast, fast)
+    slow, fast, reverse = 0.04 * y[0], 3e7 * y[1] ** 2, 1e4 * y[1] * y[2]
+    return ca.vertcat(reverse - slow, slow - reverse - fast, fast)
 
 
 def van_der_pol(y: ca.SX) -> ca.SX:
@@ -52,19 +52,19 @@ def van_der_pol(y: ca.SX) -> ca.SX:
 
 
 def brusselator(n: int) -> Problem:
-    """Two substances that react and diffuse along a line of n points (Hairer, Wanner II, IV.10, (10.6'))."""
+    """Reaction and diffusion of two substances on a line of n points (Hairer, Wanner II, IV.10, (10.6'))."""
     place = np.arange(1, n + 1) / (n + 1)
     start = np.column_stack([1.0 + np.sin(2 * np.pi * place), np.full(n, 3.0)]).ravel()
     rate = 0.02 * (n + 1) ** 2
 
     def rates(y: ca.SX) -> ca.SX:
         u, v = y[0::2], y[1::2]
-        spread = [
+        diffusion = [
             rate * (ca.vertcat(edge, part[:-1]) - 2 * part + ca.vertcat(part[1:], edge))
             for part, edge in ((u, 1.0), (v, 3.0))
         ]
-        du = 1.0 + u**2 * v - 4.0 * u + spread[0]
-        dv = 3.0 * u - u**2 * v + spread[1]
+        du = 1.0 + u**2 * v - 4.0 * u + diffusion[0]
+        dv = 3.0 * u - u**2 * v + diffusion[1]
         return ca.reshape(ca.horzcat(du, dv).T, 2 * n, 1)
 
     return Problem(name=f"Brusselator, {2 * n} states", rates=rates, start=start, stop=10.0, atol=1e-6)
@@ -88,7 +88,7 @@ PROBLEMS = (
 
 def compiled(problem: Problem) -> CompiledSystem:
     n = problem.start.size
-    ends = signature(("t", ()), ("x", (n,)), ("p", (0,)))
+    arguments = signature(("t", ()), ("x", (n,)), ("p", (0,)))
     only_p = signature(("p", (0,)))
     trace = TracedFunction.trace
     system = continuous_system(
@@ -97,8 +97,8 @@ def compiled(problem: Problem) -> CompiledSystem:
         parameters=signature(),
         signals_layout=signature(Slot("y", (n,))),
         parameter_values=np.empty(0),
-        derivative=trace("derivative", ends, signature(("xd", (n,))), lambda t, x, p: problem.rates(x)),
-        signals=trace("signals", ends, signature(("y", (n,))), lambda t, x, p: x),
+        derivative=trace("derivative", arguments, signature(("xd", (n,))), lambda t, x, p: problem.rates(x)),
+        signals=trace("signals", arguments, signature(("y", (n,))), lambda t, x, p: x),
         initial_states=trace(
             "initial_states", only_p, signature(("x0", (n,))), lambda p: ca.SX(ca.DM(problem.start))
         ),
@@ -110,7 +110,7 @@ def compiled(problem: Problem) -> CompiledSystem:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """One solver on one problem; ``seconds`` is the minimum of the turns."""
+    """Result of one solver on one problem. ``seconds`` is the minimum of the repetitions."""
 
     solver: str
     steps: int
@@ -119,10 +119,10 @@ class Outcome:
 
 
 Solve = Callable[[], tuple[np.ndarray, int]]
-"""Returns the final state and the number of steps."""
+"""Function that returns the final state and the number of steps, −1 if unknown."""
 
 
-def ours(system: CompiledSystem, problem: Problem, solver: str, rtol: float = RTOL) -> Solve:
+def armblocks_solver(system: CompiledSystem, problem: Problem, solver: str, rtol: float = RTOL) -> Solve:
     options = SimulationOptions(
         stop_time=problem.stop,
         sample_time=problem.stop,
@@ -151,22 +151,22 @@ def python_functions(problem: Problem) -> tuple[Callable[..., Any], Callable[...
     return lambda t, y: np.asarray(f(y)).ravel(), jacobian
 
 
-def scipys(problem: Problem, method: str) -> Solve:
+def scipy_solver(problem: Problem, method: str) -> Solve:
     f, J = python_functions(problem)
-    more = {"jac": J}
+    options = {"jac": J}
     if method == "LSODA" and problem.start.size >= 20:
         dense = lambda t, y: J(t, y).toarray()  # noqa: E731
-        more = {"jac": dense}
+        options = {"jac": dense}
 
     def solve() -> tuple[np.ndarray, int]:
         span = (0.0, problem.stop)
-        solution = solve_ivp(f, span, problem.start, method=method, rtol=RTOL, atol=problem.atol, **more)
+        solution = solve_ivp(f, span, problem.start, method=method, rtol=RTOL, atol=problem.atol, **options)
         return solution.y[:, -1], solution.t.size - 1
 
     return solve
 
 
-def casadis(problem: Problem) -> Solve:
+def casadi_solver(problem: Problem) -> Solve:
     y = ca.SX.sym("y", problem.start.size)
     options = {"reltol": RTOL, "abstol": problem.atol, "max_num_steps": 1_000_000}
     cvodes = ca.integrator("F", "cvodes", {"x": y, "ode": problem.rates(y)}, 0.0, problem.stop, options)
@@ -178,7 +178,7 @@ def casadis(problem: Problem) -> Solve:
     return solve
 
 
-def sundaes(system: CompiledSystem, problem: Problem) -> Solve | None:
+def sundae_solver(system: CompiledSystem, problem: Problem) -> Solve | None:
     if importlib.util.find_spec("sksundae") is None:
         return None
     from sksundae.cvode import CVODE
@@ -207,30 +207,30 @@ def sundaes(system: CompiledSystem, problem: Problem) -> Solve | None:
 
 
 def outcomes(problem: Problem, repeats: int) -> list[Outcome]:
-    """All solvers on one problem, in alternation."""
+    """Run all solvers on one problem, in alternation."""
     system = compiled(problem)
-    reference, _ = ours(system, problem, "rodas5p", 1e-11)()
+    reference, _ = armblocks_solver(system, problem, "rodas5p", 1e-11)()
     solvers: dict[str, Solve | None] = {
-        "armblocks rodas5p": ours(system, problem, "rodas5p"),
-        "armblocks auto": ours(system, problem, "auto"),
-        "CVODES in CasADi": casadis(problem),
-        "CVODE, scikit-sundae": sundaes(system, problem),
-        "SciPy Radau": scipys(problem, "Radau"),
-        "SciPy BDF": scipys(problem, "BDF"),
-        "SciPy LSODA": scipys(problem, "LSODA"),
+        "armblocks rodas5p": armblocks_solver(system, problem, "rodas5p"),
+        "armblocks auto": armblocks_solver(system, problem, "auto"),
+        "CVODES in CasADi": casadi_solver(problem),
+        "CVODE, scikit-sundae": sundae_solver(system, problem),
+        "SciPy Radau": scipy_solver(problem, "Radau"),
+        "SciPy BDF": scipy_solver(problem, "BDF"),
+        "SciPy LSODA": scipy_solver(problem, "LSODA"),
     }
     present = {name: solve for name, solve in solvers.items() if solve is not None}
     best = dict.fromkeys(present, float("inf"))
-    ends: dict[str, tuple[np.ndarray, int]] = {}
+    results: dict[str, tuple[np.ndarray, int]] = {}
     for turn in range(repeats + 1):
         for name, solve in present.items():
             if turn > 2 and best[name] > 0.5:
-                continue  # too slow to be repeated
+                continue  # the solver is too slow for more repetitions
             started = time.perf_counter()
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                ends[name] = solve()
-            if turn:  # the first one compiles
+                results[name] = solve()
+            if turn:  # the first run includes compilation
                 best[name] = min(best[name], time.perf_counter() - started)
     scale = problem.atol / RTOL + np.abs(reference)
     return [
@@ -240,14 +240,17 @@ def outcomes(problem: Problem, repeats: int) -> list[Outcome]:
             seconds=best[name],
             error=float(np.max(np.abs(end - reference) / scale)),
         )
-        for name, (end, steps) in ends.items()
+        for name, (end, steps) in results.items()
     ]
 
 
-def stiff_part(repeats: int) -> list[str]:
-    """One table for each problem, as Markdown."""
+def stiff_section(repeats: int) -> list[str]:
+    """Return the section of the stiff problems as lines of Markdown."""
     lines = ["## Stiff systems", "", f"At rtol {RTOL:g}.", ""]
-    lines += ["| problem | solver | steps | error | time | beside rodas5p |", "|---|---|---|---|---|---|"]
+    lines += [
+        "| problem | solver | steps | error | time | relative to rodas5p |",
+        "|---|---|---|---|---|---|",
+    ]
     for problem in PROBLEMS:
         outcomes_of_problem = outcomes(problem, repeats)
         for row in outcomes_of_problem:
@@ -260,5 +263,5 @@ def stiff_part(repeats: int) -> list[str]:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="three turns instead of fifteen")
-    print("\n".join(stiff_part(3 if parser.parse_args().quick else 15)))
+    parser.add_argument("--quick", action="store_true", help="three repetitions instead of fifteen")
+    print("\n".join(stiff_section(3 if parser.parse_args().quick else 15)))

@@ -1,4 +1,4 @@
-"""Write a serial armblocks robot as URDF, so that other programs compute with the same numbers."""
+"""URDF of a serial armblocks robot, so that other programs use the same parameters."""
 
 from __future__ import annotations
 
@@ -15,7 +15,11 @@ def _pose(T: np.ndarray) -> str:
 
 
 def _link(name: str, link: Link, after: np.ndarray) -> str:
-    """A URDF link frame is the joint frame, so masses are moved by the constant transform after the joint."""
+    """URDF element of a link.
+
+    A URDF link frame is the joint frame. ``after``, the constant transform after the joint, is applied to the
+    centre of mass and the inertia.
+    """
     R, p = after[:3, :3], after[:3, 3]
     centre = R @ np.asarray(link.centre_of_mass) + p
     inertia = R @ np.asarray(link.inertia) @ R.T
@@ -29,11 +33,11 @@ def _link(name: str, link: Link, after: np.ndarray) -> str:
 
 
 def to_urdf(robot: Robot) -> str:
-    """Links l1…, joints j1…, frame ``tip`` at the tool. The caller sets base and gravity."""
+    """URDF text with links l1…, joints j1… and the tool frame ``tip``, without base pose and gravity."""
     parts = [f'<robot name="{robot.name}">', '<link name="base"/>']
-    behind, parent = np.eye(4), "base"
+    previous_after, parent = np.eye(4), "base"
     for number, link in enumerate(robot.links, start=1):
-        before = behind @ link.before.matrix
+        before = previous_after @ link.before.matrix
         kind = {Revolute: "revolute", Prismatic: "prismatic"}[type(link.joint)]
         axis = " ".join(repr(float(v)) for v in link.joint.axis)
         parts.append(_link(f"l{number}", link, link.after.matrix))
@@ -42,8 +46,8 @@ def to_urdf(robot: Robot) -> str:
             f'{_pose(before)}<axis xyz="{axis}"/>'
             '<limit lower="-10" upper="10" effort="1e6" velocity="100"/></joint>'
         )
-        behind, parent = link.after.matrix, f"l{number}"
-    tip = behind @ robot.tool.matrix
+        previous_after, parent = link.after.matrix, f"l{number}"
+    tip = previous_after @ robot.tool.matrix
     parts.append('<link name="tip"/>')
     parts.append(
         f'<joint name="jtip" type="fixed"><parent link="{parent}"/><child link="tip"/>{_pose(tip)}</joint>'

@@ -6,7 +6,7 @@ import inspect
 import re
 from collections.abc import Iterable, Iterator
 
-from light_pictures import lightened
+from light_pictures import simplified
 
 import armblocks as ab
 from armblocks.blocks import BLOCKS
@@ -34,7 +34,7 @@ FIGURE_WIDTH = 736.0
 
 
 def block_pages() -> Iterator[tuple[str, str]]:
-    """Path and text of every page: the index, then a page for each block."""
+    """Yield path and text of every page: the index, then a page for each block."""
     yield "blocks.md", index_page()
     for kind in BLOCKS.values():
         yield f"blocks/{kind.type_name()}.md", block_page(kind)
@@ -47,7 +47,7 @@ def index_page() -> str:
         "",
         f"The library has {len(BLOCKS)} blocks. Each has a page with its equation, ports, parameters and a",
         "worked example: a small diagram, the Python program that builds it, and the results of a run.",
-        "In a terminal, `armblocks blocks NAME` prints the same.",
+        "In a terminal, `armblocks blocks NAME` prints this information.",
         "",
     ]
     for family, kinds in BLOCKS.families.items():
@@ -127,8 +127,7 @@ def docstring(kind: type[Block]) -> list[str]:
 
 
 def prose(text: str) -> str:
-    """The text of a docstring as Markdown: code stays code, and all other text, also formulas with stars, is
-    plain."""
+    """The text of a docstring as Markdown; Markdown characters outside of code are escaped."""
     parts = re.split(r"(?::\w+:)?(`+)(.+?)\1", text)
     tokens = [
         re.sub(r"([*_\[\]|$<>#\\~])", r"\\\1", plain) + (f"`{code}`" if code else "")
@@ -139,12 +138,12 @@ def prose(text: str) -> str:
 
 def table(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
     """A Markdown table, followed by an empty line."""
-    heads, cells = list(headings), [[cell.replace("\n", " ") for cell in row] for row in rows]
+    headings, cells = list(headings), [[cell.replace("\n", " ") for cell in row] for row in rows]
     # An empty column, such as the units of ports without units, is omitted.
-    kept_columns = [k for k in range(len(heads)) if any(row[k] for row in cells)]
-    heads, cells = [heads[k] for k in kept_columns], [[row[k] for k in kept_columns] for row in cells]
+    shown_columns = [k for k in range(len(headings)) if any(row[k] for row in cells)]
+    headings, cells = [headings[k] for k in shown_columns], [[row[k] for k in shown_columns] for row in cells]
     body = ["| " + " | ".join(row) + " |" for row in cells]
-    return ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads), *body, ""]
+    return ["| " + " | ".join(headings) + " |", "|" + "---|" * len(headings), *body, ""]
 
 
 def port_table(block: Block) -> list[str]:
@@ -163,7 +162,7 @@ def port_table(block: Block) -> list[str]:
 
 
 def shape_text(port: Port) -> str:
-    """``any``, ``scalar``, ``3``, ``4 x 4``."""
+    """The shape of a port as text: ``any``, ``scalar``, ``3``, ``4 × 4``."""
     if port.shape is None:
         return "any"
     return " × ".join(map(str, port.shape)) or "scalar"
@@ -192,7 +191,7 @@ def parameter_table(kind: type[Block]) -> list[str]:
 
 
 def allowed(rule: Parameter) -> str:
-    """The allowed values as text, choices as code. Numbers must be finite unless the text says otherwise."""
+    """The allowed values as text, choices as code. Numbers are finite unless the text allows infinity."""
     if rule.kind is ParameterKind.CHOICE:
         return ", ".join(f"`{choice}`" for choice in rule.choices)
     words = rule.describe().removesuffix(", finite")
@@ -207,8 +206,10 @@ def allowed(rule: Parameter) -> str:
 
 
 def default_text(rule: Parameter) -> str:
-    """The default as Python; a diagram by its blocks, a function by its name; empty for a required
-    parameter."""
+    """The default as Python code: of a diagram the names of its blocks, of a function its name.
+
+    Empty for a required parameter.
+    """
     if rule.required:
         return ""
     if isinstance(rule.default, Diagram):
@@ -219,17 +220,17 @@ def default_text(rule: Parameter) -> str:
 
 
 def behaviour(diagram: Diagram) -> list[str]:
-    """The states and events of the block, with the shapes of the example."""
+    """Lines about the states and events of the block, with the shapes of the example."""
     block = diagram.blocks[diagram.name]
     if block.virtual:
-        return []  # without equations; the flat diagram does not contain it
+        return []  # a virtual block has no equations
     shapes = infer_shapes(diagram).inputs[diagram.name]
     states: list[tuple[str, State]] = [
         *(("continuous state", state) for state in block.states(shapes)),
         *(("discrete state", state) for state in block.discrete_states(shapes)),
         *(("mode", state) for state in block.modes(shapes)),
     ]
-    rows = [(f"`{state.name}`", what, state.unit, prose(state.doc)) for what, state in states]
+    rows = [(f"`{state.name}`", role, state.unit, prose(state.doc)) for role, state in states]
     rows += [
         (f"`{guard.name}`", f"event {DIRECTIONS[guard.direction]}", "", prose(guard.doc))
         for guard in block.guards(shapes)
@@ -264,8 +265,8 @@ def worked_example(kind: type[Block], diagram: Diagram) -> list[str]:
     lines = ["## Example", "", prose(caption(kind)), ""]
     lines += [figure_html(figure) for figure in figures]
     size = f' style="width:{drawing.width:.0f}px"'
-    drawn = svg_inline(drawing, "diagram").replace("<svg ", f"<svg{size} ", 1)
-    lines += [f'<figure class="drawing">{drawn}</figure>', ""]
+    drawing_html = svg_inline(drawing, "diagram").replace("<svg ", f"<svg{size} ", 1)
+    lines += [f'<figure class="drawing">{drawing_html}</figure>', ""]
     lines += ["```python", diagram_to_python(diagram).rstrip(), "```", ""]
     data = diagram_to_bytes(diagram, load_robot).decode()
     lines += [
@@ -282,16 +283,16 @@ def worked_example(kind: type[Block], diagram: Diagram) -> list[str]:
 
 
 def figure_html(figure: Figure) -> str:
-    """A figure of the report in the form for these pages."""
+    """HTML of a figure of the report."""
     shape = "narrow" if figure.narrow else "wide"
-    drawn = svg_inline(lightened(figure.picture), f"plot-{figure.name}")
-    return f'<figure class="{shape}">{drawn}</figure>\n'
+    svg = svg_inline(simplified(figure.picture), f"plot-{figure.name}")
+    return f'<figure class="{shape}">{svg}</figure>\n'
 
 
 def style_sheet() -> str:
-    """CSS: colours of the figures by the switch of the theme, and the rules of the block pages.
+    """CSS: colours of the figures for the selected theme, and the rules of the block pages.
 
-    A picture in a separate file contains the colours of both themes and follows ``color-scheme`` of the page.
+    Pictures in separate files contain the colours of both themes and follow ``color-scheme`` of the page.
     """
     light, dark = (f"color-scheme:{theme};{theme_variables(theme)}" for theme in ("light", "dark"))
     return (

@@ -21,10 +21,10 @@ ROOT = DOCS.parent
 SITE = DOCS / "_build" / "html"
 STAMP = DOCS / "_build" / "built-from"
 SOURCES = ("docs", "src/armblocks", "robots", "examples", "libraries")
-"""Sources of the pages; blocks, robots, examples and docstrings are on the pages, too."""
-NOT_SOURCES = ("docs/_build", "docs/reference", "src/armblocks/studio/web")
+"""Sources of the pages, including the code whose blocks, robots, examples and docstrings they show."""
+GENERATED = ("docs/_build", "docs/reference", "src/armblocks/studio/web")
 """Folders with generated files."""
-EXCLUDED = ("debug.css", "file.png", "plus.png", "minus.png", "skeleton.css")
+UNUSED_FILES = ("debug.css", "file.png", "plus.png", "minus.png", "skeleton.css")
 """Files of the theme that no page uses."""
 
 
@@ -36,18 +36,18 @@ def needed() -> bool:
 
 def digest() -> str:
     """A hash of all sources of the pages."""
-    hash_of_sources = hashlib.sha256()
+    sources_hash = hashlib.sha256()
     for path in _sources():
-        hash_of_sources.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
-    return hash_of_sources.hexdigest()
+        sources_hash.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    return sources_hash.hexdigest()
 
 
 def _sources() -> Iterator[Path]:
-    built = [ROOT / name for name in NOT_SOURCES]
+    generated = [ROOT / name for name in GENERATED]
     for name in SOURCES:
         for path in sorted((ROOT / name).rglob("*")):
-            inside = any(path.is_relative_to(folder) for folder in built)
-            if path.is_file() and not inside and "__pycache__" not in path.parts:
+            is_generated = any(path.is_relative_to(folder) for folder in generated)
+            if path.is_file() and not is_generated and "__pycache__" not in path.parts:
                 yield path
 
 
@@ -61,8 +61,7 @@ def build() -> None:
     # In a build of a wheel, armblocks itself is not installed.
     paths = [str(ROOT / "src"), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in paths if path)}
-    # All pages are built completely, because the data of an earlier build may come from other versions of the
-    # code.
+    # A new folder for intermediate data: data of an earlier build may come from another version of the code.
     with tempfile.TemporaryDirectory() as doctrees:
         command += ["-d", doctrees, str(DOCS), str(SITE)]
         completed = subprocess.run(
@@ -74,7 +73,7 @@ def build() -> None:
             "To install armblocks without the documentation: ARMBLOCKS_SKIP_DOCS=1 pip install .\n"
             f"To install the tools for the documentation: pip install --editable '{ROOT}[docs]'"
         )
-    for name in EXCLUDED:
+    for name in UNUSED_FILES:
         (SITE / "_static" / name).unlink(missing_ok=True)
     shutil.rmtree(SITE / "_sources", ignore_errors=True)
     STAMP.write_text(before, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Configuration of Sphinx, and the calls that generate pages from the code."""
+"""Configuration of Sphinx. Importing this module generates the pages that describe the code."""
 
 import os
 import sys
@@ -6,7 +6,7 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
-# Each block's worked example runs once, for the numbers on its page.
+# The worked example of each block runs once, so that optimisation is not worth its time.
 os.environ.setdefault("ARMBLOCKS_EFFORT", "little")
 
 from generated_pages import write_generated_pages  # noqa: E402
@@ -37,7 +37,7 @@ html_theme_options = {
 html_show_sourcelink = False
 html_copy_source = False
 html_domain_indices = False  # modules are described on the pages of their classes
-html_show_search_summary = False  # summaries are fetched, which browsers do not allow for pages from the disk
+html_show_search_summary = False  # browsers do not fetch summaries for pages on the disk
 html_static_path = ["reference/static"]
 html_css_files = ["pictures.css"]
 
@@ -55,7 +55,7 @@ add_module_names = False
 
 
 def setup(app):
-    """Called by Sphinx."""
+    """Connect the functions of this folder to the events of Sphinx, which calls this function."""
     shorten_annotations()
     app.connect("autodoc-process-signature", readable_signature)
     app.connect("source-read", link_names)

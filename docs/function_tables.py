@@ -1,4 +1,4 @@
-"""The tables of all functions of formulas and scripts."""
+"""Tables of the functions of formulas and scripts for the documentation."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from armblocks.matlab.functions import TABLE
 
 
 def function_tables() -> str:
-    """All functions and constants of formulas and scripts, one table a group."""
+    """Markdown tables of all functions and constants of formulas and scripts, one for each group."""
     groups = dict.fromkeys(function.group for function in TABLE.values())
     lines: list[str] = []
     for group in groups:

@@ -20,8 +20,10 @@ from armblocks.simulation.tableaux import TABLEAUX
 
 
 def write_generated_pages(folder: Path) -> None:
-    """Write the pages into ``folder``. Unchanged pages are not written again; files of other pages are
-    removed."""
+    """Write all generated pages into ``folder``.
+
+    Unchanged files keep their modification times. Files that are not generated pages are removed.
+    """
     pages = {
         "examples.md": examples_page(),
         "robots.md": robots_page(),
@@ -47,7 +49,8 @@ def examples_page() -> str:
     lines = [
         "# Shipped examples",
         "",
-        "`armblocks run NAME` runs an example and writes its report, `armblocks studio NAME` opens it.",
+        "`armblocks run NAME` runs an example and writes its report. `armblocks studio NAME` opens the",
+        "example.",
         "",
     ]
     with warnings.catch_warnings():
@@ -56,17 +59,17 @@ def examples_page() -> str:
             diagram = ab.load_diagram(name)
             drawing = diagram_picture(diagram)
             size = f' style="width:{drawing.width:.0f}px"'
-            drawn = svg_inline(drawing, f"example-{name}").replace("<svg ", f"<svg{size} ", 1)
+            svg = svg_inline(drawing, f"example-{name}").replace("<svg ", f"<svg{size} ", 1)
             kinds = sorted({block.type_name() for block in diagram.blocks.values()})
             links = ", ".join(f"[{kind}](blocks/{kind}.md)" for kind in kinds)
-            about = diagram.description[:1].upper() + diagram.description[1:]
+            description = diagram.description[:1].upper() + diagram.description[1:]
             lines += [
                 f"## {name}",
                 "",
-                f"{prose(about)}. The run ends at {diagram.settings.stop_time:g} s.",
+                f"{prose(description)}. The run ends at {diagram.settings.stop_time:g} s.",
                 "",
             ]
-            lines += [f'<figure class="drawing">{drawn}</figure>', "", f"Blocks: {links}.", ""]
+            lines += [f'<figure class="drawing">{svg}</figure>', "", f"Blocks: {links}.", ""]
     return "\n".join(lines) + "\n"
 
 
@@ -74,22 +77,22 @@ def public_names() -> str:
     """A table of all names of ``armblocks``, with a link and the first sentence of the docstring."""
     lines = ["| name | description |", "|---|---|"]
     for name in sorted(ab.__all__, key=str.casefold):
-        thing = getattr(ab, name)
-        if not inspect.ismodule(thing):
-            role = "class" if inspect.isclass(thing) else "func"
-            lines.append(f"| {{py:{role}}}`~armblocks.{name}` | {prose(_first_sentence(thing))} |")
+        value = getattr(ab, name)
+        if not inspect.ismodule(value):
+            role = "class" if inspect.isclass(value) else "func"
+            lines.append(f"| {{py:{role}}}`~armblocks.{name}` | {prose(_first_sentence(value))} |")
     return "\n".join(lines) + "\n"
 
 
-def _first_sentence(thing: object) -> str:
-    paragraph = inspect.cleandoc(thing.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
+def _first_sentence(value: object) -> str:
+    paragraph = inspect.cleandoc(value.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
     return re.split(r"(?<=[.:]) (?=[A-Z])|::$", paragraph)[0].rstrip(":")
 
 
 def solver_table() -> str:
-    """Every integrator."""
-    heads = ("name", "also known as", "order", "step", "kind", "method", "source")
-    lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
+    """Markdown table of all solvers."""
+    headings = ("name", "other names", "order", "step", "kind", "method", "source")
+    lines = ["| " + " | ".join(headings) + " |", "|---" * len(headings) + "|"]
     for tableau in TABLEAUX:
         aliases = ", ".join(f"`{alias}`" for alias in tableau.aliases)
         step = "adaptive" if tableau.adaptive else "fixed"

@@ -1,4 +1,4 @@
-"""Figures with fewer points, because the pages show hundreds of them and are part of the wheel."""
+"""Figures with fewer points, which reduce the size of the pages in the wheel."""
 
 from __future__ import annotations
 
@@ -15,31 +15,31 @@ MIN_POINTS = 24
 """Lines with fewer points are unchanged."""
 
 
-def lightened(picture: Picture) -> Picture:
-    """The same picture, with as few points in its long lines as the tolerance allows."""
-    return replace(picture, marks=[_lighter(mark) for mark in picture.marks])
+def simplified(picture: Picture) -> Picture:
+    """The picture with fewer points in its long lines, within ``TOLERANCE``."""
+    return replace(picture, marks=[_simplified_mark(mark) for mark in picture.marks])
 
 
-def _lighter(mark: Mark) -> Mark:
+def _simplified_mark(mark: Mark) -> Mark:
     if isinstance(mark, Group):
-        return replace(mark, marks=tuple(_lighter(inner) for inner in mark.marks))
+        return replace(mark, marks=tuple(_simplified_mark(inner) for inner in mark.marks))
     if isinstance(mark, Polyline):
         points = np.asarray(mark.points, dtype=np.float64)
         if len(points) > MIN_POINTS and np.isfinite(points).all():
-            return replace(mark, points=points[kept_points(points)])
+            return replace(mark, points=points[selected_points(points)])
     return mark
 
 
-def kept_points(points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """A mask (N,) of the points of a line (N, 2) that remain: its ends and its corners.
+def selected_points(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Mask (N,) of the points of a line (N, 2) that the simplified line has: its ends and its corners.
 
     Source: Douglas and Peucker, "Algorithms for the reduction of the number of points", 1973.
     """
     mask = np.zeros(len(points), dtype=np.bool_)
     mask[[0, -1]] = True
-    open_spans = [(0, len(points) - 1)]
-    while open_spans:
-        first, last = open_spans.pop()
+    spans = [(0, len(points) - 1)]
+    while spans:
+        first, last = spans.pop()
         if last - first < 2:
             continue
         inner = points[first + 1 : last] - points[first]
@@ -51,5 +51,5 @@ def kept_points(points: NDArray[np.float64]) -> NDArray[np.bool_]:
         if distances[farthest] > TOLERANCE:
             middle = first + 1 + farthest
             mask[middle] = True
-            open_spans += [(first, middle), (middle, last)]
+            spans += [(first, middle), (middle, last)]
     return mask

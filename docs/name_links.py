@@ -1,4 +1,4 @@
-"""Replaces the names of armblocks in the tables of names by links to their pages in the reference."""
+"""Links from the tables of names to the pages of the reference."""
 
 from __future__ import annotations
 
@@ -15,12 +15,11 @@ CLASSES = {
     "robot": "armblocks.Robot",
     "run": "armblocks.DiagramRun",
 }
-"""The names of objects of these classes in the code of the tables."""
+"""Classes of the variables in the code of the tables."""
 
 
 def link_names(_app: object, page: str, source: list[str]) -> None:
-    """Rewrite the last column of every table of these pages. Sphinx calls the function with each page's
-    text."""
+    """Insert links in the last column of the tables on ``PAGES``. Sphinx calls it for each page."""
     if page in PAGES:
         source[0] = re.sub(r"(?m)^(\| .*\| )([^|\n]+)(\|)$", _linked_row, source[0])
 

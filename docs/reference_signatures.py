@@ -22,14 +22,14 @@ SHORT = {
     r"\bComplex\b": "ComplexArray",
     r"\bValues\b": "Mapping[str, ArrayLike]",
 }
-"""Names in annotations, each with the name that the reference shows instead."""
+"""Regular expressions for type names in annotations, with the names that the reference shows."""
 ALIASES = {"Array": "Array", "ArrayLike": "ArrayLike", "ComplexArray": "ComplexArray"}
-"""Names that are not replaced; the page explains them."""
+"""Type aliases that the reference shows by name; its first page explains them."""
 
 
 def shorten_annotations() -> None:
-    """Write ``Array`` for the types of NumPy arrays in all annotations of armblocks that are loaded."""
-    TypeAliasForwardRef.__repr__ = lambda alias: alias.name  # shown by Sphinx inside Mapping[...]
+    """Replace the types of NumPy arrays by ``Array`` in the annotations of loaded armblocks modules."""
+    TypeAliasForwardRef.__repr__ = lambda alias: alias.name  # Sphinx prints this inside Mapping[...]
     for function in _functions():
         for name, text in function.__annotations__.items():
             if isinstance(text, str):
@@ -38,37 +38,39 @@ def shorten_annotations() -> None:
 
 def short(annotation: str) -> str:
     """The annotation with the short names of types."""
-    for written, shown in SHORT.items():
-        annotation = re.sub(written, shown, annotation)
+    for pattern, name in SHORT.items():
+        annotation = re.sub(pattern, name, annotation)
     return annotation
 
 
 def _functions() -> Iterator[Callable[..., object]]:
     for name, module in list(sys.modules.items()):
         if name.partition(".")[0] == "armblocks":
-            for thing in list(vars(module).values()):
-                members = vars(thing).values() if inspect.isclass(thing) else (thing,)
+            for value in list(vars(module).values()):
+                members = vars(value).values() if inspect.isclass(value) else (value,)
                 for member in members:
-                    found = getattr(member, "fget", None) or getattr(member, "func", None)
-                    found = found or getattr(member, "__func__", None) or member
-                    if inspect.isfunction(found) and found.__module__.startswith("armblocks"):
-                        yield found
+                    function = getattr(member, "fget", None) or getattr(member, "func", None)
+                    function = function or getattr(member, "__func__", None) or member
+                    if inspect.isfunction(function) and function.__module__.startswith("armblocks"):
+                        yield function
 
 
 def readable_signature(
-    _app: object, what: str, _name: str, thing: Any, _options: object, *written: str | None
+    _app: object, kind: str, _name: str, value: Any, _options: object, *signature: str | None
 ) -> tuple[str | None, ...]:
-    """The fields of a dataclass, because the signature of its ``__new__``, which checks names, accepts
-    everything."""
-    if what == "class" and dataclasses.is_dataclass(thing):
-        return _fields(thing), None
+    """Signature of a class or function for the reference; that of a dataclass shows its fields.
+
+    The signature of its ``__new__``, which checks names, accepts all arguments.
+    """
+    if kind == "class" and dataclasses.is_dataclass(value):
+        return _fields(value), None
     # Defaults such as <the diagram's> are not Python; with them Sphinx would show the signature as one line.
-    return tuple(text and re.sub(r"= <[^>]*>", "= ...", text) for text in written)
+    return tuple(text and re.sub(r"= <[^>]*>", "= ...", text) for text in signature)
 
 
-def _fields(thing: Any) -> str:
+def _fields(dataclass: Any) -> str:
     texts: list[str] = []
-    for field in dataclasses.fields(thing):
+    for field in dataclasses.fields(dataclass):
         if field.init and not field.name.startswith("_"):
             text = f"{field.name}: {short(str(field.type))}"
             if field.default is not dataclasses.MISSING:
@@ -82,29 +84,29 @@ def _fields(thing: Any) -> str:
 
 
 def _default(value: object) -> str:
-    """The default as Python if it is short."""
+    """The default as Python code if it is short, else an ellipsis."""
     text = repr(value)
     return text if len(text) <= 30 and not text.startswith("<") and "object at" not in text else "..."
 
 
 def arm_page() -> str:
     """The class Arm with the call signatures of its methods, which are created at their first access."""
-    found: dict[str, list[str]] = {}
+    methods: dict[str, list[str]] = {}
     for name, member in vars(ab.Arm).items():
         if isinstance(member, cached_property) and not name.startswith("_"):
             call = getattr(arm_module, str(member.func.__annotations__["return"])).__call__
             names = [part.replace(annotation=inspect.Parameter.empty) for part in _parameters(call)]
             text = inspect.cleandoc(member.func.__doc__ or "")
             text = f"Returns {text.partition(' → ')[2]}"
-            found[name] = [
+            methods[name] = [
                 f"   .. py:method:: {name}{inspect.Signature(names)}",
                 "",
                 *(f"      {line}".rstrip() for line in text.splitlines()),
                 "",
             ]
     lines = ["```{eval-rst}", ".. currentmodule:: armblocks", "", ".. autoclass:: Arm"]
-    lines += [f"   :exclude-members: {', '.join(found)}", ""]
-    for method in found.values():
+    lines += [f"   :exclude-members: {', '.join(methods)}", ""]
+    for method in methods.values():
         lines += method
     return "\n".join([*lines, "```", ""])
 

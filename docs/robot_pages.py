@@ -20,9 +20,9 @@ POSES = {
     "puma560": (0.5, 0.9, -2.6, 0.0, 0.6, 0.0),
     "twolink": (0.6, 0.7),
 }
-"""Joint coordinates (rad) of the pictures; all 0 for robots that are not listed."""
+"""Joint positions of the pictures, rad; 0 for robots that are not listed."""
 SIZE = (420.0, 340.0)
-"""px."""
+"""Width and height of a picture, px."""
 
 
 def robots_page() -> str:
@@ -31,7 +31,7 @@ def robots_page() -> str:
         "# Shipped robots",
         "",
         '`ab.load_robot("kr180")` loads a robot by its name. In a terminal, `armblocks show kr180` prints',
-        "all its numbers. The robot editor of `armblocks studio` shows it and edits copies of it.",
+        "all parameters of this robot. The robot editor of `armblocks studio` shows robots and edits copies.",
         "",
     ]
     with warnings.catch_warnings():
@@ -45,13 +45,15 @@ def _robot(name: str) -> Iterator[str]:
     arm = ab.load_robot(name)
     robot = arm.robot
     q = POSES.get(name, (0.0,) * robot.n)
-    about = "; ".join(text for text in (robot.manufacturer, robot.comment) if text)
+    maker = f" ({robot.manufacturer})" if robot.manufacturer else ""
+    title = prose(f"{robot.name}{maker}: {robot.comment}" if robot.comment else f"{robot.name}{maker}")
     picture = svg_inline(arm_picture(robot, q, width=SIZE[0], height=SIZE[1]), f"robot-{name}")
     yield from (f"## {name}", "", f'<figure class="narrow">{picture}</figure>', "")
-    yield from (f"{prose(robot.name)}: {prose(about)}. {robot.n} joints, {robot.joint_letters}.", "")
+    joints = f"{robot.n} joints: {robot.joint_letters} (R revolute, P prismatic)"
+    yield from (f"{title}. {joints}.", "")
     if lines := dh_table(robot):
         yield from ("```text", *lines, "```", "")
-    letters = {"rad": "°", "m": " m"}
+    unit_symbols = {"rad": "°", "m": " m"}
     rows: list[tuple[str, ...]] = []
     for k, (joint, unit) in enumerate(zip(robot.joint_names, robot.joint_units)):
         scale = 180 / np.pi if unit == "rad" else 1.0
@@ -60,8 +62,8 @@ def _robot(name: str) -> Iterator[str]:
         rows.append(
             (
                 f"`{joint}`",
-                f"{low:g} … {high:g}{letters[unit]}" if np.isfinite([low, high]).all() else "",
-                f"{speed:g}{letters[unit]}/s" if np.isfinite(speed) else "",
+                f"{low:g} … {high:g}{unit_symbols[unit]}" if np.isfinite([low, high]).all() else "",
+                f"{speed:g}{unit_symbols[unit]}/s" if np.isfinite(speed) else "",
                 f"{torque:g} {'N m' if unit == 'rad' else 'N'}" if np.isfinite(torque) else "",
             )
         )

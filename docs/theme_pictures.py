@@ -1,8 +1,8 @@
 """Pictures of the pages in the light and in the dark theme.
 
-The Markdown of a page has a ``<picture>`` with a dark source, which GitHub shows by the theme of the reader.
-Sphinx copies only pictures of its own image directives, and the pages have a separate switch for the theme.
-Therefore each ``<picture>`` becomes two images, and the theme hides one of them.
+In Markdown, a ``<picture>`` has a light and a dark source; GitHub selects one by the reader's theme. Sphinx
+copies only the files of its image directives, and its pages have a switch for the theme. Therefore each
+``<picture>`` becomes two image directives. The theme hides one of the images.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ _PICTURE = re.compile(
 
 
 def show_by_theme(_app: object, _page: str, source: list[str]) -> None:
-    """Write each ``<picture>`` as two images; Sphinx calls it with the text of each page."""
-    source[0] = _PICTURE.sub(_both, source[0])
+    """Replace each ``<picture>`` by two images. Sphinx calls this function with the text of each page."""
+    source[0] = _PICTURE.sub(_two_images, source[0])
 
 
-def _both(match: re.Match[str]) -> str:
+def _two_images(match: re.Match[str]) -> str:
     dark, alternative, light = match.groups()
     return f"![{alternative}]({light}){{.only-light}}![{alternative}]({dark}){{.only-dark}}"

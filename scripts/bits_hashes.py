@@ -1,7 +1,7 @@
 """Print one hash for each group of results that the documents guarantee to be equal on every machine.
 
 ``python scripts/bits_hashes.py [--cpu NAME --lanes N]``, with armblocks importable; ``scripts/bits.py`` runs
-it for several processors and compares. ``--cpu`` compiles for that processor of LLVM's list.
+it for several processors and compares the hashes. ``--cpu`` is an LLVM name of the processor to compile for.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from armblocks.compiler import target as targets
 
 Numbers = Iterator[tuple[str, np.ndarray]]
 ROWS = 37
-"""Number of samples of a batch: complete vectors of any length, and a remainder."""
-OF_TWO = ("atan2", "hypot", "fmod", "remainder", "power")
+"""Number of samples in a batch. It is not a multiple of any number of lanes."""
+BINARY_FUNCTIONS = ("atan2", "hypot", "fmod", "remainder", "power")
 
 
 def compile_for(cpu: str, lanes: int) -> None:
-    """Compile all code of this process for another processor; call before importing the rest of armblocks."""
-    chosen = replace(targets.host_target(), cpu=cpu, features="", lanes=lanes)
-    targets.host_target = lambda: chosen  # pyright: ignore[reportAttributeAccessIssue]
+    """Compile all code of this process for another processor. Call this before other imports of armblocks."""
+    target = replace(targets.host_target(), cpu=cpu, features="", lanes=lanes)
+    targets.host_target = lambda: target  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def spread(rng: np.random.Generator, count: int, exponents: int) -> np.ndarray:
-    """Numbers of both signs with binary exponents up to this limit, computed without the C library."""
+def random_numbers(rng: np.random.Generator, count: int, exponents: int) -> np.ndarray:
+    """Random numbers of both signs with binary exponents up to ``exponents``, without the C library."""
     return np.ldexp(2.0 * rng.random(count) - 1.0, rng.integers(-exponents, exponents, count, endpoint=True))
 
 
 def elementary_functions() -> Numbers:
-    """Every function of the kernels, for arguments of all magnitudes, single and in batches."""
+    """Results of every elementary function, for arguments of all magnitudes, single and in batches."""
     import casadi
 
     from armblocks.compiler import compile_function
@@ -43,21 +43,21 @@ def elementary_functions() -> Numbers:
 
     names = [
         *("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh"),
-        *("exp", "expm1", "log", "log1p", "erf", "sqrt", *OF_TWO),
+        *("exp", "expm1", "log", "log1p", "erf", "sqrt", *BINARY_FUNCTIONS),
     ]
     rng = np.random.default_rng(9)
-    ends = [0.0, -0.0, 1.0, -1.0, np.inf, -np.inf, np.nan, 5e-324, 2.3e-308, 1e308, 710.0, -745.0, 1e22]
-    sizes = spread(rng, 400, 1000)
-    pool = np.concatenate([ends, spread(rng, 2000, 1), 20.0 * spread(rng, 1000, 1), sizes])
+    special = [0.0, -0.0, 1.0, -1.0, np.inf, -np.inf, np.nan, 5e-324, 2.3e-308, 1e308, 710.0, -745.0, 1e22]
+    large = random_numbers(rng, 400, 1000)
+    pool = np.concatenate([special, random_numbers(rng, 2000, 1), 20.0 * random_numbers(rng, 1000, 1), large])
     first, second = (rng.choice(pool, 4001).reshape(-1, 1) for _ in range(2))
     for name in names:
         operation = (lambda a, b: a**b) if name == "power" else getattr(casadi, name)
-        one = name not in OF_TWO
+        unary = name not in BINARY_FUNCTIONS
         traced = TracedFunction.trace(
             name,
             signature(("a", (1,)), ("b", (1,))),
             signature(("y", (1,))),
-            (lambda a, b, f=operation: f(a)) if one else operation,
+            (lambda a, b, f=operation: f(a)) if unary else operation,
         )
         kernel = compile_function(traced)
         yield name, kernel(first, second)
@@ -65,12 +65,14 @@ def elementary_functions() -> Numbers:
 
 
 def rounded_constants() -> Numbers:
-    """The functions that compute constants."""
+    """Results of the functions that compute constants."""
     from armblocks.rounded_functions import FUNCTIONS
 
     rng = np.random.default_rng(10)
     for name, function in FUNCTIONS.items():
-        values = np.concatenate([spread(rng, 200, 1), spread(rng, 100, 40), spread(rng, 20, 1000)])
+        values = np.concatenate(
+            [random_numbers(rng, 200, 1), random_numbers(rng, 100, 40), random_numbers(rng, 20, 1000)]
+        )
         arguments = (
             zip(values, rng.permutation(values)) if name in ("atan2", "hypot", "power") else zip(values)
         )
@@ -78,7 +80,7 @@ def rounded_constants() -> Numbers:
 
 
 def linear_algebra() -> Numbers:
-    """Linear equations and matrix-vector products, in batches and single."""
+    """Solutions of linear equations and matrix-vector products, single and in batches."""
     from casadi import mtimes
 
     from armblocks.compiler import compile_function
@@ -86,32 +88,32 @@ def linear_algebra() -> Numbers:
     from armblocks.equations.linear_solution import linear_solution
 
     rng = np.random.default_rng(12)
-    works = {"solution": (linear_solution, (2, 3, 7, 20)), "product": (mtimes, (3, 16, 33))}
-    for name, (work, sizes) in works.items():
+    functions = {"solution": (linear_solution, (2, 3, 7, 20)), "product": (mtimes, (3, 16, 33))}
+    for name, (function, sizes) in functions.items():
         for n in sizes:
             traced = TracedFunction.trace(
                 name,
                 signature(("A", (n, n)), ("b", (n,))),
                 signature(("x", (n,))),
-                lambda A, b, work=work: [work(A, b)],
+                lambda A, b, function=function: [function(A, b)],
             )
             kernel = compile_function(traced)
             A, b = rng.random((ROWS, n, n)) - 0.5, rng.random((ROWS, n)) - 0.5
             yield f"{name} {n}", kernel(A, b)
             yield f"{name} {n} of one matrix", kernel(A[0], b)
-            yield f"{name} {n} single", np.array([kernel(*one) for one in zip(A, b)])
+            yield f"{name} {n} single", np.array([kernel(*pair) for pair in zip(A, b)])
 
 
 def robots() -> Numbers:
-    """Every function of every robot, and of one with angles that are not multiples of 90 degrees."""
+    """Results of every dynamics function of the shipped robots and of a robot with oblique axes."""
     import armblocks as ab
     from armblocks import dynamics
     from armblocks.compiler import compile_function
 
-    turned = ab.modified_dh("base", alpha=0.4, theta=0.9).before
-    skew = ab.Robot(
+    base = ab.modified_dh("base", alpha=0.4, theta=0.9).before
+    oblique = ab.Robot(
         name="skew",
-        base=turned,
+        base=base,
         links=tuple(
             ab.modified_dh(
                 f"l{k}",
@@ -127,14 +129,14 @@ def robots() -> Numbers:
             for k in range(3)
         ),
     )
-    every = [ab.load_robot(name).robot for name in ab.list_robots()]
+    shipped = [ab.load_robot(name).robot for name in ab.list_robots()]
     rng = np.random.default_rng(11)
-    for robot in (*every, skew):
+    for robot in (*shipped, oblique):
         for name in sorted(name for name in dir(dynamics) if name.startswith("trace_")):
             try:
                 traced = getattr(dynamics, name)(robot)
             except TypeError:
-                continue  # a function that needs more than a robot
+                continue  # this function has other arguments than a robot
             if not hasattr(traced, "casadi_function"):
                 continue
             kernel = compile_function(traced)
@@ -155,7 +157,7 @@ FORMULAS = (
 
 
 def constants() -> Numbers:
-    """Runs of diagrams with constants in formulas and filters."""
+    """Signals of diagrams with constants in formulas and filters."""
     import armblocks as ab
     from armblocks.blocks import AnalogFilter, Clock, DigitalFilter, Expression, Integrator
 
@@ -182,25 +184,25 @@ def constants() -> Numbers:
     for design in ("butterworth", "chebyshev1", "chebyshev2"):
         for kind in ("low_pass", "high_pass", "band_pass", "band_stop"):
             for block in (AnalogFilter, DigitalFilter):
-                numbers_in = {
+                parameters = {
                     "edge": 0.31,
                     "upper_edge": 0.47,
                     "order": 5,
                     "design": design,
                     "filter_type": kind,
                 }
-                more = {"sample_time": 0.01} if block is DigitalFilter else {}
+                options = {"sample_time": 0.01} if block is DigitalFilter else {}
                 yield from run(
                     f"{block.__name__} {design} {kind}",
                     "rk4",
-                    lambda d, block=block, all=numbers_in | more: d.add(
-                        "f", block(**all), d.add("c", Clock())
+                    lambda d, block=block, parameters=parameters | options: d.add(
+                        "f", block(**parameters), d.add("c", Clock())
                     ),
                 )
 
 
 def shipped_blocks() -> Numbers:
-    """The worked example of every block."""
+    """Signals of the worked example of every block."""
     import armblocks as ab
 
     for kind in ab.list_blocks():
@@ -210,7 +212,7 @@ def shipped_blocks() -> Numbers:
 
 
 def shipped_diagrams() -> Numbers:
-    """Every shipped diagram, for its first 0.2 s."""
+    """Signals of every shipped diagram, for the first 0.2 s."""
     import armblocks as ab
 
     for name in ab.list_examples():
@@ -231,7 +233,7 @@ GROUPS: dict[str, Callable[[], Numbers]] = {
 
 
 def canonical(numbers: np.ndarray) -> bytes:
-    """The bytes of numbers; all NaNs have the same bytes, because sign and payload are not guaranteed."""
+    """Bytes of an array. All NaNs have the same bytes, because their sign and payload are not guaranteed."""
     array = np.array(numbers, dtype=np.float64)
     array[np.isnan(array)] = np.nan
     return array.tobytes()
@@ -242,22 +244,22 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cpu")
     parser.add_argument("--lanes", type=int, default=2)
-    parser.add_argument("--details", action="store_true", help="a line for each array, too")
-    parser.add_argument("groups", nargs="*", help=f"which: {', '.join(GROUPS)} (default: all)")
+    parser.add_argument("--details", action="store_true", help="also print a line for each array")
+    parser.add_argument("groups", nargs="*", help=f"groups of results: {', '.join(GROUPS)} (default: all)")
     requested = parser.parse_args()
     if requested.cpu:
         compile_for(requested.cpu, requested.lanes)
     warnings.simplefilter("ignore")
     for group in requested.groups or GROUPS:
-        whole = hashlib.sha256()
+        group_hash = hashlib.sha256()
         count = 0
         for name, numbers in GROUPS[group]():
             data = canonical(numbers)
-            whole.update(name.encode() + data)
+            group_hash.update(name.encode() + data)
             count += 1
             if requested.details:
                 print(f"  {group} | {name} {hashlib.sha256(data).hexdigest()[:12]}")
-        print(f"{group}: {whole.hexdigest()[:24]} ({count} arrays)")
+        print(f"{group}: {group_hash.hexdigest()[:24]} ({count} arrays)")
         sys.stdout.flush()
 
 

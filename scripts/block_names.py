@@ -1,7 +1,7 @@
 """Write ``src/armblocks/blocks/__init__.pyi``: the names of all blocks, for type checkers and editors.
 
-The package finds its blocks in its folders at import time, which a type checker cannot follow. A test fails
-if the file is not up to date.
+The package finds its blocks in its folders at import time. Type checkers cannot follow this and read the file
+instead. A test fails if the file is not up to date.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ BANNER = "# Made by scripts/block_names.py: do not edit."
 
 
 def stub() -> str:
-    """Return the text of the file: each block class imported from the module that defines it."""
+    """Return the text of the stub file, with one import for each block class."""
     imports = sorted((kind.__module__, name) for name, kind in BLOCKS.items())
     lines = [
         BANNER,

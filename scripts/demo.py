@@ -1,8 +1,9 @@
 """Set up the environment and run the experiment of the paper, with a report of all figures and numbers.
 
-The environment contains the core and the studio, whose page is built when ``armblocks studio`` first starts.
+The environment contains the core and the studio. The first start of ``armblocks studio`` builds its front
+end.
 
-``python3 scripts/demo.py [armblocks run's own options]``, for instance ``--stop-time 5`` or ``--out DIR``.
+``python3 scripts/demo.py [options of armblocks run]``, for example ``--stop-time 5`` or ``--out DIR``.
 """
 
 from __future__ import annotations

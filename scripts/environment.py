@@ -1,6 +1,7 @@
-"""The virtual environment of the project, ``.venv``: created if absent, updated if needed.
+"""Creates and updates ``.venv``, the virtual environment of the project.
 
-Standard library only, so that ``python3 scripts/…`` works without preparation on Linux, macOS and Windows.
+This module uses the standard library only, so that ``python3 scripts/…`` needs no preparation on Linux, macOS
+and Windows.
 """
 
 from __future__ import annotations
@@ -19,18 +20,18 @@ VENV = ROOT / ".venv"
 BINARIES = VENV / ("Scripts" if os.name == "nt" else "bin")
 PYTHON = BINARIES / ("python.exe" if os.name == "nt" else "python")
 STAMP = VENV / "armblocks-installed.json"
-OLDEST_PYTHON = (3, 11)
+MIN_PYTHON = (3, 11)
 ENVIRONMENT = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
-"""pip creates no bytecode; with the bytecode of the first import a process starts three times as fast."""
+"""The environment of commands. Bytecode is allowed, because processes start three times as fast with it."""
 
 
 def say(text: str) -> None:
-    """Print and flush, so that the order is correct if the output is redirected to a file."""
+    """Print and flush, so that redirected output has the order of the commands."""
     print(text, flush=True)
 
 
 def run(*command: str | Path, cwd: Path = ROOT) -> int:
-    """Run a command without standard input, with its output passed through; return the exit code."""
+    """Run a command without standard input; return its exit code. The output is not captured."""
     completed = subprocess.run(
         [str(part) for part in command], cwd=cwd, env=ENVIRONMENT, stdin=subprocess.DEVNULL
     )
@@ -40,19 +41,19 @@ def run(*command: str | Path, cwd: Path = ROOT) -> int:
 def prepare(*extras: str) -> None:
     """Install armblocks (editable) with these extras of pyproject.toml into ``.venv``.
 
-    A stamp in ``.venv`` records the installed extras: without a change of pyproject.toml nothing is done.
+    A file in ``.venv`` records the installed extras. They are installed again if pyproject.toml changes.
     Exits with a message if Python is too old or a step fails.
     """
-    if sys.version_info < OLDEST_PYTHON:
-        oldest = ".".join(str(part) for part in OLDEST_PYTHON)
-        sys.exit(f"armblocks needs Python {oldest} or newer; this is {sys.version.split()[0]}")
-    if not _runs():
+    if sys.version_info < MIN_PYTHON:
+        minimum = ".".join(str(part) for part in MIN_PYTHON)
+        sys.exit(f"armblocks needs Python {minimum} or newer; this is {sys.version.split()[0]}")
+    if not _interpreter_works():
         _create()
     digest = _digest()
-    present = _read_stamp(digest)
-    if present is not None and set(extras) <= present:
+    installed = _read_stamp(digest)
+    if installed is not None and set(extras) <= installed:
         return
-    all_extras = sorted(set(extras) | (present or set()))
+    all_extras = sorted(set(extras) | (installed or set()))
     target = f".[{','.join(all_extras)}]" if all_extras else "."
     say(f"== install armblocks {target} (a minute or more the first time)")
     code = _pip_install("--editable", target)
@@ -65,10 +66,9 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
 def prepare_browser() -> None:
-    """Check that a browser for the journeys, the browser tests of the studio, exists; on Debian and Ubuntu,
-    install one.
+    """Find a browser for the tests of the studio; install one on Debian and Ubuntu if there is none.
 
-    Exits with a message if no browser can be found or installed, so that the check is not skipped silently.
+    Exits with a message without a browser, so that these tests are not skipped silently.
     """
     if any(shutil.which(name) for name in BROWSERS):
         return
@@ -81,7 +81,7 @@ def prepare_browser() -> None:
     sys.exit(f"the tests of the studio need a browser: install one of {', '.join(BROWSERS)}")
 
 
-def _runs() -> bool:
+def _interpreter_works() -> bool:
     """Whether the environment exists and its interpreter works (the system may have upgraded Python)."""
     if not PYTHON.exists():
         return False
@@ -90,21 +90,21 @@ def _runs() -> bool:
 
 
 def _create() -> None:
-    say(f"== make {VENV.name} with Python {sys.version.split()[0]}")
+    say(f"== create {VENV.name} with Python {sys.version.split()[0]}")
     if run(sys.executable, "-m", "venv", "--clear", VENV) != 0:
         sys.exit(
-            f"Python could not make a virtual environment in {VENV}. "
+            f"Python could not create a virtual environment in {VENV}. "
             "On Debian and Ubuntu install its module: apt-get install python3-venv"
         )
 
 
 PIP_STEPS = ("Downloading", "Using cached", "Installing collected packages")
-"""Beginnings of the lines in which pip reports its progress."""
+"""First words of the lines in which pip reports its progress."""
 
 
 def _pip_install(*arguments: str) -> int:
     """Run pip and show each of its steps with its start time; return the exit code."""
-    # Bytecode is created at import: creating it for all modules takes longer than the installation.
+    # Bytecode for all modules would take longer than the installation. Imports create it when needed.
     command = [
         str(PYTHON),
         "-m",

@@ -2,9 +2,9 @@
 
     python scripts/fuzz.py --minutes 60 --seed 7
 
-Prints each finding as a small diagram with a script that builds it, the number of judged diagrams, and why
-some diagrams cannot be judged. Equal seeds give equal diagrams. ``--laws`` selects laws of
-``tests/reference/fuzz_laws.py``. The exit code is 1 if there was a finding.
+Prints each failure as a small diagram with a script that builds it, the number of compared diagrams, and the
+reasons why other diagrams cannot be compared. Equal seeds give equal diagrams. ``--laws`` selects laws of
+``tests/reference/fuzz_laws.py``. The exit code is 1 after a failure.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from fuzzing import fuzz
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description="Random diagrams against the reference simulator.")
-    parser.add_argument("--minutes", type=float, default=10.0, help="how long")
-    parser.add_argument("--seed", type=int, default=0, help="the first seed; the others follow it")
-    parser.add_argument("--count", type=int, default=0, help="how many diagrams at most; 0 for no limit")
-    parser.add_argument("--laws", nargs="*", default=list(LAWS), choices=list(LAWS), help="which laws")
-    parser.add_argument("--findings", type=int, default=20, help="stop after so many findings")
-    parser.add_argument("--reduce", type=float, default=120.0, help="seconds to reduce one finding")
+    parser = argparse.ArgumentParser(description="Compare random diagrams with the reference simulator.")
+    parser.add_argument("--minutes", type=float, default=10.0, help="duration, min")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the first diagram")
+    parser.add_argument("--count", type=int, default=0, help="maximum number of diagrams; 0 for no limit")
+    parser.add_argument("--laws", nargs="*", default=list(LAWS), choices=list(LAWS), help="laws to check")
+    parser.add_argument("--findings", type=int, default=20, help="maximum number of failures")
+    parser.add_argument("--reduce", type=float, default=120.0, help="maximum time to reduce one failure, s")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
     end = time.monotonic() + 60.0 * arguments.minutes

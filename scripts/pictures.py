@@ -1,4 +1,4 @@
-"""Create the pictures of README and docs from the experiment of the paper, in docs/pictures.
+"""Write the pictures of README and docs/paper.md into docs/pictures, from the experiment of the paper.
 
 Run ``python3 scripts/pictures.py`` and commit the changed files.
 """
@@ -17,7 +17,7 @@ TARGET = ROOT / "docs" / "pictures"
 
 
 def main() -> int:
-    """Run the experiment into a temporary folder and copy the pictures that the documents show."""
+    """Run the experiment in a temporary folder and copy its pictures."""
     prepare()
     with tempfile.TemporaryDirectory() as folder:
         code = run(PYTHON, "-m", "armblocks", "run", "kr180model", "--out", folder)

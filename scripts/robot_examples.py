@@ -46,7 +46,7 @@ EXAMPLES = Path(__file__).parent.parent / "examples"
 
 
 def puma560_multirate() -> Diagram:
-    """Six axes, each with a position loop of 1 kHz around a current loop of 10 kHz.
+    """A Puma 560 with a position controller at 1 kHz and a current controller at 10 kHz for each axis.
 
     The current loop is a PI controller with its zero at R / L, a crossover frequency of 3000 rad/s and a
     supply of 40 V. At the start the currents hold the arm against gravity.
@@ -60,7 +60,7 @@ def puma560_multirate() -> Diagram:
     hold = puma.gravload(np.zeros(6)) / (robot.gear_ratios * k)
     builder = DiagramBuilder(
         "puma560_multirate",
-        description="a Puma with a 1 kHz position and a 10 kHz current loop",
+        description="Puma with a 1 kHz position loop and a 10 kHz current loop",
         settings=SimulationOptions(stop_time=10.0, sample_time=0.01),
     )
     path = builder.add("path", JTraj(q0=[0.0] * 6, qf=[0.5, 0.9, -0.8, 0.6, -0.4, 1.0], tmax=4.0))
@@ -117,10 +117,10 @@ def puma560_multirate() -> Diagram:
 
 
 def dc_motor_sampled_pid() -> Diagram:
-    """A DC motor at 100 rad/s under a PID controller with a sample time of 10 ms, loaded from 2 s on."""
+    """A DC motor with a PID speed controller (100 rad/s, sample time 10 ms) and a load torque from 2 s on."""
     builder = DiagramBuilder(
         "dc_motor_sampled_pid",
-        description="a DC motor's speed under a sampled PID, loaded at 2 s",
+        description="sampled PID speed control of a DC motor, load step at 2 s",
         settings=SimulationOptions(stop_time=4.0, sample_time=0.002),
     )
     reference = builder.add("speed reference", Step(time=0.2, final=100.0))
@@ -151,7 +151,7 @@ def dc_motor_sampled_pid() -> Diagram:
 
 
 def puma560_payload_drop() -> Diagram:
-    """A Puma under a 1 kHz controller that does not model the payload of 3 kg, which is dropped at 4 s."""
+    """A Puma 560 drops a payload of 3 kg at 4 s; its 1 kHz controller does not model the payload."""
     robot = load_robot("puma560").robot.nofriction(viscous=False)
     payload = (3.0, 0.0, 0.0, 0.1, 0.01, 0.01, 0.01, 0.0, 0.0, 0.0)
     builder = DiagramBuilder(
@@ -198,7 +198,7 @@ def puma560_payload_drop() -> Diagram:
 
 
 def kr180_cell() -> Robot:
-    """The KR180 on a pedestal between two pallets and a wall, which are fixed links."""
+    """The KR180 on a pedestal, with two pallets and a wall as fixed links."""
     arm = load_robot("kr180").robot
     scene = (
         ("pedestal", Box(size=(0.7, 0.7, 2.4), material=Material.BASE), (0.0, 0.0, 1.2)),
@@ -207,7 +207,7 @@ def kr180_cell() -> Robot:
         ("wall", Box(size=(2.8, 0.12, 1.5), material=Material.FLANGE), (2.4, -0.75, 0.75)),
     )
     fixed = [
-        Link(name=name, joint=Fixed(), geometry=(replace(box, pose=_moved(x, y, z - 2.4)),))
+        Link(name=name, joint=Fixed(), geometry=(replace(box, pose=_translation(x, y, z - 2.4)),))
         for name, box, (x, y, z) in scene
     ]
     return replace(
@@ -219,25 +219,26 @@ def kr180_cell() -> Robot:
     )
 
 
-def _moved(x: float, y: float, z: float) -> Pose:
+def _translation(x: float, y: float, z: float) -> Pose:
     return ((1.0, 0.0, 0.0, x), (0.0, 1.0, 0.0, y), (0.0, 0.0, 1.0, z), (0.0, 0.0, 0.0, 1.0))
 
 
 def kr180_pick_and_place() -> Diagram:
-    """Move a load of 60 kg from one pallet over a wall to the other, through points with rounded corners.
+    """A KR180 moves a load of 60 kg over a wall, from pallet to pallet, on a path with rounded corners.
 
-    The second and third axis of the KR180 of the paper coincide: both tilt the arm by half of ``tilt``. The
-    fourth axis keeps the edges of the load parallel to those of the pallets. Two equal points in a row are a
-    pause; in the middle of the pauses the load is gripped (2.7 s) and released (10.7 s).
+    The second and third axis of the KR180 of the paper coincide: each moves by half of the angle ``tilt``.
+    The fourth axis keeps the edges of the load parallel to those of the pallets. Two equal consecutive points
+    are a pause. The arm grips the load in the middle of the first pause (2.7 s) and releases it in the middle
+    of the second (10.7 s).
     """
     robot = load_robot("kr180_cell").robot
     stations = ((-50.0, 45.0), (-50.0, 0.0), (-50.0, 0.0), (-50.0, 45.0), (15.0, 50.0))
     stations += ((80.0, 45.0), (80.0, 0.0), (80.0, 0.0), (80.0, 45.0))
-    points = np.radians([(turn, tilt / 2.0, tilt / 2.0, turn) for turn, tilt in stations])
+    points = np.radians([(yaw, tilt / 2.0, tilt / 2.0, yaw) for yaw, tilt in stations])
     load = (60.0, 0.0, 0.0, 0.2, 2.05, 2.05, 2.5, 0.0, 0.0, 0.0)
     builder = DiagramBuilder(
         "kr180_pick_and_place",
-        description="a KR180 carries 60 kg over a wall, pallet to pallet",
+        description="a KR180 carries 60 kg over a wall from pallet to pallet",
         settings=SimulationOptions(stop_time=14.0, sample_time=0.01),
     )
     motion = MultiSegment(points=points, durations=(2.0, 0.8, 2.0, 1.6, 1.6, 2.0, 0.8, 2.0), blend=0.6)

@@ -1,7 +1,8 @@
 """Take the pictures of the studio that README and docs show: ``python3 scripts/studio_pictures.py [NAME …]``.
 
-A real studio is started and operated in Chromium. Each function below takes one picture; names select some of
-them. Needs ``playwright`` (in the extra ``test``) and Chromium or Chrome.
+The script starts a studio and operates it in Chromium. Each function below takes one picture or several.
+Names on the command line select functions. It needs ``playwright`` (in the extra ``test``) and
+Chromium or Chrome.
 """
 
 from __future__ import annotations
@@ -33,16 +34,16 @@ FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-
 TIMEOUT_MS = 180_000
 THEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
 THEME_MS = 2000
-"""Time in which the page draws its views and curves in another theme, ms."""
-MOMENTS = (0, 2.5, 5, 10)
-"""Instants of the motion at which the arm is shown, s."""
+"""Time to draw all views after a change of the theme, ms."""
+POSE_TIMES = (0, 2.5, 5, 10)
+"""Times of the motion at which the arm is shown, s."""
 DROP = """([name, content]) => {
-    const brought = new DataTransfer()
+    const data = new DataTransfer()
     const bytes = Uint8Array.from(atob(content), (letter) => letter.charCodeAt(0))
-    brought.items.add(new File([bytes], name))
+    data.items.add(new File([bytes], name))
     for (const kind of ['dragenter', 'drop'])
         document.body.dispatchEvent(
-            new DragEvent(kind, { bubbles: true, cancelable: true, dataTransfer: brought })
+            new DragEvent(kind, { bubbles: true, cancelable: true, dataTransfer: data })
         )
 }"""
 
@@ -78,7 +79,7 @@ def studio(model: str) -> Generator[str]:
 
 
 @contextmanager
-def shown(browser: Browser, size: tuple[int, int], model: str = "kr180model") -> Generator[Page]:
+def open_page(browser: Browser, size: tuple[int, int], model: str = "kr180model") -> Generator[Page]:
     """Open a page of a studio that shows a model with its arm."""
     with studio(model) as link:
         page = browser.new_page(
@@ -103,39 +104,39 @@ def run(page: Page) -> None:
     page.locator(".run-state").filter(has_text=re.compile("done", re.IGNORECASE)).wait_for()
 
 
-def at(page: Page, seconds: float, stop: float = 10.0) -> None:
-    """Move the time cursor to an instant with the keys; the step of the slider is a thousandth of the run."""
+def set_time(page: Page, seconds: float, stop: float = 10.0) -> None:
+    """Move the time cursor with the keys; the step of the slider is a thousandth of the run."""
     slider = page.get_by_role("slider", name="Time")
     slider.focus()
     slider.press("Home")
     for _ in range(round(seconds / stop * 1000 / 10)):
-        slider.press("Shift+ArrowRight")  # ten recorded instants of 10 ms
+        slider.press("Shift+ArrowRight")  # ten samples of 10 ms
     page.wait_for_timeout(800)
 
 
-def taller(page: Page, by: int) -> None:
-    """Drag the upper edge of the scopes upwards by some pixels."""
+def enlarge_scopes(page: Page, by: int) -> None:
+    """Drag the upper edge of the scopes upwards by ``by`` px."""
     top = page.locator(".scopes-panel, .dock .empty").last.bounding_box()
     assert top is not None
-    edges = [one.bounding_box() for one in page.locator(".dv-sash").all()]
-    flat = [one for one in edges if one and one["width"] > one["height"] and one["x"] <= top["x"] + 9]
-    edge = min(flat, key=lambda one: abs(one["y"] - top["y"] + 30))
+    edges = [sash.bounding_box() for sash in page.locator(".dv-sash").all()]
+    horizontal = [e for e in edges if e and e["width"] > e["height"] and e["x"] <= top["x"] + 9]
+    edge = min(horizontal, key=lambda e: abs(e["y"] - top["y"] + 30))
     drag(page, edge, up=by)
 
 
-def wider(page: Page, by: int) -> None:
-    """Drag the right edge of the library by some pixels."""
+def enlarge_library(page: Page, by: int) -> None:
+    """Drag the right edge of the library to the right by ``by`` px."""
     library = page.locator(".palette").bounding_box()
     assert library is not None
-    edges = [one.bounding_box() for one in page.locator(".dv-sash").all()]
-    upright = [one for one in edges if one and one["height"] > one["width"]]
+    edges = [sash.bounding_box() for sash in page.locator(".dv-sash").all()]
+    vertical = [e for e in edges if e and e["height"] > e["width"]]
     right = library["x"] + library["width"]
-    edge = min(upright, key=lambda one: abs(one["x"] - right))
+    edge = min(vertical, key=lambda e: abs(e["x"] - right))
     drag(page, edge, right=by)
 
 
 def drag(page: Page, edge: FloatRect, *, right: int = 0, up: int = 0) -> None:
-    """Drag an edge between two panels by some pixels."""
+    """Drag an edge between two panels by ``right`` and ``up`` px."""
     x, y = edge["x"] + edge["width"] / 2, edge["y"] + edge["height"] / 2
     page.mouse.move(x, y)
     page.mouse.down()
@@ -143,20 +144,20 @@ def drag(page: Page, edge: FloatRect, *, right: int = 0, up: int = 0) -> None:
     page.mouse.up()
 
 
-def keep(page: Page, name: str, part: Locator | None = None) -> None:
-    """Write a picture of the page, or of a part of it, in each theme, in 1.5 times the resolution."""
+def save_picture(page: Page, name: str, part: Locator | None = None) -> None:
+    """Write a picture of the page, or of one element, in each theme, with 1.5 pixels per CSS pixel."""
     for theme in THEMES:
         page.emulate_media(color_scheme=theme, reduced_motion="reduce")
         page.wait_for_timeout(THEME_MS)
-        shot = page.screenshot(animations="disabled", clip=part and inside(part))
-        image = Image.open(io.BytesIO(shot)).convert("RGB")
+        screenshot = page.screenshot(animations="disabled", clip=part and inner_area(part))
+        image = Image.open(io.BytesIO(screenshot)).convert("RGB")
         path = PICTURES / f"{name}-{theme}.webp"
         path.write_bytes(min(_lossless(image), _lossy(image), key=len))  # the pictures are part of the wheel
         print(f"{path.relative_to(ROOT)}: {path.stat().st_size / 1000:.0f} kB", flush=True)
 
 
-def inside(part: Locator) -> FloatRect:
-    """The area of a part without its border; a dialog starts at a fraction of a pixel."""
+def inner_area(part: Locator) -> FloatRect:
+    """The area of an element without its border, in whole pixels; a dialog starts at a fraction of one."""
     box = part.bounding_box()
     assert box is not None
     left, top = math.ceil(box["x"]) + 1, math.ceil(box["y"]) + 1
@@ -165,44 +166,45 @@ def inside(part: Locator) -> FloatRect:
 
 
 def _lossless(picture: Image.Image) -> bytes:
-    """The picture in 256 colours, which look the same; the smaller file without a view of a robot."""
+    """The picture with 256 colours as WebP: the smaller file for pictures without a robot view."""
     data = io.BytesIO()
     picture.quantize(256).convert("RGB").save(data, "WEBP", lossless=True, method=6)
     return data.getvalue()
 
 
 def _lossy(picture: Image.Image) -> bytes:
+    """The picture as lossy WebP: the smaller file for pictures with a robot view."""
     data = io.BytesIO()
     picture.save(data, "WEBP", quality=90, method=6, use_sharp_yuv=True)
     return data.getvalue()
 
 
-def whole(browser: Browser) -> None:
+def studio_with_run(browser: Browser) -> None:
     """The model of the paper after its run, with canvas, arm and scopes."""
-    with shown(browser, (1440, 860)) as page:
+    with open_page(browser, (1440, 860)) as page:
         run(page)
-        at(page, 4.5)
+        set_time(page, 4.5)
         page.mouse.move(2, 2)
-        keep(page, "studio")
+        save_picture(page, "studio")
 
 
 def script(browser: Browser) -> None:
     """Figures 5 and 6: the script of the paper dropped on the page, and the window of the new model."""
-    with shown(browser, (1440, 820)) as page:
+    with open_page(browser, (1440, 820)) as page:
         page.evaluate(DROP, ["kr180.m", base64.b64encode(SCRIPT.read_bytes()).decode()])
         editor = page.locator(".robot-editor")
         editor.locator("canvas").wait_for()
         page.wait_for_timeout(1500)
-        keep(page, "paper-5-script")
+        save_picture(page, "paper-5-script")
         page.get_by_role("button", name="Close the notes").click()
         editor.get_by_text("Dynamics", exact=True).click()
         page.wait_for_timeout(1500)
-        keep(page, "paper-6-model")
+        save_picture(page, "paper-6-model")
 
 
 def robot_editor(browser: Browser) -> None:
     """The robot editor with the dynamics of the Puma and moved joints."""
-    with shown(browser, (1440, 860)) as page:
+    with open_page(browser, (1440, 860)) as page:
         page.get_by_role("button", name="Menu").click()
         page.get_by_role("menuitem", name="puma560", exact=True).click()
         editor = page.locator(".robot-editor")
@@ -210,63 +212,64 @@ def robot_editor(browser: Browser) -> None:
         for joint, value in (("link2", "40"), ("link3", "-150"), ("link5", "50")):
             editor.get_by_role("textbox", name=f"q of {joint} as a number").fill(value)
         editor.get_by_role("region", name="Jacobian").wait_for()
-        editor.get_by_role("button", name="Show all of the arm").click()
+        editor.get_by_role("button", name="Show the whole arm").click()
         page.mouse.move(5, 850)
         page.wait_for_timeout(3000)
-        keep(page, "robot-editor")
+        save_picture(page, "robot-editor")
 
 
 def library(browser: Browser) -> None:
     """Figure 7: the blocks of the library roblocks, in the palette."""
-    with shown(browser, (1440, 640)) as page:
-        wider(page, 420)
+    with open_page(browser, (1440, 640)) as page:
+        enlarge_library(page, 420)
         page.get_by_role("textbox", name="Search the library").fill("robot")
         page.wait_for_timeout(400)
-        keep(page, "paper-7-library", page.locator(".palette"))
+        save_picture(page, "paper-7-library", page.locator(".palette"))
 
 
 def dialog(browser: Browser) -> None:
     """Figure 8: the parameters of jtraj, and the configuration parameters of a slide of the paper."""
-    with shown(browser, (1280, 900)) as page:
-        page.add_style_tag(content="[role=dialog] { border-radius: 0 !important }")  # nothing in the corners
+    with open_page(browser, (1280, 900)) as page:
+        # Rounded corners would show the background.
+        page.add_style_tag(content="[role=dialog] { border-radius: 0 !important }")
         page.locator('.react-flow__node[data-id="jtraj"]').dblclick()
         opened = page.get_by_role("dialog")
         opened.wait_for()
         page.wait_for_timeout(600)
-        keep(page, "paper-8-jtraj", opened)
+        save_picture(page, "paper-8-jtraj", opened)
         page.keyboard.press("Escape")
         opened.wait_for(state="hidden")
         page.keyboard.press("Control+e")
         opened.wait_for()
         page.wait_for_timeout(600)
-        keep(page, "paper-configuration", opened)
+        save_picture(page, "paper-configuration", opened)
 
 
 def model(browser: Browser) -> None:
-    """Figure 9: the model, alone on the sheet."""
-    with shown(browser, (1440, 860)) as page:
+    """Figure 9: the sheet with the model."""
+    with open_page(browser, (1440, 860)) as page:
         page.locator(".react-flow__controls-fitview").click()
         page.wait_for_timeout(600)
-        keep(page, "paper-9-model", page.locator(".react-flow"))
+        save_picture(page, "paper-9-model", page.locator(".react-flow"))
 
 
-def moments(browser: Browser) -> None:
-    """Figure 10: the robot view at some instants of the motion."""
-    with shown(browser, (1440, 860)) as page:
+def poses(browser: Browser) -> None:
+    """Figure 10: the robot view at ``POSE_TIMES``."""
+    with open_page(browser, (1440, 860)) as page:
         run(page)
-        for seconds in MOMENTS:
-            at(page, seconds)
-            keep(page, f"paper-10-{seconds:g}s", page.locator(".robot"))
+        for seconds in POSE_TIMES:
+            set_time(page, seconds)
+            save_picture(page, f"paper-10-{seconds:g}s", page.locator(".robot"))
 
 
 def scopes(browser: Browser) -> None:
     """Figure 11: the three projections of the path, angles, speeds, accelerations, torques."""
-    with shown(browser, (1745, 1300)) as page:
-        taller(page, 440)
+    with open_page(browser, (1745, 1300)) as page:
+        enlarge_scopes(page, 440)
         run(page)
-        at(page, 5)
+        set_time(page, 5)
         page.mouse.move(2, 2)
-        keep(page, "paper-11-scopes", page.locator(".scopes-panel"))
+        save_picture(page, "paper-11-scopes", page.locator(".scopes-panel"))
 
 
 def notebook(browser: Browser) -> None:
@@ -287,18 +290,18 @@ def notebook(browser: Browser) -> None:
         page.evaluate(SHOW_WIDGET, [str(widget._esm), {**state, "time": 4.5}, samples])
         page.frame_locator("iframe").locator(".robot canvas").wait_for()
         page.wait_for_timeout(3000)
-        keep(page, "notebook")
+        save_picture(page, "notebook")
         page.close()
 
 
 SHOTS = {
-    "studio": whole,
+    "studio": studio_with_run,
     "editor": robot_editor,
     "script": script,
     "library": library,
     "dialog": dialog,
     "model": model,
-    "moments": moments,
+    "poses": poses,
     "scopes": scopes,
     "notebook": notebook,
 }

@@ -1,11 +1,10 @@
-"""Set up the environment and run every check; for use before a commit and in CI.
+"""Set up the environment and run every check, before a commit and in CI.
 
-``python3 scripts/test.py`` runs all steps, also after a failure, and ends with exit code 1 if any step
-failed. ``python3 scripts/test.py format types`` runs only the named steps.
+``python3 scripts/test.py`` runs all steps, also after a failure. The exit code is 1 if a step failed.
+``python3 scripts/test.py format types`` runs only the named steps.
 
-The static checks run in sequence while the tests run. The output is displayed as if all steps ran in
-sequence: the first unfinished step is shown as it runs, and the output of later ones is buffered until their
-turn.
+The static checks run in two parallel rows, then the tests run. The output has the order of the steps: the
+output of the first unfinished step is shown immediately, that of later steps is buffered.
 """
 
 from __future__ import annotations
@@ -38,15 +37,16 @@ STEPS: dict[str, tuple[str | object, ...]] = {
     "docs": (PYTHON, "docs/build_site.py"),
     "tests": (PYTHON, "-m", "pytest", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"),
 }
-BEFORE_ALL = ("page",)
-"""Steps whose results the others need."""
+FIRST_STEPS = ("page",)
+"""Steps whose results the other steps need."""
 STAGES = (
     (("types",), ("web types", "web lint", "web format", "web tests", "lint", "format", "layers", "docs")),
     (("tests",),),
 )
 """Stages run in sequence. In a stage, the rows run in parallel, and the steps of a row in sequence.
-The tests have a separate stage, because journeys in a browser need the whole machine."""
-GLANCE_SECONDS = 0.1
+The tests have a separate stage, because browser tests need all cores."""
+POLL_SECONDS = 0.1
+"""Interval at which new output of a step is shown, s."""
 
 
 class Step:
@@ -84,11 +84,11 @@ class Step:
             self._ended.set()
 
     def follow(self) -> None:
-        """Show the output so far, and new output until the command ends."""
+        """Show the existing output, and new output until the command ends."""
         say(f"== {self.name}: {' '.join(self.command).replace(f'{ROOT}/', '')}")
         with self._output.open("rb") as output:
             while True:
-                ended = self._ended.wait(GLANCE_SECONDS)
+                ended = self._ended.wait(POLL_SECONDS)
                 if text := output.read():
                     sys.stdout.buffer.write(text)
                     sys.stdout.buffer.flush()
@@ -115,7 +115,7 @@ def run_steps(names: Sequence[str]) -> list[Step]:
 
         try:
             for name in names:
-                if name in BEFORE_ALL:
+                if name in FIRST_STEPS:
                     pool.submit(steps[name].run)
                     steps[name].follow()
             for stage in STAGES:
@@ -138,7 +138,7 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "steps", nargs="*", metavar="step", help=f"which steps: {', '.join(STEPS)} (default: all)"
+        "steps", nargs="*", metavar="step", help=f"steps to run: {', '.join(STEPS)} (default: all)"
     )
     requested = parser.parse_args().steps
     for name in requested:
@@ -152,7 +152,7 @@ def main() -> int:
     for step in results:
         verdict = "passed" if step.code == 0 else f"FAILED (exit code {step.code})"
         say(f"   {step.name:<10} {verdict:<24} {step.seconds:6.1f} s")
-    say(f"   all together {time.perf_counter() - start:31.1f} s")
+    say(f"   total {time.perf_counter() - start:38.1f} s")
     return 1 if any(step.code != 0 for step in results) else 0
 
 

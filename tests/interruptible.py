@@ -13,8 +13,8 @@ def start_interruptible(command: Sequence[str], **options: Any) -> subprocess.Po
     """Start a process with text pipes in which SIGINT has its default action.
 
     A child process inherits an ignored SIGINT. A shell script that runs ``nohup pytest &`` starts the tests
-    with SIGINT ignored (POSIX.1-2017, Shell Command Language, 2.11), and their child processes would not end
-    on Ctrl-C.
+    with SIGINT ignored (POSIX.1-2017, Shell Command Language, 2.11). Child processes of the tests would not
+    end on Ctrl-C.
     """
     before = signal.getsignal(signal.SIGINT)
     if before is signal.SIG_IGN:

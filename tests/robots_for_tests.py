@@ -28,7 +28,7 @@ from armblocks.spatial import Transform, rotation_about
 
 
 def build_puma560() -> Robot:
-    """Corke's parameters of 8/95, as the Robotics Toolbox ships them (d1 = 0.67183)."""
+    """Return the Robotics Toolbox's Puma 560, with Corke's parameters of August 1995 (d1 = 0.67183 m)."""
     alpha = (pi / 2, 0, -pi / 2, pi / 2, -pi / 2, 0)
     a = (0, 0.4318, 0.0203, 0, 0, 0)
     d = (0.67183, 0, 0.15005, 0.4318, 0, 0)
@@ -76,7 +76,7 @@ def build_puma560() -> Robot:
 
 
 def build_kr180() -> Robot:
-    """The palletising arm of the paper, with the printed parameters."""
+    """Return the palletising arm of the paper, with the parameters printed there."""
     alpha = (pi / 2, 0, pi / 2, 0)
     a = (0.35, 0, 1.6, 0)
     d = (0.75, 1.25, 0, 2.6)
@@ -205,8 +205,8 @@ LAW_ROBOTS: dict[str, Robot] = {
 }
 """Robots for tests of physical laws: all shipped robots, and random trees."""
 
-SOLID_ROBOTS: dict[str, Robot] = {robot.name: robot for robot in RANDOM_ROBOTS}
-"""The robots of LAW_ROBOTS whose inertias are all physically consistent."""
+CONSISTENT_ROBOTS: dict[str, Robot] = {robot.name: robot for robot in RANDOM_ROBOTS}
+"""Random trees: all their inertias are physically consistent, unlike those of some shipped robots."""
 
 
 @cache
@@ -222,7 +222,7 @@ def evaluate(robot: Robot, name: str, *values: ArrayLike) -> np.ndarray:
 
 
 def random_states(robot: Robot, count: int = 4, seed: int = 7) -> list[tuple[np.ndarray, ...]]:
-    """Return ``count`` triples of (n,): joint positions, speeds, and accelerations or torques."""
+    """Return ``count`` triples of arrays (n,): joint positions, speeds, and accelerations or torques."""
     random = np.random.default_rng(seed)
     scales = (np.pi, 2.0, 5.0)
     return [tuple(random.uniform(-s, s, robot.n) for s in scales) for _ in range(count)]

@@ -20,7 +20,7 @@ from armblocks import user_folders
         (MacOS, "Library/Caches/armblocks", "Library/Application Support/armblocks"),
     ],
 )
-def test_user_folders_on_unix(
+def test_user_folders_on_unix_are_in_the_home_folder(
     system: type[PlatformDirsABC], cache: str, state: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("XDG_CACHE_HOME", "XDG_STATE_HOME", "XDG_DATA_HOME"):
@@ -30,7 +30,7 @@ def test_user_folders_on_unix(
     assert (requested.user_cache_path, requested.user_state_path) == (tmp_path / cache, tmp_path / state)
 
 
-def test_user_folders_on_windows(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_user_folders_on_windows_are_in_the_local_application_data(monkeypatch: pytest.MonkeyPatch) -> None:
     folders = {"CSIDL_LOCAL_APPDATA": "local"}
     monkeypatch.setattr("platformdirs.windows.get_win_folder", folders.__getitem__)
     requested = Windows("armblocks", appauthor=False)

@@ -4,6 +4,7 @@ import { DroppedTableDialog } from './canvas/dropped_table_dialog'
 import { SubsystemPreview } from './canvas/subsystem_preview'
 import { ContextMenu } from './context_menu'
 import { CommandPalette } from './command_palette'
+import { Bookmarks } from './documents/bookmarks_dialog'
 import { CloseDialog } from './documents/close_dialog'
 import { OpenDialog } from './documents/open_dialog'
 import { RecoveryDialog } from './documents/recovery_dialog'
@@ -27,6 +28,7 @@ export function AllDialogs() {
       <MaskDialog />
       <Configuration />
       <ParameterSets />
+      <Bookmarks />
       <QuickInsert />
       <ConnectDialog />
       <CommandPalette />

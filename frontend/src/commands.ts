@@ -2,7 +2,15 @@ import { align, comment, distribute, flip, ground, group, rotate, selectedBlocks
 import { rename } from './canvas/block_node'
 import { copy, cut, duplicate, paste } from './canvas/clipboard'
 import { addNote, sheetView, ZOOM_STEP } from './canvas/sheet_actions'
-import { openConfiguration, openMask, openParameterSets, openTour, save, showDialog } from './dialogs'
+import {
+  openBookmarks,
+  openConfiguration,
+  openMask,
+  openParameterSets,
+  openTour,
+  save,
+  showDialog,
+} from './dialogs'
 import { exportDrawing, openReport } from './documents/export'
 import { canClose, canStepTabs, closeInFront, stepTabs } from './documents/tabs'
 import { control, startOrResume } from './run/start'
@@ -49,9 +57,9 @@ const COMMANDS: Command[] = [
     run: () => control('step'),
   },
   { title: 'Step back', keys: 'Ctrl+←', handledByFields: true, enabled: hasRun, run: () => control('back') },
-  { title: 'Find blocks, types and values', keys: 'Ctrl+F', run: () => showDialog('find') },
+  { title: 'Find blocks, types, values and bookmarks', keys: 'Ctrl+F', run: () => showDialog('find') },
   { title: 'Add a block', run: () => showDialog('insert') },
-  { title: 'Draw a wire by the names of its ends', keys: '>', run: () => showDialog('connect') },
+  { title: 'Draw a wire by the names of its ports', keys: '>', run: () => showDialog('connect') },
   { title: 'Write a note', keys: '"', run: addNote },
   { title: 'Undo', keys: 'Ctrl+Z', handledByFields: true, run: () => alterDocument('undo') },
   { title: 'Redo', keys: 'Ctrl+Y, Ctrl+Shift+Z', handledByFields: true, run: () => alterDocument('redo') },
@@ -132,6 +140,8 @@ const COMMANDS: Command[] = [
   { title: 'Zoom in', keys: '+', run: () => sheetView.zoom?.(ZOOM_STEP) },
   { title: 'Zoom out', keys: '-', run: () => sheetView.zoom?.(1 / ZOOM_STEP) },
   { title: 'Show the sheet at 100 %', keys: '1', run: () => sheetView.zoom?.(null) },
+  { title: 'Bookmark this view', keys: 'Ctrl+B', run: () => openBookmarks('add') },
+  { title: 'Bookmarks of views', keys: 'Ctrl+Shift+B', run: () => openBookmarks() },
   { title: 'Light theme', run: () => setTheme('light') },
   { title: 'Dark theme', run: () => setTheme('dark') },
   { title: 'Theme of the system', run: () => setTheme('auto') },

@@ -1,7 +1,7 @@
 import type { ReplyTo, Request, ServerEvent } from './messages'
 import { storeUnsent, unsent } from './unsent'
 
-/** Why the server refused a request. */
+/** The refusal of a request by the server, with the reason. */
 export class Refusal extends Error {
   constructor(
     readonly what: string,
@@ -31,16 +31,16 @@ const REPLY_TIMEOUT_MS = 2500
 const RECONNECT_AFTER_MS = 10_000
 
 /**
- * The websocket to the server. Requests without a reply are sent again after a reconnection, when the page
- * has its document again (`resend`), and also after a reload of the page. Edits carry keys, so the server
- * applies each of them once.
+ * The websocket to the server. After a reconnection or a reload of the page, the server first reopens the
+ * documents of the page. Then requests without a reply are sent again (`resend`). Edits carry keys, so the
+ * server applies each of them once.
  */
 export class Connection {
   private socket: WebSocket | null = null
   private lastNumber = 0
   private readonly pending = new Map<number, PendingRequest>()
   private reconnectDelay = FIRST_DELAY_MS
-  /** Whether requests may be sent: not until the server has reopened the documents of this page. */
+  /** Whether the server has reopened the documents of this page, so that requests may be sent. */
   private attached = false
   private pingedAt = 0
   private onEvent: (event: ServerEvent) => void = () => {}
@@ -120,7 +120,7 @@ export class Connection {
     })
   }
 
-  /** Send requests again, first those without a reply; called when the page has its document again. */
+  /** Send all requests without a reply; called when the server has reopened the documents of the page. */
   resend(): void {
     this.attached = true
     for (const [number, { request }] of this.pending) this.send(number, request)

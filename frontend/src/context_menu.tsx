@@ -6,7 +6,7 @@ import { closeMenu, useContextMenu, type Entries, type Entry } from './context_m
 /** The open context menu, at the pointer. */
 export function ContextMenu() {
   const { opened, label, at, entries, openCount } = useContextMenu()
-  // A panel under the menu may disappear, such as the sheet of another document.
+  // The menu closes when the window loses the focus.
   useEffect(() => {
     if (!opened) return
     addEventListener('blur', closeMenu)

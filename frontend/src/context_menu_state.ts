@@ -85,6 +85,6 @@ export function useMenuHandlers(open: (at: { x: number; y: number }, target: Ele
   }
 }
 
-/** Whether the browser's menu is useful at an element: it has the clipboard of text fields. */
+/** Whether the browser's menu is kept at an element: text fields need its clipboard commands. */
 export const hasOwnMenu = (target: EventTarget): boolean =>
   target instanceof Element && target.closest('input, textarea, [role="menu"]') !== null

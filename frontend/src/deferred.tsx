@@ -9,7 +9,7 @@ const loaders: (() => Promise<unknown>)[] = []
 
 /**
  * A part of the page that is not in the first download. It is fetched when the page has shown its document
- * and is idle, or earlier if it is needed. Until then, `words` is displayed in its place.
+ * and is idle, or earlier if it is needed. Until then, `placeholder` is displayed in its place.
  */
 export function deferred(load: () => Promise<ComponentType>, placeholder = ''): ComponentType {
   const Part = lazy(() => load().then((part) => ({ default: part })))

@@ -14,6 +14,7 @@ type Dialog =
   | 'configuration'
   | 'mask'
   | 'parameter_sets'
+  | 'bookmarks'
   | 'save_as'
   | 'open'
   | 'recovery'
@@ -65,14 +66,19 @@ export const useTour = create<{ stop: number | null }>(() => ({ stop: null }))
 
 export const openTour = (): void => useTour.setState({ stop: 0 })
 
-/** The configuration parameters belong to a document. */
+/** Open the configuration parameters of the displayed document, if there is one. */
 export function openConfiguration(): void {
   if (useStudio.getState().document) showDialog('configuration')
 }
 
-/** The parameter sets belong to a document. */
+/** Open the parameter sets of the displayed document, if there is one. */
 export function openParameterSets(): void {
   if (useStudio.getState().document) showDialog('parameter_sets')
+}
+
+/** The bookmarks of the document; `typed` begins a bookmark of the present view. */
+export function openBookmarks(typed: 'add' | '' = ''): void {
+  if (useStudio.getState().document) showDialog('bookmarks', typed)
 }
 
 /** Edit the mask of a subsystem on the sheet; without a block, the mask of the sheet. */

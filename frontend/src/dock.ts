@@ -8,10 +8,10 @@ export function setDock(api: DockviewApi): void {
 }
 
 const HIGHLIGHT_MS = 1200
-/** Time in which a chart is drawn at the first run, whose code is then loaded. */
+/** Maximum time to wait for a chart, whose code is loaded at the first run. */
 const CHART_TIMEOUT_MS = 3000
 
-/** Show the chart of a block in the panel of the scopes, and mark it for a moment. */
+/** Show the chart of a block in the panel of the scopes, and highlight it for 1.2 s. */
 export function showScope(path: string): void {
   dock?.getPanel('scopes')?.api.setActive()
   const end = performance.now() + CHART_TIMEOUT_MS

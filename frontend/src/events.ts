@@ -97,7 +97,7 @@ function welcome(event: EventOf<'welcome'>): void {
     library: new Map(event.library.map((kind) => [kind.type, kind])),
     documents: event.documents,
   })
-  // Not earlier: a page that shows its document again offers no recovery of it.
+  // Set after the documents are restored: a restored document is not offered for recovery.
   void restoreDocuments(event).then(() =>
     useStudio.setState((s) => ({ recoveries: recoverable(event.recoveries, s.documents) })),
   )
@@ -174,7 +174,7 @@ function documentChecked(event: EventOf<'checked'>): void {
 }
 
 function runStarted(event: EventOf<'run_started'>): void {
-  // Sent again after a reconnection: the samples are the same.
+  // After a reconnection the server sends the same event again.
   const { run, document } = useStudio.getState()
   if (run?.run === event.run) return
   const displayed = document?.state.document === event.document
@@ -247,7 +247,7 @@ async function restoreDiagram(welcome: EventOf<'welcome'>): Promise<void> {
     useStudio.setState({ returned: true })
     const key = await ask({ kind: 'attach', document, document_kind: 'diagram', inside, path, origin })
     if (key !== undefined) {
-      // Not later: the pending requests may belong to documents in other tabs.
+      // The tabs are restored before `resend`, because pending requests may belong to their documents.
       await reattachTabs(welcome)
       connection.resend()
       return

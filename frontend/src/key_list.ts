@@ -19,7 +19,7 @@ export const KEYS: KeyGroup[] = [
       ['arrows', 'Move the selection; with Shift by one pixel'],
       ['Del, Backspace', 'Delete blocks, wires and notes'],
       ['Esc', 'Clear the selection; again: leave the subsystem'],
-      ['>', 'Draw a wire by the names of its ends'],
+      ['>', 'Draw a wire by the names of its ports'],
       ['"', 'Write a note'],
       ['Space', 'Fit the sheet into the window'],
       ['+, =', 'Zoom in'],
@@ -81,6 +81,17 @@ export const KEYS: KeyGroup[] = [
       ['↑, ↓', 'Move through the list'],
       ['Enter', 'Accept the selected or typed entry'],
       ['Esc', 'Close'],
+    ],
+  },
+  {
+    title: 'List of bookmarks',
+    sources: ['documents/bookmarks_dialog.tsx'],
+    keys: [
+      ['↑, ↓, Home, End', 'Move through the list'],
+      ['Enter', 'Show the view of the bookmark'],
+      ['F2', 'Rename the bookmark; Esc discards the name'],
+      ['Del', 'Remove the bookmark'],
+      ['Esc', 'Close the list'],
     ],
   },
   {

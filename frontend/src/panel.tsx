@@ -46,7 +46,7 @@ function dockOptions(place: Panel['place']) {
   return side === 'below' ? { position, initialHeight: size } : { position, initialWidth: size }
 }
 
-/** A panel that is rendered when it is first visible, hidden panels are not rendered. */
+/** A panel that is rendered when it first becomes visible. */
 export function whenVisible(Part: ComponentType): PanelComponent {
   return function Panel({ api }) {
     const [wasVisible, setWasVisible] = useState(api.isVisible)

@@ -16,6 +16,7 @@ export interface Envelope {
   request:
     | AskMask
     | Attach
+    | AskBookmarks
     | Change
     | Close
     | Control
@@ -81,6 +82,13 @@ export interface Attach {
   in_front?: boolean;
 }
 /**
+ * Return the bookmarks of all sheets of a model.
+ */
+export interface AskBookmarks {
+  kind: "bookmarks";
+  document: string;
+}
+/**
  * Apply an edit.
  *
  * ``inside``: names of the subsystems that lead to the edited sheet of a diagram. Consecutive changes with
@@ -96,6 +104,7 @@ export interface Change {
   gesture?: string;
   edit:
     | AddBlocks
+    | AddBookmark
     | AddJoint
     | SetAppearance
     | ApplyParameterSet
@@ -119,10 +128,12 @@ export interface Change {
     | SetParameters
     | PasteBlocks
     | RemoveBlocks
+    | RemoveBookmark
     | RemoveJoint
     | RemoveParameterSet
     | RemoveSetParameter
     | Rename
+    | RenameBookmark
     | RenameLink
     | RenameParameterSet
     | SaveParameterSet
@@ -172,6 +183,24 @@ export interface Wire {
   source: string;
   target: string;
   bends?: number[];
+}
+/**
+ * Store a part of the sheet under a name. ``replace``: the bookmark exists, and gets this part.
+ */
+export interface AddBookmark {
+  kind: "add_bookmark";
+  name: string;
+  part: SheetPart;
+  replace?: boolean;
+}
+/**
+ * A part of a sheet, px: top left corner and size.
+ */
+export interface SheetPart {
+  x: number;
+  y: number;
+  width: number;
+  height: number;
 }
 /**
  * Insert a new link after another one, or at the base if ``after`` is empty.
@@ -408,6 +437,13 @@ export interface RemoveBlocks {
   notes?: string[];
 }
 /**
+ * Remove a bookmark of the sheet.
+ */
+export interface RemoveBookmark {
+  kind: "remove_bookmark";
+  name: string;
+}
+/**
  * Remove a link; its child links are attached to its parent.
  */
 export interface RemoveJoint {
@@ -437,6 +473,14 @@ export interface Rename {
   name: string;
 }
 /**
+ * Rename a bookmark of the sheet.
+ */
+export interface RenameBookmark {
+  kind: "rename_bookmark";
+  name: string;
+  to: string;
+}
+/**
  * Give a link another name.
  */
 export interface RenameLink {
@@ -455,8 +499,8 @@ export interface RenameParameterSet {
 /**
  * Store values of parameters, by ``block.parameter``, under a name.
  *
- * ``of_others``: also the model's values of the parameters of all other sets. ``replace``: the values
- * replace those of a set with this name, which must exist.
+ * ``all_parameters``: the model's values of the parameters that only other sets have are stored, too.
+ * ``replace``: the values replace those of a set with this name, which must exist.
  */
 export interface SaveParameterSet {
   kind: "save_parameter_set";
@@ -464,7 +508,7 @@ export interface SaveParameterSet {
   values: {
     [k: string]: unknown;
   };
-  of_others?: boolean;
+  all_parameters?: boolean;
   replace?: boolean;
 }
 /**
@@ -526,7 +570,7 @@ export interface Files {
   kind: "files";
 }
 /**
- * Search all sheets for blocks by words in names, types and values.
+ * Search all sheets: blocks by words in names, types and values, bookmarks by words in names.
  */
 export interface Find {
   kind: "find";
@@ -1293,6 +1337,7 @@ export interface SettingRule {
 export interface Replies {
   ask_mask: SetMask;
   attach: string;
+  bookmarks: SheetBookmark[];
   change: number;
   close: boolean;
   control: null;
@@ -1337,6 +1382,15 @@ export interface Replies {
   undo: number;
 }
 /**
+ * A bookmark of the sheet at a path. ``linked``: it belongs to a library block and cannot be edited.
+ */
+export interface SheetBookmark {
+  inside: string[];
+  name: string;
+  part: SheetPart;
+  linked: boolean;
+}
+/**
  * A file of the project; ``size`` in bytes.
  */
 export interface DataFile {
@@ -1351,13 +1405,17 @@ export interface FileList {
   recent: string[];
 }
 /**
- * A block found by a search; ``match`` is the matching value, ``""`` if the name or type matches.
+ * A block or a bookmark found by a search.
+ *
+ * ``match`` is the matching value of the block, ``""`` if its name or type matches. ``part`` is the part of
+ * the sheet that a bookmark shows; ``title`` is then ``""``.
  */
 export interface FoundBlock {
   inside: string[];
   name: string;
   title: string;
   match: string;
+  part?: SheetPart | null;
 }
 /**
  * The sheets of a model as a tree.
@@ -1396,7 +1454,7 @@ export interface SetParameter {
 /**
  * The columns of a file, and the table of the chosen ones, or its ``fault``.
  *
- * ``time`` is the column with the times, ``chosen`` are those of the values. ``rows`` are the first rows of
+ * ``time`` is the column of times, ``chosen`` are the columns of values. ``rows`` are the first rows of
  * these columns as text. ``times`` (s) and ``curves`` are points for a plot: minimum and maximum of groups
  * of rows. ``spacing`` has the minimum and the maximum difference of successive times, s.
  */
@@ -1441,7 +1499,7 @@ export interface FunctionSource {
   fault: Fault | null;
 }
 /**
- * A function of a Python file; ``line`` is that of its definition.
+ * A function of a Python file; ``line`` is the line number of its definition.
  */
 export interface SourceFunction {
   name: string;

@@ -11,17 +11,21 @@ const TUNE = 'tune'
 /** Initial width of the robot view, px. */
 export const robotWidth = (): number => Math.min(640, 0.28 * innerWidth)
 
-/** Whether a robot view is of use: a block of the top sheet has a robot, or one of a sheet seen since. */
-export function hasRobot(blocks: Record<string, SheetBlock>, isTop: boolean, previously: boolean): boolean {
+/** Whether the robot view is shown: for a sheet with a robot, and in subsystems if it was shown before. */
+export function needsRobotView(
+  blocks: Record<string, SheetBlock>,
+  isTop: boolean,
+  previously: boolean,
+): boolean {
   return Object.values(blocks).some(({ parameters }) => parameters['robot']) || (!isTop && previously)
 }
 
-/** Show the robot view only for a model with a robot: without it, diagram and scopes take its room. */
+/** Show the robot view only for a model with a robot: without a robot, diagram and scopes use its space. */
 export function showRobotPanelIfNeeded(api: DockviewApi, add: (id: string) => void): void {
   let visible = true
   const update = ({ document }: { document: ReturnType<typeof useStudio.getState>['document'] }) => {
     if (!document) return
-    const needed = hasRobot(document.blocks, document.inside.length === 0, visible)
+    const needed = needsRobotView(document.blocks, document.inside.length === 0, visible)
     if (needed === visible) return
     visible = needed
     const library = api.getPanel(LIBRARY)

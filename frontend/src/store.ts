@@ -2,7 +2,7 @@ import { create } from 'zustand'
 import { Connection, Refusal, type ConnectionState } from './connection'
 import { scheduleFrame } from './frames'
 import { newKey } from './keys'
-import { outstanding, pathOf, withMoves, type SentMove } from './model/sent_moves'
+import { outstandingMoves, pathOf, withMoves, type SentMove } from './model/sent_moves'
 import type { Edit, EventOf, ReplyTo, Request } from './messages'
 import type {
   BlockType,
@@ -87,7 +87,7 @@ interface Studio {
   /** A block that is to be centred in the window. */
   blockToCentre: string | null
   notices: Notice[]
-  /** Whether the last run failed: unconnected inputs are then errors, before they are only marked. */
+  /** Whether the last run failed; unconnected inputs are then shown as errors instead of warnings. */
   strict: boolean
   select: (names: Iterable<string>) => void
   edit: (block: string | null) => void
@@ -195,7 +195,7 @@ function showMove(move: SentMove): void {
 
 /** Show a state of the document from the server, with the moves that it does not contain yet. */
 export function showState(document: OpenDocument): Pick<Studio, 'document' | 'sent'> {
-  const sent = outstanding(useStudio.getState().sent, document)
+  const sent = outstandingMoves(useStudio.getState().sent, document)
   return { document: withMoves(document, sent), sent }
 }
 
@@ -208,9 +208,9 @@ export async function attempt(edit: Edit, inside: string[]): Promise<void> {
 /** Undo or redo a step of a document, or reload its file. */
 export function alterDocument(
   kind: 'undo' | 'redo' | 'reload',
-  of: DocumentState | undefined = useStudio.getState().document?.state,
+  state: DocumentState | undefined = useStudio.getState().document?.state,
 ): void {
-  if (of) void ask({ kind, ...alteration(of) })
+  if (state) void ask({ kind, ...alteration(state) })
 }
 
 /** Show a document that the server has open. */

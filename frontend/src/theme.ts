@@ -12,10 +12,10 @@ export const themeManager = localStorageColorSchemeManager({ key: 'armblocks-the
 
 const useTheme = create<{ set: (scheme: MantineColorScheme) => void }>(() => ({ set: () => {} }))
 
-/** Show a theme, or that of the system. */
+/** Select a theme; `auto` is the theme of the system. */
 export const setTheme = (scheme: MantineColorScheme): void => useTheme.getState().set(scheme)
 
-/** Called by the page with the function of the component library. */
+/** Register the function of the component library that changes the theme. */
 export const onTheme = (set: (scheme: MantineColorScheme) => void): void => useTheme.setState({ set })
 
 /** Colours, fonts and corners of the component library, as in all figures of armblocks. */
@@ -79,8 +79,7 @@ export const theme = createTheme({
   autoContrast: true,
   defaultRadius: 'sm',
   components: {
-    // The colours of titles and labels have too little contrast on their own tint; the tints are those of all
-    // messages.
+    // Coloured titles have too little contrast on the tinted background. All messages use the same tints.
     Alert: {
       styles: { title: { color: 'var(--ink)' } },
       vars: (_theme: MantineTheme, { color }: AlertProps) => {

@@ -5,7 +5,7 @@ const stored = (text: string | null) =>
   storedData<unknown>({ getItem: () => text } as unknown as Storage, 'key')
 
 describe('storedData', () => {
-  it('returns what was stored', () => {
+  it('returns the stored value', () => {
     expect(stored('{"document":"d1","inside":[]}')).toEqual({ document: 'd1', inside: [] })
   })
   it.each([null, '', '{"document":', 'undefined'])('returns null for %j', (text) => {

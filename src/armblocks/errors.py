@@ -55,11 +55,11 @@ class ArmblocksError(ValueError):
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle the parts, so that a process pool can return the error."""
-        return _unpickled, (type(self), self.args), self.__dict__
+        return _restored_error, (type(self), self.args), self.__dict__
 
 
-def _unpickled(kind: type[ArmblocksError], args: tuple[object, ...]) -> ArmblocksError:
-    """Restore an unpickled error from its text; ``__init__`` would take the parts of the text."""
+def _restored_error(kind: type[ArmblocksError], args: tuple[object, ...]) -> ArmblocksError:
+    """Restore an error from its pickled text without ``__init__``, which expects the parts of the text."""
     return kind.__new__(kind, *args)
 
 
@@ -74,41 +74,42 @@ MAX_LIST_LENGTH = 200
 
 
 class UnknownNameError(ArmblocksError):
-    """A name that is not in ``known``. The message suggests the nearest name and lists the known names."""
+    """A name is not in ``known``. The message suggests the nearest name and lists the known names."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str], *, where: str = "") -> None:
         self.kind = kind
         self.name = name
         self.known: Sequence[str] = sorted(known)
         folded = {entry.casefold(): entry for entry in self.known}
-        near = difflib.get_close_matches(name.casefold(), list(folded), n=1, cutoff=0.5)
-        shown = name if len(name) <= MAX_NAME_LENGTH else f"{name[:MAX_NAME_LENGTH]}..."
+        nearest = difflib.get_close_matches(name.casefold(), list(folded), n=1, cutoff=0.5)
+        shortened_name = name if len(name) <= MAX_NAME_LENGTH else f"{name[:MAX_NAME_LENGTH]}..."
         super().__init__(
-            f"there is no {kind} named '{shown}'",
+            f"there is no {kind} named '{shortened_name}'",
             where=where,
-            allowed=_legible(self.known, name),
-            fix=f"did you mean '{folded[near[0]]}'?" if near else "use one of the names above",
+            allowed=_shortened_list(self.known, name),
+            fix=f"did you mean '{folded[nearest[0]]}'?" if nearest else "use one of the names above",
         )
 
 
-def _legible(names: Sequence[str], unknown: str) -> str:
+def _shortened_list(names: Sequence[str], unknown: str) -> str:
     """All names if they are few, else the names most similar to the unknown one and the number of others."""
     if not names:
         return "none exist"
-    if len(whole := ", ".join(names)) <= MAX_LIST_LENGTH:
-        return whole
+    if len(full_list := ", ".join(names)) <= MAX_LIST_LENGTH:
+        return full_list
     matcher = difflib.SequenceMatcher(b=unknown.casefold())
 
-    def likeness(name: str) -> float:
+    def similarity(name: str) -> float:
         matcher.set_seq1(name.casefold())
         return matcher.quick_ratio()
 
-    chosen: list[str] = []
-    for name in sorted(names, key=lambda name: -likeness(name)):
-        if sum(map(len, chosen)) + 2 * len(chosen) + len(name) > MAX_LIST_LENGTH - 30:
+    nearest_names: list[str] = []
+    for name in sorted(names, key=lambda name: -similarity(name)):
+        if sum(map(len, nearest_names)) + 2 * len(nearest_names) + len(name) > MAX_LIST_LENGTH - 30:
             break
-        chosen.append(name)
-    return f"{', '.join(sorted(chosen) or [names[0][:MAX_LIST_LENGTH]])}, and {len(names) - len(chosen)} more"
+        nearest_names.append(name)
+    shown_names = sorted(nearest_names) or [names[0][:MAX_LIST_LENGTH]]
+    return f"{', '.join(shown_names)}, and {len(names) - len(nearest_names)} more"
 
 
 def check_arguments(kind: type, values: Sequence[object], named: Mapping[str, object]) -> None:
@@ -146,7 +147,7 @@ def check_type(
             f"a value of type {type(value).__name__} was given",
             where=where,
             allowed=allowed,
-            fix="pass such a value",
+            fix="pass a value of an allowed type",
         )
 
 
@@ -222,4 +223,4 @@ class InertiaWarning(ArmblocksWarning):
 
 
 class LimitWarning(ArmblocksWarning):
-    """A joint exceeded its position or speed limit. The text has joint, time and value."""
+    """A joint exceeded its position or speed limit. The message contains joint, time and value."""

@@ -1,6 +1,6 @@
-"""Libraries of optional extras: imported at first use, with an error that names the extra if one is missing.
+"""Imports of optional libraries at first use. The error for a missing library names its extra.
 
-The core of armblocks (robots, diagrams, runs, reports, command line) works without any of them.
+The core of armblocks (robots, diagrams, runs, reports, command line) needs no optional library.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ LIBRARIES = {
     "figures": ("matplotlib",),
     "notebook": ("anywidget", "traitlets"),
     "studio": ("pydantic", "starlette", "uvicorn", "websockets"),
+    "xacro": ("xacro",),
 }
 """The libraries of each extra, by import name."""
 

@@ -19,7 +19,7 @@ def write_atomically(path: str | Path, data: bytes, *, mode: int = 0o666) -> os.
 
     The bytes are written to a temporary file in the same folder and flushed (``fsync``). A rename then
     replaces the old file, and the folder entry is flushed too. A symbolic link stays a link: its target is
-    replaced. The permissions of an existing file are kept.
+    replaced. The permissions of an existing file do not change.
 
     Source: Pillai et al., "All File Systems Are Not Created Equal", OSDI 2014: a rename without both
     ``fsync`` calls is not safe.
@@ -31,14 +31,14 @@ def write_atomically(path: str | Path, data: bytes, *, mode: int = 0o666) -> os.
     folder = target.parent
     temporary = folder / f".{target.name[:64]}.{secrets.token_hex(6)}.tmp"
     try:
-        written = _write_through(temporary, data, mode)
+        status = _write_and_flush(temporary, data, mode)
         if target.exists():
             temporary.chmod(target.stat().st_mode & 0o7777)
         temporary.replace(target)
         sync_folder(folder)
-        return written
+        return status
     except OSError as error:
-        raise _cannot_write(str(path), error) from error
+        raise _write_error(str(path), error) from error
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
@@ -47,19 +47,19 @@ def write_atomically(path: str | Path, data: bytes, *, mode: int = 0o666) -> os.
 class GrowingFile:
     """A file that is written in parts under a temporary name and renamed when it is complete.
 
-    Until then an existing file of that name is unchanged. Raises ``FormatError`` as
+    Before the renaming, an existing file of that name is unchanged. Raises ``FormatError`` as
     :func:`write_atomically` does.
     """
 
     def __init__(self, path: str | Path) -> None:
-        self._shown = str(path)
+        self._path_text = str(path)
         self._target = _writable_target(path)
         name = f".{self._target.name[:64]}.{secrets.token_hex(6)}.part"
         self._temporary = self._target.parent / name
         try:
             self.stream: BinaryIO = self._temporary.open("xb")
         except OSError as error:
-            raise _cannot_write(self._shown, error) from error
+            raise _write_error(self._path_text, error) from error
 
     def finish(self) -> None:
         """Rename the complete file to its final name."""
@@ -73,7 +73,7 @@ class GrowingFile:
             sync_folder(self._target.parent)
         except OSError as error:
             self.abandon()
-            raise _cannot_write(self._shown, error) from error
+            raise _write_error(self._path_text, error) from error
 
     def abandon(self) -> None:
         """Delete the temporary file."""
@@ -111,7 +111,7 @@ def read_bounded(path: str | Path, limit: int) -> bytes:
     return data
 
 
-def _write_through(path: Path, data: bytes, mode: int) -> os.stat_result:
+def _write_and_flush(path: Path, data: bytes, mode: int) -> os.stat_result:
     """Create ``path`` with ``mode`` less the user's umask, write the data and flush it to the disk."""
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), mode)
     with os.fdopen(descriptor, "wb") as stream:
@@ -122,7 +122,7 @@ def _write_through(path: Path, data: bytes, mode: int) -> os.stat_result:
 
 
 def sync_folder(folder: Path) -> None:
-    """Flush a folder's entries to the disk. Windows has no such call and orders renames itself."""
+    """Flush a folder's entries to the disk. Windows has no such call and needs none."""
     if os.name == "nt":
         return
     descriptor = os.open(folder, os.O_RDONLY)
@@ -151,7 +151,7 @@ def _writable_target(path: str | Path) -> Path:
     return target
 
 
-def _cannot_write(path: str, error: OSError) -> FormatError:
+def _write_error(path: str, error: OSError) -> FormatError:
     return FormatError(
         f"the file cannot be written ({error.strerror or error})",
         where=path,

@@ -12,30 +12,30 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 
-def lazy_exports(package: str, homes: Mapping[str, str]) -> Callable[[str], object]:
+def lazy_exports(package: str, modules: Mapping[str, str]) -> Callable[[str], object]:
     """The module-level ``__getattr__`` (PEP 562) of ``package``.
 
-    ``homes`` maps each name to the module that defines it. A name whose module is ``package.name`` is that
-    module itself. After the first lookup a name is an ordinary attribute.
+    ``modules`` maps each name to the module that defines it. A name whose module is
+    ``package.name`` is that module itself. After the first lookup a name is an ordinary attribute.
     """
 
     def find(name: str) -> object:
-        home = homes.get(name)
-        if home is None:
+        module_name = modules.get(name)
+        if module_name is None:
             raise AttributeError(f"module '{package}' has no attribute '{name}'", name=name, obj=package)
-        module = importlib.import_module(home)
-        value: object = module if home == f"{package}.{name}" else getattr(module, name)
+        module = importlib.import_module(module_name)
+        value: object = module if module_name == f"{package}.{name}" else getattr(module, name)
         setattr(sys.modules[package], name, value)
         return value
 
     return find
 
 
-def shown_by(module: str, function: str) -> Callable[[Any], str]:
+def display_method(module: str, function: str) -> Callable[[Any], str]:
     """A notebook display method (``_repr_html_`` and the like) that calls ``function`` of ``module``.
 
-    Description classes belong to a layer below the drawing code and must not import it. They name the drawing
-    function, which is imported at the first call.
+    Description classes belong to a layer below the drawing code and must not import it. They give the name of
+    the drawing function, which is imported at the first call.
     """
 
     def show(self: object) -> str:

@@ -2,9 +2,10 @@
 
 Numbers that are computed before compilation (constants in formulas, angles between the axes of a robot, the
 poles of a filter) become constants of the code. The C library's functions, which :mod:`math`, NumPy and
-CasADi call, differ in the last place from one library or processor to the next; these do not. They use
-integer arithmetic: a real number ``x`` is ``round(x 2**bits)``, with 192 bits more than the magnitude of the
-argument needs, so that the result is correctly rounded in practice. A call takes 10 to 200 microseconds.
+CasADi call, differ in the last place from one library or processor to the next. The functions of this module
+use integer arithmetic and give the same bits everywhere. A real number ``x`` is the integer
+``round(x 2**bits)``, with 192 bits more than the magnitude of the argument needs. Results are therefore
+correctly rounded in practice. A call takes 10 to 200 microseconds.
 
 Signed zeros, infinities and NaN follow C99 (Annex F): an argument outside the domain gives NaN, a pole gives
 an infinity, and no function raises. The series are those of Abramowitz and Stegun, Handbook of Mathematical
@@ -20,21 +21,21 @@ from fractions import Fraction
 from functools import lru_cache
 
 INFINITY, NAN = math.inf, math.nan
-_SPARE = 192
+_EXTRA_BITS = 192
 """Extra bits beyond those that the magnitude of an argument needs."""
 
 
-def _spare(x: float) -> int:
-    """Number of fraction bits for which ``x`` and ``x**2`` keep :data:`_SPARE` extra bits."""
-    return _SPARE + 2 * abs(math.frexp(x)[1])
+def _working_bits(x: float) -> int:
+    """Number of fraction bits for which ``x`` and ``x**2`` keep :data:`_EXTRA_BITS` extra bits."""
+    return _EXTRA_BITS + 2 * abs(math.frexp(x)[1])
 
 
-def _fixed(x: float | Fraction, bits: int) -> int:
+def _fixed_point(x: float | Fraction, bits: int) -> int:
     numerator, denominator = x.as_integer_ratio()
     return (numerator << bits) // denominator
 
 
-def _rounded(value: int, bits: int, sign_of: float = 0.0) -> float:
+def _rounded_double(value: int, bits: int, sign_of: float = 0.0) -> float:
     """``value 2**-bits`` rounded to nearest; a zero result takes the sign of ``sign_of``."""
     try:
         result = value / (1 << bits) if bits >= 0 else float(value << -bits)
@@ -113,7 +114,7 @@ def _logarithm(x: int, bits: int) -> int:
 def _logarithm_of(x: float, bits: int) -> int:
     """``ln x`` of a positive number of any size."""
     _, exponent = math.frexp(x)
-    return _logarithm(_fixed(math.ldexp(x, -exponent), bits), bits) + exponent * _ln2(bits)
+    return _logarithm(_fixed_point(math.ldexp(x, -exponent), bits), bits) + exponent * _ln2(bits)
 
 
 def _shifted(value: int, k: int) -> int:
@@ -121,7 +122,7 @@ def _shifted(value: int, k: int) -> int:
 
 
 def _arc_tangent(x: int, bits: int) -> int:
-    """``atan x``, with three times ``atan x = 2 atan(x / (1 + sqrt(1 + x**2)))``."""
+    """``atan x``, after three reductions ``atan x = 2 atan(x / (1 + sqrt(1 + x**2)))``."""
     one = 1 << bits
     for _ in range(3):
         x = _quotient(x, one + math.isqrt((one << bits) + x * x), bits)
@@ -129,11 +130,11 @@ def _arc_tangent(x: int, bits: int) -> int:
 
 
 def _sine_cosine(x: float) -> tuple[int, int, int]:
-    """``sin x`` and ``cos x`` of a finite number, and their bits."""
-    bits = _spare(x)
-    half_turn = _pi(bits)
-    quarter = (2 * _fixed(x, bits) + half_turn // 2) // half_turn
-    r = _fixed(x, bits) - quarter * half_turn // 2
+    """``sin x`` and ``cos x`` of a finite number as fixed-point numbers, and their fraction bits."""
+    bits = _working_bits(x)
+    pi = _pi(bits)
+    quadrant = (2 * _fixed_point(x, bits) + pi // 2) // pi
+    r = _fixed_point(x, bits) - quadrant * pi // 2
     parts: list[int] = []
     for term, n in ((r, 1), (1 << bits, 0)):
         total = term
@@ -143,8 +144,8 @@ def _sine_cosine(x: float) -> tuple[int, int, int]:
             n += 2
         parts.append(total)
     sine, cosine = parts
-    turned = ((sine, cosine), (cosine, -sine), (-sine, -cosine), (-cosine, sine))[quarter % 4]
-    return (*turned, bits)
+    rotated = ((sine, cosine), (cosine, -sine), (-sine, -cosine), (-cosine, sine))[quadrant % 4]
+    return (*rotated, bits)
 
 
 # Trigonometric functions.
@@ -155,7 +156,7 @@ def sin(x: float) -> float:
     if not math.isfinite(x) or x == 0.0:
         return x if x == 0.0 else NAN
     sine, _, bits = _sine_cosine(x)
-    return _rounded(sine, bits, x)
+    return _rounded_double(sine, bits, x)
 
 
 def cos(x: float) -> float:
@@ -163,7 +164,7 @@ def cos(x: float) -> float:
     if not math.isfinite(x):
         return NAN
     _, cosine, bits = _sine_cosine(x)
-    return _rounded(cosine, bits)
+    return _rounded_double(cosine, bits)
 
 
 def tan(x: float) -> float:
@@ -171,7 +172,7 @@ def tan(x: float) -> float:
     if not math.isfinite(x) or x == 0.0:
         return x if x == 0.0 else NAN
     sine, cosine, bits = _sine_cosine(x)
-    return _rounded(_quotient(sine, cosine, bits), bits, x)
+    return _rounded_double(_quotient(sine, cosine, bits), bits, x)
 
 
 def atan(x: float) -> float:
@@ -185,20 +186,25 @@ def atan2(y: float, x: float) -> float:
         return NAN
     if math.isinf(x) or math.isinf(y):
         x, y = (math.copysign(1.0 if math.isinf(part) else 0.0, part) for part in (x, y))
-    across, along = abs(y), abs(x)
-    if across == 0.0 and math.copysign(1.0, x) > 0.0:
+    abs_y, abs_x = abs(y), abs(x)
+    if abs_y == 0.0 and math.copysign(1.0, x) > 0.0:
         return y
-    small, large = sorted((across, along))
-    bits = _SPARE + 2 * max(0, math.frexp(large)[1] - math.frexp(small or large)[1])
+    small, large = sorted((abs_y, abs_x))
+    bits = _EXTRA_BITS + 2 * max(0, math.frexp(large)[1] - math.frexp(small or large)[1])
     # Below 2**-1100 the quotient underflows, or is negligible when added to pi.
-    bits = min(bits, _SPARE + 2 * 1100)
-    (top, scale), (bottom, other) = small.as_integer_ratio(), (large or 1.0).as_integer_ratio()
-    angle = _arc_tangent(((top * other) << bits) // (scale * bottom), bits)
-    if across > along:
+    bits = min(bits, _EXTRA_BITS + 2 * 1100)
+    (small_numerator, small_denominator), (large_numerator, large_denominator) = (
+        small.as_integer_ratio(),
+        (large or 1.0).as_integer_ratio(),
+    )
+    angle = _arc_tangent(
+        ((small_numerator * large_denominator) << bits) // (small_denominator * large_numerator), bits
+    )
+    if abs_y > abs_x:
         angle = _pi(bits) // 2 - angle
     if math.copysign(1.0, x) < 0.0:
         angle = _pi(bits) - angle
-    return math.copysign(_rounded(angle, bits), y)
+    return math.copysign(_rounded_double(angle, bits), y)
 
 
 def asin(x: float) -> float:
@@ -207,67 +213,69 @@ def asin(x: float) -> float:
         return x if x == 0.0 else NAN
     if abs(x) == 1.0:
         return atan2(x, 0.0)
-    bits = _spare(x)
-    value = _fixed(x, bits)
+    bits = _working_bits(x)
+    value = _fixed_point(x, bits)
     cosine = math.isqrt((1 << 2 * bits) - value * value)
-    return _rounded(_arc_tangent(_quotient(value, cosine, bits), bits), bits, x)
+    return _rounded_double(_arc_tangent(_quotient(value, cosine, bits), bits), bits, x)
 
 
 def acos(x: float) -> float:
     """Angle in rad, 0 … pi, whose cosine is ``x``: ``2 atan sqrt((1 - x) / (1 + x))``."""
     if not abs(x) <= 1.0:
         return NAN
-    bits = _SPARE + 128
+    bits = _EXTRA_BITS + 128
     if x == -1.0:
-        return _rounded(_pi(bits), bits)
-    one, value = 1 << bits, _fixed(x, bits)
-    return _rounded(2 * _arc_tangent(math.isqrt(_quotient(one - value, one + value, 2 * bits)), bits), bits)
+        return _rounded_double(_pi(bits), bits)
+    one, value = 1 << bits, _fixed_point(x, bits)
+    return _rounded_double(
+        2 * _arc_tangent(math.isqrt(_quotient(one - value, one + value, 2 * bits)), bits), bits
+    )
 
 
 # Exponentials and logarithms.
 
-_FAR = 800.0  # exp overflows from 710 on and vanishes below -746
+_MAX_EXPONENT = 800.0  # exp overflows above 710 and underflows to 0 below -746
 
 
 def exp(x: float) -> float:
     """``e**x``."""
-    if math.isnan(x) or abs(x) > _FAR:
+    if math.isnan(x) or abs(x) > _MAX_EXPONENT:
         return NAN if math.isnan(x) else INFINITY if x > 0.0 else 0.0
-    bits = _SPARE
-    value, k = _exponential(_fixed(x, bits), bits)
-    return _rounded(value, bits - k)
+    bits = _EXTRA_BITS
+    value, k = _exponential(_fixed_point(x, bits), bits)
+    return _rounded_double(value, bits - k)
 
 
 def expm1(x: float) -> float:
     """``e**x - 1``."""
-    if math.isnan(x) or x == 0.0 or x > _FAR:
+    if math.isnan(x) or x == 0.0 or x > _MAX_EXPONENT:
         return x if x == 0.0 else NAN if math.isnan(x) else INFINITY
-    bits = _spare(x)
-    value, k = _exponential(_fixed(max(x, -_FAR), bits), bits)
-    return _rounded(_shifted(value, k) - (1 << bits), bits, x)
+    bits = _working_bits(x)
+    value, k = _exponential(_fixed_point(max(x, -_MAX_EXPONENT), bits), bits)
+    return _rounded_double(_shifted(value, k) - (1 << bits), bits, x)
 
 
 def _both_exponentials(x: float) -> tuple[int, int, int]:
-    """``e**x`` and ``e**-x`` for ``|x| <= 800``, and their bits."""
-    bits = _spare(x) + int(3.0 * abs(x))  # enough bits for the smaller result, too
-    value = _shifted(*_exponential(_fixed(x, bits), bits))
+    """``e**x`` and ``e**-x`` for ``|x| <= 800`` as fixed-point numbers, and their fraction bits."""
+    bits = _working_bits(x) + int(3.0 * abs(x))  # enough bits for the smaller result, too
+    value = _shifted(*_exponential(_fixed_point(x, bits), bits))
     return value, _quotient(1, value, 2 * bits), bits
 
 
 def sinh(x: float) -> float:
     """Hyperbolic sine."""
-    if math.isnan(x) or x == 0.0 or abs(x) > _FAR:
+    if math.isnan(x) or x == 0.0 or abs(x) > _MAX_EXPONENT:
         return x if x == 0.0 else NAN if math.isnan(x) else math.copysign(INFINITY, x)
     above, below, bits = _both_exponentials(x)
-    return _rounded(above - below, bits + 1, x)
+    return _rounded_double(above - below, bits + 1, x)
 
 
 def cosh(x: float) -> float:
     """Hyperbolic cosine."""
-    if math.isnan(x) or abs(x) > _FAR:
+    if math.isnan(x) or abs(x) > _MAX_EXPONENT:
         return NAN if math.isnan(x) else INFINITY
     above, below, bits = _both_exponentials(x)
-    return _rounded(above + below, bits + 1)
+    return _rounded_double(above + below, bits + 1)
 
 
 def tanh(x: float) -> float:
@@ -275,57 +283,59 @@ def tanh(x: float) -> float:
     if math.isnan(x) or x == 0.0 or abs(x) > 40.0:
         return x if x == 0.0 else NAN if math.isnan(x) else math.copysign(1.0, x)
     above, below, bits = _both_exponentials(x)
-    return _rounded(_quotient(above - below, above + below, bits), bits, x)
+    return _rounded_double(_quotient(above - below, above + below, bits), bits, x)
 
 
 def log(x: float) -> float:
     """Natural logarithm; -inf at zero."""
     if not 0.0 < x < INFINITY:
         return -INFINITY if x == 0.0 else INFINITY if x == INFINITY else NAN
-    return _rounded(_logarithm_of(x, _SPARE), _SPARE)
+    return _rounded_double(_logarithm_of(x, _EXTRA_BITS), _EXTRA_BITS)
 
 
 def log1p(x: float) -> float:
     """``ln(1 + x)``; -inf at -1."""
     if not -1.0 < x < INFINITY or x == 0.0:
         return x if x == 0.0 or x == INFINITY else -INFINITY if x == -1.0 else NAN
-    bits = _spare(x)
-    return _rounded(_logarithm((1 << bits) + _fixed(x, bits), bits), bits, x)
+    bits = _working_bits(x)
+    return _rounded_double(_logarithm((1 << bits) + _fixed_point(x, bits), bits), bits, x)
 
 
 def log10(x: float) -> float:
     """Logarithm to the base of 10."""
     if not 0.0 < x < INFINITY:
         return log(x)
-    return _rounded(_quotient(_logarithm_of(x, _SPARE), _logarithm_of(10.0, _SPARE), _SPARE), _SPARE)
+    return _rounded_double(
+        _quotient(_logarithm_of(x, _EXTRA_BITS), _logarithm_of(10.0, _EXTRA_BITS), _EXTRA_BITS), _EXTRA_BITS
+    )
 
 
 def asinh(x: float) -> float:
     """Inverse hyperbolic sine."""
     if not math.isfinite(x) or x == 0.0:
         return NAN if math.isnan(x) else x
-    bits = _spare(x)
-    value = _fixed(abs(x), bits)
+    bits = _working_bits(x)
+    value = _fixed_point(abs(x), bits)
     root = math.isqrt((1 << 2 * bits) + value * value)
-    return math.copysign(_rounded(_logarithm(value + root, bits), bits), x)
+    return math.copysign(_rounded_double(_logarithm(value + root, bits), bits), x)
 
 
 def acosh(x: float) -> float:
     """Inverse hyperbolic cosine."""
     if not 1.0 <= x < INFINITY:
         return INFINITY if x == INFINITY else NAN
-    bits = _spare(x)
-    value = _fixed(x, bits)
-    return _rounded(_logarithm(value + math.isqrt(value * value - (1 << 2 * bits)), bits), bits)
+    bits = _working_bits(x)
+    value = _fixed_point(x, bits)
+    return _rounded_double(_logarithm(value + math.isqrt(value * value - (1 << 2 * bits)), bits), bits)
 
 
 def atanh(x: float) -> float:
     """Inverse hyperbolic tangent; infinite at -1 and 1."""
     if not abs(x) < 1.0 or x == 0.0:
         return x if x == 0.0 else math.copysign(INFINITY, x) if abs(x) == 1.0 else NAN
-    bits = _spare(x)
-    value, one = _fixed(x, bits), 1 << bits
-    return _rounded(_logarithm(_quotient(one + value, one - value, bits), bits), bits + 1, x)
+    bits = _working_bits(x)
+    value, one = _fixed_point(x, bits), 1 << bits
+    return _rounded_double(_logarithm(_quotient(one + value, one - value, bits), bits), bits + 1, x)
 
 
 # Powers, hypotenuse, error function.
@@ -345,16 +355,16 @@ def power(x: float, y: float) -> float:
         return NAN
     sign = -1.0 if x < 0.0 and int(y) % 2 else 1.0
     if y == int(y) and abs(y) <= 64.0:
-        return sign * _of_fraction(Fraction(abs(x)) ** int(y))
-    bits = _SPARE + 64
+        return sign * _nearest_double(Fraction(abs(x)) ** int(y))
+    bits = _EXTRA_BITS + 64
     value = Fraction(y) * _logarithm_of(abs(x), bits)
-    if abs(value) > int(_FAR) << bits:
+    if abs(value) > int(_MAX_EXPONENT) << bits:
         return sign * (INFINITY if value > 0 else 0.0)
     result, k = _exponential(math.floor(value), bits)
-    return sign * _rounded(result, bits - k)
+    return sign * _rounded_double(result, bits - k)
 
 
-def _of_fraction(value: Fraction) -> float:
+def _nearest_double(value: Fraction) -> float:
     try:
         return float(value)
     except OverflowError:
@@ -371,22 +381,22 @@ def hypot(x: float, *others: float) -> float:
     total = sum((Fraction(size) ** 2 for size in sizes), Fraction(0))
     if not total:
         return 0.0
-    bits = _SPARE + max(0, total.denominator.bit_length() - total.numerator.bit_length())
-    return _rounded(math.isqrt(_fixed(total, 2 * bits)), bits)
+    bits = _EXTRA_BITS + max(0, total.denominator.bit_length() - total.numerator.bit_length())
+    return _rounded_double(math.isqrt(_fixed_point(total, 2 * bits)), bits)
 
 
 def erf(x: float) -> float:
-    """Error function, by its series about 0; 1 to the last place from 6 on."""
+    """Error function, by its series about 0. From ``x = 6`` on, the nearest double is 1."""
     if math.isnan(x) or x == 0.0 or abs(x) >= 6.0:
         return x if x == 0.0 or math.isnan(x) else math.copysign(1.0, x)
-    bits = _spare(x)
-    value = _fixed(x, bits)
+    bits = _working_bits(x)
+    value = _fixed_point(x, bits)
     square, term, total, n = (value * value) >> bits, value, value, 0
     while term not in (0, -1):
         n += 1
         term = -(term * square >> bits) // n
         total += term // (2 * n + 1)
-    return _rounded(_quotient(2 * total, math.isqrt(_pi(bits) << bits), bits), bits, x)
+    return _rounded_double(_quotient(2 * total, math.isqrt(_pi(bits) << bits), bits), bits, x)
 
 
 FUNCTIONS: dict[str, Callable[..., float]] = {

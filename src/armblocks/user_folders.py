@@ -10,7 +10,7 @@ NAME = "armblocks"
 
 def cache_folder() -> Path | None:
     """The folder for files that can be recomputed; ``None`` where the user has no home folder."""
-    from platformdirs import user_cache_path  # takes 10 ms, needless without a cache
+    from platformdirs import user_cache_path  # imported here: takes 10 ms
 
     return _absolute(lambda: user_cache_path(NAME, appauthor=False))
 
@@ -23,7 +23,10 @@ def state_folder() -> Path | None:
 
 
 def _absolute(find: Callable[[], Path]) -> Path | None:
-    """Without a home folder some versions of platformdirs raise an error, others return a path with ``~``."""
+    """The folder that ``find`` returns; ``None`` where the user has no home folder.
+
+    Without a home folder some versions of platformdirs raise an error, others return a path with ``~``.
+    """
     try:
         folder = find()
     except RuntimeError:

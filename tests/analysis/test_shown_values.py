@@ -59,7 +59,7 @@ def test_poles_at_zero_are_shown_as_zero_in_any_states_and_units(integrators: in
         assert int((poles == 0.0).sum()) == count
         others = np.linalg.eigvals(A[count:, count:])
         assert matched(poles[poles != 0.0] / scale, others / scale, 1e-6)
-        assert "on the edge of stability" in repr(system)
+        assert "on the stability boundary" in repr(system)
         assert not system.is_stable
 
 
@@ -93,8 +93,8 @@ def test_an_undamped_pair_and_a_double_pole_are_shown_without_rounding_errors(se
     assert matched(poles[poles.imag != 0.0], [3j, -3j])
     assert (poles.real[poles.imag != 0.0] == 0.0).all()
     assert matched(poles[poles.imag == 0.0], [-2.0, -2.0, -7.0], 1e-6)
-    waves = [mode for mode in shown_modes(system) if mode.pole.imag]
-    assert [(mode.damping, mode.time_constant) for mode in waves] == [(0.0, math.inf)] * 2
+    oscillating_modes = [mode for mode in shown_modes(system) if mode.pole.imag]
+    assert [(mode.damping, mode.time_constant) for mode in oscillating_modes] == [(0.0, math.inf)] * 2
 
 
 def test_a_damping_of_1e_9_is_shown() -> None:
@@ -109,9 +109,9 @@ def test_a_damping_of_1e_9_is_shown() -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_poles_of_a_discrete_system_are_shown_at_0_at_1_and_on_the_unit_circle(seed: int) -> None:
     random = np.random.default_rng(seed)
-    turn = 0.7
+    angle = 0.7
     A = np.diag([0.0, 1.0, 0.0, 0.0, 0.4])
-    A[2:4, 2:4] = [[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]]
+    A[2:4, 2:4] = [[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]]
     system = LinearSystem(similar(A, random)[0], np.zeros((5, 0)), np.zeros((0, 5)), np.zeros((0, 0)), dt=0.1)
     poles = shown_poles(system)
     assert {0j, 1 + 0j} <= set(poles.tolist())
@@ -119,7 +119,7 @@ def test_poles_of_a_discrete_system_are_shown_at_0_at_1_and_on_the_unit_circle(s
     modes = {round(mode.frequency, 6): mode for mode in shown_modes(system)}
     assert modes[0.0].time_constant == math.inf
     assert (modes[7.0].damping, modes[7.0].time_constant) == (0.0, math.inf)
-    assert "on the edge of stability" in repr(system)
+    assert "on the stability boundary" in repr(system)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

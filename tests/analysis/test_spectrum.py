@@ -17,7 +17,7 @@ SCIPY_NAMES = {"flat top": "flattop", "rectangular": "boxcar"}
 
 
 @pytest.mark.parametrize("window", WINDOWS)
-def test_a_line_has_the_amplitude_of_its_sine_under_every_window(window: str) -> None:
+def test_a_spectral_line_has_the_amplitude_of_its_sine_for_every_window(window: str) -> None:
     wave = 3.0 * np.sin(2 * np.pi * 10.0 * TIME + 0.3)
     spectrum = signal_spectrum(TIME, wave, window=window)
     line = np.argmin(abs(spectrum.frequency - 10.0))
@@ -41,7 +41,7 @@ def test_a_power_density_integrates_to_the_mean_square() -> None:
 @pytest.mark.parametrize("quantity", QUANTITIES)
 @pytest.mark.parametrize("window", WINDOWS)
 @pytest.mark.parametrize("averages", [1, 7])
-def test_scipy_gives_the_same_densities(quantity: str, window: str, averages: int) -> None:
+def test_spectra_agree_with_scipy(quantity: str, window: str, averages: int) -> None:
     # SciPy's flat-top window has the same published coefficients: both agree to rounding errors.
     actual = signal_spectrum(TIME, NOISE, quantity=quantity, window=window, averages=averages)
     assert actual.length == 2 * COUNT // (averages + 1)
@@ -84,7 +84,7 @@ def test_unsuitable_signals_and_unknown_options_are_refused() -> None:
         signal_spectrum([1.0], [1.0])
     with pytest.raises(InputError, match=r"a signal is not finite"):
         signal_spectrum([0.0, 1.0, 2.0], [1.0, np.nan, 2.0])
-    with pytest.raises(InputError, match=r"nothing is recorded after 9 s"):
+    with pytest.raises(InputError, match=r"there are no samples after 9 s"):
         signal_spectrum([0.0, 1.0, 2.0], [1.0, 1.0, 2.0], begin=9.0)
     with pytest.raises(UnknownNameError, match=r"no quantity named 'power'"):
         signal_spectrum(TIME, TIME, quantity="power")

@@ -25,14 +25,14 @@ from armblocks.blocks import (
 )
 from armblocks.errors import AlgebraicLoopError, InputError
 
-RUNS: list[dict[str, Any]] = [
+SOLVER_SETTINGS: list[dict[str, Any]] = [
     {"solver": "rk4", "step": 0.01},
     {"solver": "rk45", "rtol": 1e-9, "atol": 1e-12},
     {"solver": "rodas5p", "rtol": 1e-9, "atol": 1e-12},
 ]
 
 
-def constrained(formula: str, initial: float = 0.0) -> ab.DiagramBuilder:
+def constrained_diagram(formula: str, initial: float = 0.0) -> ab.DiagramBuilder:
     """A diagram with z from formula(z, t) = 0, its derivative, its integral and a sample-and-hold of z."""
     builder = ab.DiagramBuilder("constrained", settings=ab.SimulationOptions(stop_time=2.0, sample_time=0.1))
     z = builder.add("z", AlgebraicConstraint(initial=initial))
@@ -45,10 +45,10 @@ def constrained(formula: str, initial: float = 0.0) -> ab.DiagramBuilder:
     return builder
 
 
-@pytest.mark.parametrize("settings", RUNS)
+@pytest.mark.parametrize("settings", SOLVER_SETTINGS)
 def test_the_root_nearest_to_the_start_value_is_found_and_tracked(settings: dict[str, Any]) -> None:
     for sign in (1.0, -1.0):
-        result = ab.simulate(constrained("u1 ^ 2 - 1 - u2", initial=3.0 * sign).build(), **settings)
+        result = ab.simulate(constrained_diagram("u1 ^ 2 - 1 - u2", initial=3.0 * sign).build(), **settings)
         expected = sign * np.sqrt(1.0 + result.time)
         np.testing.assert_allclose(result["z"], expected, rtol=1e-9)
         np.testing.assert_allclose(result["rate"], 0.5 / expected, rtol=1e-8)
@@ -59,7 +59,7 @@ def test_the_root_nearest_to_the_start_value_is_found_and_tracked(settings: dict
 
 
 def test_a_linear_equation_is_eliminated_symbolically() -> None:
-    diagram = constrained("4 * u1 - u2").build()
+    diagram = constrained_diagram("4 * u1 - u2").build()
     assert ab.compile_diagram(diagram).system.algebraic.size == 0
     result = ab.simulate(diagram)
     assert np.array_equal(result["z"], result.time / 4.0)
@@ -115,7 +115,7 @@ DECISIONS = ((1.0, -1.0, 0.0), (0.0, 1.0, -1.0), (-1.0, 0.0, 1.0), (-1.0, -1.0, 
 ACTIONS = ((1.0, 10.0), (2.0, 20.0), (3.0, 30.0), (4.0, 40.0))
 
 
-def decided(conditions: tuple[int, ...]) -> tuple[float, ...]:
+def table_outputs(conditions: tuple[int, ...]) -> tuple[float, ...]:
     for row, action in zip(DECISIONS, ACTIONS):
         if all(required in (-1.0, float(condition)) for required, condition in zip(row, conditions)):
             return action
@@ -123,7 +123,7 @@ def decided(conditions: tuple[int, ...]) -> tuple[float, ...]:
 
 
 @pytest.mark.parametrize("conditions", list(itertools.product((0, 1), repeat=3)))
-@pytest.mark.parametrize("settings", RUNS[:2])
+@pytest.mark.parametrize("settings", SOLVER_SETTINGS[:2])
 def test_the_first_matching_row_of_a_decision_table_is_taken(
     conditions: tuple[int, ...], settings: dict[str, Any]
 ) -> None:
@@ -132,7 +132,7 @@ def test_the_first_matching_row_of_a_decision_table_is_taken(
     table = TruthTable(decisions=DECISIONS, actions=ACTIONS)
     builder.add("table", table, builder.add("mux", Mux(inputs=3), *inputs))
     result = ab.simulate(builder.build(), **settings)
-    assert tuple(result["table"][-1]) == decided(conditions)
+    assert tuple(result["table"][-1]) == table_outputs(conditions)
 
 
 def test_invalid_decision_tables_are_refused() -> None:
@@ -160,8 +160,8 @@ def pendulum(constraint: str) -> ab.Diagram:
     y = builder.add("y", SecondOrderIntegrator())
     builder.connect(builder.add("ax", Expression(formula="-u1 * u2", inputs=2), force, x["x"]), x["u"])
     builder.connect(builder.add("ay", Expression(formula="-u1 * u2 - 9.81", inputs=2), force, y["x"]), y["u"])
-    ends = (x["x"], y["x"], x["dx"], y["dx"], force)
-    rule = builder.add("rule", Expression(formula=constraint, inputs=5), *ends)
+    signals = (x["x"], y["x"], x["dx"], y["dx"], force)
+    rule = builder.add("rule", Expression(formula=constraint, inputs=5), *signals)
     builder.connect(rule, force["u"])
     return builder.build()
 
@@ -172,13 +172,13 @@ def test_a_rod_is_refused_at_index_3_and_2_and_simulated_at_index_1() -> None:
         with pytest.raises(
             AlgebraicLoopError,
             match=r"does not contain its unknown .*that contain their unknown.*twice for a rod",
-        ) as refused:
+        ) as caught:
             ab.simulate(pendulum(constraint), stop_time=1.0)
-        assert refused.value.loop == ("L/z",)
-        assert len(str(refused.value)) < 400
+        assert caught.value.loop == ("L/z",)
+        assert len(str(caught.value)) < 400
     period = 2.3678419475762374493  # 4 K(1/2) / sqrt(9.81)
-    whole = pendulum("u3^2 + u4^2 - u5 * (u1^2 + u2^2) - 9.81 * u2")
-    result = ab.simulate(whole, stop_time=period, rtol=1e-11, atol=1e-12)
+    rod = pendulum("u3^2 + u4^2 - u5 * (u1^2 + u2^2) - 9.81 * u2")
+    result = ab.simulate(rod, stop_time=period, rtol=1e-11, atol=1e-12)
     # only the second derivative of the length is constrained: its error is the tolerance times the time
     # squared
     assert result["x/x"][-1] == pytest.approx(1.0, abs=1e-9)

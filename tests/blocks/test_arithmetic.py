@@ -40,7 +40,7 @@ U = RANDOM.normal(size=(3, 4))
 V = RANDOM.normal(size=(3, 4))
 
 
-def test_blocks_with_one_elementwise_operation() -> None:
+def test_elementwise_operations_agree_with_numpy() -> None:
     assert np.array_equal(evaluate(Abs(), U)["y"], np.abs(U))
     assert np.array_equal(evaluate(Bias(bias=2.5), U)["y"], U + 2.5)
     assert np.array_equal(evaluate(UnaryMinus(), U)["y"], -U)
@@ -52,14 +52,14 @@ def test_blocks_with_one_elementwise_operation() -> None:
     assert evaluate(RadiansToDegrees(), U)["y"] == pytest.approx(np.rad2deg(U), rel=1e-15)
 
 
-def test_roots() -> None:
+def test_square_roots_agree_with_numpy() -> None:
     assert np.array_equal(evaluate(Sqrt(), np.abs(U))["y"], np.sqrt(np.abs(U)))
     assert np.array_equal(evaluate(Sqrt(function="signedSqrt"), U)["y"], np.sign(U) * np.sqrt(np.abs(U)))
     assert evaluate(Sqrt(function="rSqrt"), 4.0)["y"] == 0.5
 
 
 @pytest.mark.parametrize(("name", "function"), [("floor", np.floor), ("ceil", np.ceil), ("fix", np.trunc)])
-def test_rounding(name: str, function: np.ufunc) -> None:
+def test_rounding_agrees_with_numpy(name: str, function: np.ufunc) -> None:
     u = np.concatenate([RANDOM.normal(0, 5, 20), [-2.0, -0.5, 0.0, 0.5, 3.0, 1e300]])
     assert np.array_equal(evaluate(Rounding(function=name), u)["y"], function(u))
 
@@ -70,7 +70,7 @@ def test_exact_halves_are_rounded_away_from_zero() -> None:
     assert evaluate(Rounding(function="round"), u)["y"].tolist() == expected
 
 
-def test_remainders() -> None:
+def test_remainders_agree_with_numpy_and_matlab_for_a_divisor_of_zero() -> None:
     u, v = RANDOM.normal(0, 5, 50), RANDOM.normal(0, 2, 50)
     assert np.array_equal(evaluate(Modulo(), u, v)["y"], np.mod(u, v))
     assert np.array_equal(evaluate(Modulo(function="rem"), u, v)["y"], np.fmod(u, v))
@@ -108,19 +108,19 @@ def test_an_angle_difference_lies_between_minus_pi_and_pi() -> None:
         ("cube", lambda u: u**3),
     ],
 )
-def test_exponentials_and_logarithms(name: str, function: np.ufunc) -> None:
+def test_exponentials_and_logarithms_agree_with_numpy(name: str, function: np.ufunc) -> None:
     u = RANDOM.uniform(0.1, 3, 20)
     assert evaluate(MathFunction(function=name), u)["y"] == pytest.approx(function(u), rel=4e-15)
 
 
-def test_inverse_hyperbolic_functions() -> None:
+def test_inverse_hyperbolic_functions_agree_with_numpy() -> None:
     u = RANDOM.uniform(0.1, 0.9, 20)
     assert evaluate(Trigonometry(function="asinh"), u)["y"] == pytest.approx(np.arcsinh(u), rel=1e-14)
     assert evaluate(Trigonometry(function="acosh"), u + 1)["y"] == pytest.approx(np.arccosh(u + 1), rel=1e-14)
     assert evaluate(Trigonometry(function="atanh"), u)["y"] == pytest.approx(np.arctanh(u), rel=1e-14)
 
 
-def test_reductions() -> None:
+def test_sums_and_products_of_elements_agree_with_numpy() -> None:
     assert evaluate(SumOfElements(), U)["y"] == pytest.approx(U.sum(), rel=1e-14)
     assert evaluate(ProductOfElements(), U)["y"] == pytest.approx(U.prod(), rel=1e-14)
     assert evaluate(DotProduct(), U[0], V[0])["y"] == pytest.approx(U[0] @ V[0], rel=1e-14)
@@ -136,7 +136,7 @@ def test_extrema_give_the_index_of_the_first_of_equal_elements() -> None:
     assert result["index"] == np.argmax(U.ravel(order="F")) + 1
 
 
-def test_norms() -> None:
+def test_norms_agree_with_numpy() -> None:
     u = U.ravel()
     for name, order in (("2", 2), ("1", 1), ("inf", np.inf)):
         assert evaluate(Norm(norm=name), u)["y"] == pytest.approx(np.linalg.norm(u, order), rel=1e-14)

@@ -31,7 +31,7 @@ from armblocks.blocks import (
 from armblocks.errors import InputError
 
 
-def test_sources() -> None:
+def test_sources_have_their_closed_forms() -> None:
     assert evaluate(Clock(), t=3.5)["y"] == 3.5
     assert evaluate(Step(time=1.0, initial=2.0, final=5.0), t=0.99)["y"] == 2.0
     assert evaluate(Step(time=1.0, initial=2.0, final=5.0), t=1.0)["y"] == 5.0
@@ -48,7 +48,7 @@ def test_scalar_and_vector_gains_are_broadcast() -> None:
     assert evaluate(MatrixGain(gain=[[1, 2, 3], [4, 5, 6]]), [1, 0, -1])["y"].tolist() == [-2, -2]
 
 
-def test_sums_and_products() -> None:
+def test_sums_and_products_use_the_given_signs_and_operators() -> None:
     assert evaluate(Sum(signs="+-+"), 1.0, [2.0, 3.0], 4.0)["y"].tolist() == [3.0, 2.0]
     assert evaluate(Sum(signs="-"), 1.0)["y"] == -1.0
     assert evaluate(Product(operators="*/*"), 6.0, [2.0, 3.0], 5.0)["y"].tolist() == [15.0, 10.0]
@@ -74,20 +74,20 @@ def test_sums_and_products() -> None:
         ("square", np.square),
     ],
 )
-def test_math_functions(name: str, function: np.ufunc) -> None:
+def test_math_functions_agree_with_numpy(name: str, function: np.ufunc) -> None:
     u = np.array([0.3, 1.0, 2.5])
     assert evaluate(MathFunction(function=name), u)["y"] == pytest.approx(function(u), rel=1e-15)
 
 
 @pytest.mark.parametrize("name", ["sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"])
-def test_trigonometry(name: str) -> None:
+def test_trigonometric_functions_agree_with_numpy(name: str) -> None:
     u = np.array([-0.7, 0.0, 0.4])
     numpy_name = {"asin": "arcsin", "acos": "arccos", "atan": "arctan"}.get(name, name)
     expected = getattr(np, numpy_name)(u)
     assert evaluate(Trigonometry(function=name), u)["y"] == pytest.approx(expected, rel=1e-15)
 
 
-def test_functions_of_several_inputs() -> None:
+def test_functions_of_several_inputs_agree_with_numpy() -> None:
     y, x = np.array([1.0, 1.0, -1.0, -1.0]), np.array([1.0, -1.0, -1.0, 1.0])
     assert evaluate(Atan2(), y, x)["angle"] == pytest.approx(np.arctan2(y, x), rel=1e-15)
     assert evaluate(Power(), [2.0, 3.0], 3.0)["y"] == pytest.approx([8.0, 27.0], rel=1e-15)
@@ -95,7 +95,7 @@ def test_functions_of_several_inputs() -> None:
     assert evaluate(MinMax(function="max", inputs=3), [1, 5], [4, 2], 3)["y"].tolist() == [4, 5]
 
 
-def test_saturation() -> None:
+def test_saturation_limits_each_element() -> None:
     limits = Saturation(lower=-1.0, upper=[2.0, 3.0, 4.0])
     assert evaluate(limits, [-5.0, 2.5, 9.0])["y"].tolist() == [-1.0, 2.5, 4.0]
     assert evaluate(Saturation(lower=0.0, upper=np.inf), 1e300)["y"] == 1e300
@@ -162,5 +162,5 @@ def test_an_improper_transfer_function_is_refused(
 ) -> None:
     from armblocks.blocks import TransferFunction
 
-    with pytest.raises(InputError, match=r"TransferFunction: the denominator is .*no more b than a"):
+    with pytest.raises(InputError, match=r"TransferFunction: the denominator is .*at most as many in b"):
         TransferFunction(numerator=numerator, denominator=denominator)

@@ -30,7 +30,7 @@ SETTINGS: list[dict[str, Any]] = [{"solver": "rk4", "step": 0.01}, {"rtol": 1e-9
 RUNS = pytest.mark.parametrize("settings", SETTINGS, ids=["rk4", "rk45"])
 
 
-def bang(u: float) -> float:
+def bang_bang(u: float) -> float:
     """A function that cannot be traced."""
     return 1.0 if u < 0.3 else -1.0
 
@@ -39,7 +39,7 @@ def loop(controller: Block, *, delay: bool = False) -> Diagram:
     """A sampled controller of y' = u - y / 2, between sampled blocks with the same clock."""
     builder = DiagramBuilder("d")
     plant = builder.add("plant", Integrator())
-    measured = builder.add("seen", TransportDelay(delay=0.07), plant) if delay else plant
+    measured = builder.add("measurement", TransportDelay(delay=0.07), plant) if delay else plant
     sampled = builder.add(
         "sampled", Gain(gain=2.0), builder.add("hold", ZeroOrderHold(sample_time=T), measured)
     )
@@ -50,12 +50,12 @@ def loop(controller: Block, *, delay: bool = False) -> Diagram:
     return builder.build()
 
 
-def by_hand(count: int) -> np.ndarray:
+def recurrence(count: int) -> np.ndarray:
     """The same loop, computed tick by tick with the closed form of y' = c - y / 2 between ticks."""
     y, before, outputs = 0.0, 0.0, list[float]()
     for _ in range(count):
         outputs.append(y)
-        output = bang(2.0 * y)
+        output = bang_bang(2.0 * y)
         c, before = output + before, output
         y = 2 * c + (y - 2 * c) * np.exp(-T / 2)
     return np.array(outputs)
@@ -66,9 +66,12 @@ def test_a_called_function_is_evaluated_in_order_with_the_other_sampled_blocks(
     settings: dict[str, Any],
 ) -> None:
     result = ab.simulate(
-        loop(CalledPythonFunction(function=bang, sample_time=T)), stop_time=3.0, sample_time=T, **settings
+        loop(CalledPythonFunction(function=bang_bang, sample_time=T)),
+        stop_time=3.0,
+        sample_time=T,
+        **settings,
     )
-    assert result["plant"] == pytest.approx(by_hand(31), abs=1e-8)
+    assert result["plant"] == pytest.approx(recurrence(31), abs=1e-8)
     assert result.run.calls == 31
     assert 0.0 < result.run.call_time < result.run.wall_time
     assert "Python was called 31 times for 'controller'" in result.run.message
@@ -83,7 +86,7 @@ def test_a_called_function_agrees_with_the_traced_function(settings: dict[str, A
     def law(u: Any, t: Any) -> Any:
         return 1.0 - u * u / 4 + 0.1 * t
 
-    def of_ticks(u: Any, s: Any) -> Any:
+    def law_at_ticks(u: Any, s: Any) -> Any:
         return law(u, s)
 
     called = loop(CalledPythonFunction(function=law, sample_time=T), delay=delay)
@@ -93,7 +96,7 @@ def test_a_called_function_agrees_with_the_traced_function(settings: dict[str, A
     builder.add(
         "y",
         ab.blocks.Outport(),
-        builder.add("f", PythonFunction(function=of_ticks), held, ticked),
+        builder.add("f", PythonFunction(function=law_at_ticks), held, ticked),
     )
     traced = loop(ab.blocks.Subsystem(diagram=builder.build()), delay=delay)
     first, second = (
@@ -137,7 +140,7 @@ def test_functions_in_series_are_called_once_per_tick_in_order() -> None:
 def test_pauses_logs_and_saved_states_do_not_change_the_result(
     settings: dict[str, Any], tmp_path: Path
 ) -> None:
-    diagram = loop(CalledPythonFunction(function=bang, sample_time=T))
+    diagram = loop(CalledPythonFunction(function=bang_bang, sample_time=T))
     whole = ab.simulate(diagram, stop_time=2.0, sample_time=0.02, **settings)
     run = ab.begin(diagram, stop_time=2.0, sample_time=0.02, **settings)
     while not run.finished:
@@ -155,7 +158,7 @@ def test_pauses_logs_and_saved_states_do_not_change_the_result(
 
 def test_an_algebraic_loop_through_a_called_function_is_refused() -> None:
     builder = DiagramBuilder("d")
-    handle = builder.add("f", CalledPythonFunction(function=bang))
+    handle = builder.add("f", CalledPythonFunction(function=bang_bang))
     builder.connect(builder.add("g", Gain(gain=0.5), handle), handle["u"])
     with pytest.raises(AlgebraicLoopError, match=r"f/y[\s\S]*put a Unit Delay into the loop"):
         trace_diagram(builder.build())
@@ -195,7 +198,7 @@ def test_a_failed_call_names_block_and_time_and_keeps_the_earlier_samples() -> N
 
 
 def test_derivatives_through_a_called_function_are_refused() -> None:
-    diagram = loop(CalledPythonFunction(function=bang, sample_time=T))
+    diagram = loop(CalledPythonFunction(function=bang_bang, sample_time=T))
     with pytest.raises(
         InputError, match=r"block 'controller' calls Python, which has no derivatives[\s\S]*traceable"
     ):
@@ -221,7 +224,7 @@ def test_invalid_parameters_of_a_called_function_are_refused() -> None:
         CalledPythonFunction(results="u")
     builder = DiagramBuilder("d")
     held = builder.add("held", ZeroOrderHold(sample_time=T), builder.add("u", SineWave()))
-    builder.add("f", CalledPythonFunction(function=bang, sample_time=-1.0), held)
+    builder.add("f", CalledPythonFunction(function=bang_bang, sample_time=-1.0), held)
     with pytest.raises(DiagramError, match=r"a block that calls Python has no clock[\s\S]*period"):
         ab.simulate(builder.build(), stop_time=1.0)
 
@@ -233,4 +236,4 @@ def test_a_file_with_a_python_function_is_loaded_only_with_trust(tmp_path: Path)
     with pytest.raises(FormatError, match="trust"):
         ab.load_diagram(document)
     result = ab.simulate(ab.load_diagram(document, trust=True), stop_time=3.0, sample_time=T, rtol=1e-9)
-    assert result["plant"] == pytest.approx(by_hand(31), abs=1e-6)
+    assert result["plant"] == pytest.approx(recurrence(31), abs=1e-6)

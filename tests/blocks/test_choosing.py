@@ -70,7 +70,7 @@ def test_scalar_inputs_of_switches_are_broadcast() -> None:
 
 
 @pytest.mark.parametrize(("relation", "function"), COMPARISONS.items())
-def test_relational_operators(relation: str, function: np.ufunc) -> None:
+def test_relational_operators_agree_with_numpy(relation: str, function: np.ufunc) -> None:
     left, right = np.array([1.0, 2.0, 3.0]), np.array([2.0, 2.0, 2.0])
     expected = function(left, right).tolist()
     assert evaluate(RelationalOperator(relation=relation), left, right)["y"].tolist() == expected
@@ -89,7 +89,7 @@ GATES = {
 
 
 @pytest.mark.parametrize("operator", GATES)
-def test_logical_operators(operator: str) -> None:
+def test_logical_operators_agree_with_their_truth_tables(operator: str) -> None:
     for u in itertools.product([0.0, -2.5], repeat=3):
         result = evaluate(LogicalOperator(operator=operator, inputs=3), *u)["y"]
         assert result == float(GATES[operator](u))
@@ -100,7 +100,7 @@ def test_not() -> None:
     assert evaluate(LogicalOperator(operator="NOT"), [0.0, 2.0])["y"].tolist() == [1, 0]
 
 
-def test_intervals() -> None:
+def test_an_interval_test_includes_only_its_closed_ends() -> None:
     u = [0.0, 1.0, 1.5, 2.0, 3.0]
     closed, half = IntervalTest(lower=1.0, upper=2.0), IntervalTest(lower=1.0, upper=2.0, upper_closed=False)
     assert evaluate(closed, u)["y"].tolist() == [0, 1, 1, 1, 0]
@@ -116,7 +116,7 @@ def test_intervals() -> None:
     assert evaluate(IntervalTestDynamic(lower_closed=False), 2.0, u, 1.0)["y"].tolist() == [0, 0, 1, 1, 0]
 
 
-def test_a_truth_table() -> None:
+def test_combinatorial_logic_outputs_the_row_of_its_truth_table() -> None:
     adder = CombinatorialLogic(
         table=[[a ^ b ^ c, a + b + c > 1] for a, b, c in itertools.product([0, 1], repeat=3)]
     )

@@ -25,7 +25,7 @@ def diagram(block: Block, source: Block) -> Diagram:
 
 
 @SOLVERS
-def test_a_circuit_with_the_current_as_an_unknown(solver: dict[str, Any]) -> None:
+def test_a_circuit_with_an_algebraic_current_agrees_with_its_closed_form(solver: dict[str, Any]) -> None:
     """RC = 0.5 s: C v' = i, 0 = u - v - R i; v = 1 - exp(-2 t) after a step, and i = (1 - v) / R."""
     R, C = 0.25, 2.0
     block = DescriptorStateSpace(
@@ -80,8 +80,8 @@ def test_initial_algebraic_variables_follow_from_the_differential_ones() -> None
         initial=(3.0, 100.0),
     )
     result = ab.simulate(diagram(block, Step()), **TOLERANCES)
-    course = 3.0 * np.exp(-result.time)
-    assert result["block/y"] == pytest.approx(np.column_stack([course, 2.0 * course]), abs=1e-9)
+    expected_x = 3.0 * np.exp(-result.time)
+    assert result["block/y"] == pytest.approx(np.column_stack([expected_x, 2.0 * expected_x]), abs=1e-9)
 
 
 def test_a_system_with_E_equal_to_zero_is_a_gain() -> None:

@@ -34,7 +34,7 @@ def test_limits_in_the_wrong_order_are_refused(kind: type[Block], lower: str, up
     kind(**{lower: 1.0, upper: 1.0})
     message = (
         rf"{kind.__name__}: {lower} is 2\.0 and {upper} is 1\.0\. "
-        rf"Allowed: {lower} <= {upper}\. Fix: exchange them"
+        rf"Allowed: {lower} <= {upper}\. Fix: exchange the two values"
     )
     with pytest.raises(InputError, match=message):
         kind(**{lower: 2.0, upper: 1.0})
@@ -48,7 +48,7 @@ def test_every_element_of_a_vector_has_its_own_guards_and_modes() -> None:
     assert system.guard_directions == (0, 0, 0, 0)
     p = system.parameter_values
     assert system.guards(0.0, (), [0.0, 0.0], (), p)[0].tolist() == [-1.0, 1.0, 0.5, 3.5]
-    # the mode of the second element contradicts its signal, and is corrected whatever guard fires
+    # The mode of the second element contradicts its signal. The event of any guard corrects it.
     _, z = system.reset(0.0, (), [0.0, 0.0], (), p, [-1.0, 0.0, 0.0, 0.0])
     assert z.tolist() == [0.0, 1.0]
     # a guard that fired without a contradiction sets the mode of its element
@@ -59,7 +59,7 @@ def test_every_element_of_a_vector_has_its_own_guards_and_modes() -> None:
     assert z.tolist() == [0.0, 1.0]
 
 
-def test_outputs_at_fixed_inputs() -> None:
+def test_outputs_at_fixed_inputs_agree_with_numpy() -> None:
     u = np.array([-3.0, -0.5, -0.2, 0.0, 0.5, 0.76, 2.0])
     assert evaluate(Saturation(), u)["y"].tolist() == np.clip(u, -0.5, 0.5).tolist()
     assert evaluate(DeadZone(), u)["y"] == pytest.approx(u - np.clip(u, -0.5, 0.5), abs=0.0)

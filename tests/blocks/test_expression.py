@@ -139,6 +139,8 @@ def test_messages_name_the_position_and_a_fix() -> None:
         evaluate(Expression(formula="u @ u"), U)
     with pytest.raises(DiagramError, match=r"vectors of 2 and 3 elements are combined"):
         evaluate(Expression(formula="u1 + u2", inputs=2), U, [1.0, 2.0])
+    with pytest.raises(DiagramError, match=r"the formula gives an empty array.*Allowed: scalars and vectors"):
+        evaluate(Expression(formula="1:0:5"), U)
     with pytest.raises(DiagramError, match=r"'u' has shape \(2, 2\).*scalars and vectors in a formula"):
         evaluate(Expression(), np.eye(2))
     with pytest.raises(InputError, match=r"the formula has 5000 characters. Allowed: at most 4000"):

@@ -44,29 +44,29 @@ SOLVERS = pytest.mark.parametrize(
 )
 
 
-def fires(kind: str, value: float, before: float | None) -> bool:
+def reset_fires(kind: str, value: float, before: float | None) -> bool:
     """Return whether a reset fires, by the rules of Simulink's documentation."""
     first = before is None
-    was = 0.0 if before is None else before
+    previous = 0.0 if before is None else before
     return {
         "none": False,
-        "rising": not first and was <= 0 < value,
-        "falling": not first and was > 0 >= value,
-        "either": not first and (was > 0) != (value > 0),
-        "level": value != 0 or (not first and was != 0),
+        "rising": not first and previous <= 0 < value,
+        "falling": not first and previous > 0 >= value,
+        "either": not first and (previous > 0) != (value > 0),
+        "level": value != 0 or (not first and previous != 0),
         "level hold": value != 0,
     }[kind]
 
 
-def played(values: np.ndarray) -> RepeatingSequenceStair:
+def sequence_source(values: np.ndarray) -> RepeatingSequenceStair:
     return RepeatingSequenceStair(values=values, sample_time=T)
 
 
-def ticked(*blocks: Block) -> list[dict[str, np.ndarray]]:
+def tick_outputs(*blocks: Block) -> list[dict[str, np.ndarray]]:
     """Return the outputs of several blocks at each tick, with the signals above as inputs."""
     builder = DiagramBuilder("d")
-    courses = {"u": U, "reset": TRIGGER, "initial": START, "enable": ENABLE}
-    sources = {name: builder.add(name, played(course)) for name, course in courses.items()}
+    input_values = {"u": U, "reset": TRIGGER, "initial": START, "enable": ENABLE}
+    sources = {name: builder.add(name, sequence_source(values)) for name, values in input_values.items()}
     for number, block in enumerate(blocks):
         handle = builder.add(f"block {number}", block)
         for port in block.input_ports():
@@ -105,20 +105,20 @@ def test_a_discrete_integrator_is_reset_at_its_ticks(method: str) -> None:
         )
         for kind, source in cases
     ]
-    for (kind, source), outputs in zip(cases, ticked(*blocks)):
+    for (kind, source), outputs in zip(cases, tick_outputs(*blocks)):
         check_discrete_integrator(outputs, kind, source, method)
 
 
 def check_discrete_integrator(actual: dict[str, np.ndarray], kind: str, source: str, method: str) -> None:
     """Compare outputs with the recurrence, for a gain of 2 and limits."""
     lower, upper = -0.9, 0.8
-    share = {"forward_euler": 0.0, "backward_euler": 1.0, "trapezoidal": 0.5}[method]
+    weight = {"forward_euler": 0.0, "backward_euler": 1.0, "trapezoidal": 0.5}[method]
     x = 0.3
     for k in range(COUNT):
         assert actual["state"][k] == pytest.approx(x, abs=1e-13)
-        if fires(kind, TRIGGER[k], TRIGGER[k - 1] if k else None) or (k == 0 and source == "external"):
+        if reset_fires(kind, TRIGGER[k], TRIGGER[k - 1] if k else None) or (k == 0 and source == "external"):
             x = 0.3 if source == "internal" else START[k]
-        y = min(max(x + share * 2.0 * T * U[k], lower), upper)
+        y = min(max(x + weight * 2.0 * T * U[k], lower), upper)
         assert actual["y"][k] == pytest.approx(y, abs=1e-13)
         assert actual["saturated"][k] == (1.0 if y >= upper else -1.0 if y <= lower else 0.0)
         x = min(max(x + 2.0 * T * U[k], lower), upper)
@@ -137,19 +137,19 @@ def test_a_delay_is_reset_at_its_ticks() -> None:
         )
         for kind, source, length, enable in cases
     ]
-    for case, outputs in zip(cases, ticked(*blocks)):
+    for case, outputs in zip(cases, tick_outputs(*blocks)):
         check_delay(outputs["y"], *case)
 
 
 def check_delay(actual: np.ndarray, kind: str, source: str, length: int, enable: bool) -> None:
     """Compare outputs with the list of earlier inputs."""
-    past, held, before, begun = [0.3] * length, 0.3, None, source == "internal"
+    buffer, held, before, started = [0.3] * length, 0.3, None, source == "internal"
     for k in range(COUNT):
         if not enable or ENABLE[k]:
-            if fires(kind, TRIGGER[k], before) or not begun:
-                past = [START[k] if source == "external" else 0.3] * length
-            held, begun, before = past[0], True, TRIGGER[k]
-            past = [*past[1:], U[k]]
+            if reset_fires(kind, TRIGGER[k], before) or not started:
+                buffer = [START[k] if source == "external" else 0.3] * length
+            held, started, before = buffer[0], True, TRIGGER[k]
+            buffer = [*buffer[1:], U[k]]
         assert actual[k] == pytest.approx(held, abs=1e-14)
 
 
@@ -158,7 +158,7 @@ def test_a_resettable_delay_without_reset_agrees_with_the_delay_block() -> None:
     block = ResettableDelay(
         length=3, external_reset="none", initial_condition_source="internal", initial=0.3, sample_time=T
     )
-    outputs, expected = ticked(block, plain)
+    outputs, expected = tick_outputs(block, plain)
     np.testing.assert_array_equal(outputs["y"], expected["y"])
 
 
@@ -226,9 +226,9 @@ def test_a_level_reset_holds_the_present_initial_value(kind: str, solver: dict[s
     sources = {"u": Constant(value=1.0), "reset": pulses, "initial": SineWave(frequency=3.0)}
     result = ab.simulate(integral(block, sources), stop_time=4.0, sample_time=0.01, **solver)
     t = result.time
-    since = np.mod(t - 0.5, 2.0)
-    held = (t >= 0.5) & (since < 0.75 - 1e-12)
-    released = t - since + 0.75
+    phase = np.mod(t - 0.5, 2.0)
+    held = (t >= 0.5) & (phase < 0.75 - 1e-12)
+    released = t - phase + 0.75
     expected = np.where(held, np.sin(3 * t), np.sin(3 * released) + (t - released))
     expected = np.where(t < 0.5, t, expected)
     assert result["y/y"] == pytest.approx(expected, abs=1e-9)

@@ -39,7 +39,9 @@ def run(
 @SOLVERS
 @pytest.mark.parametrize("outside", ["hold", "zero"])
 @pytest.mark.parametrize("method", ["linear", "flat"])
-def test_values_and_integrals(method: str, outside: str, solver: str, step: float | None) -> None:
+def test_values_and_integrals_agree_with_numpy(
+    method: str, outside: str, solver: str, step: float | None
+) -> None:
     rows = np.column_stack([TIMES, VALUES])
     result = run(diagram_of(data=rows, method=method, outside=outside), solver, step)
     t = result.time
@@ -111,13 +113,13 @@ def test_a_diagram_file_refers_to_the_file_of_the_table(tmp_path: Path) -> None:
     assert ab.load_diagram(tmp_path / "e.json") == diagram
 
 
-def test_a_table_without_numbers_in_a_header(tmp_path: Path) -> None:
+def test_a_file_without_a_header_is_read(tmp_path: Path) -> None:
     path = tmp_path / "plain.csv"
     path.write_text("0,1,2\n1,3,4\n")
     assert np.asarray(ab.load_table(path)).tolist() == [[0.0, 1.0, 2.0], [1.0, 3.0, 4.0]]
 
 
-def test_names_with_commas_in_a_header(tmp_path: Path) -> None:
+def test_column_names_may_contain_commas(tmp_path: Path) -> None:
     path = tmp_path / "matrix.csv"
     path.write_text('time, "M[0,0]", "M[0,1]"\n0,1,2\n1,3,4\n')
     assert ab.load_table(path).names == ("M[0,0]", "M[0,1]")

@@ -25,7 +25,7 @@ from armblocks.robot import Robot
 RANDOM = np.random.default_rng(25)
 
 
-def test_inverses_of_a_jacobian() -> None:
+def test_inverses_of_a_jacobian_have_their_defining_properties() -> None:
     J = RANDOM.normal(size=(6, 6))
     assert evaluate(JacobianInverse(), J)["Ji"] == pytest.approx(np.linalg.inv(J), rel=1e-10)
     assert np.array_equal(evaluate(JacobianInverse(method="transpose"), J)["Ji"], J.T)
@@ -40,7 +40,7 @@ def test_inverses_of_a_jacobian() -> None:
     assert np.isfinite(singular).all()
 
 
-def test_quantities_of_the_arm(puma560: Robot) -> None:
+def test_arm_quantities_agree_with_the_dynamics_functions(puma560: Robot) -> None:
     q, qd, qdd = RANDOM.uniform(-1, 1, (3, 6))
     (w,) = dynamics.trace_manipulability(puma560)(q)
     assert evaluate(Manipulability(robot=puma560), q)["w"] == pytest.approx(float(w), rel=1e-12)
@@ -55,7 +55,7 @@ def test_quantities_of_the_arm(puma560: Robot) -> None:
     assert result == pytest.approx(tau, rel=1e-11, abs=1e-11)
 
 
-def test_pd_control_of_each_joint() -> None:
+def test_pd_control_acts_on_each_joint() -> None:
     qr, qdr, q, qd = RANDOM.normal(size=(4, 3))
     expected = [10, 20, 30] * (qr - q) + 5 * (qdr - qd)
     assert evaluate(JointPD(Kp=[10, 20, 30], Kd=5.0), qr, qdr, q, qd)["tau"] == pytest.approx(

@@ -22,7 +22,7 @@ def rate(block: Block, port: str, t: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("cruise", [1.01, 1.5, 2.0])
-def test_a_trapezoidal_profile(cruise: float) -> None:
+def test_a_trapezoidal_profile_has_exact_ends_and_consistent_derivatives(cruise: float) -> None:
     q0, qf, tmax = np.array([0.0, 1.0]), np.array([2.0, -3.0]), 4.0
     block = Trapezoidal(q0=q0, qf=qf, tmax=tmax, cruise=cruise)
     ramp = tmax * (1 - 1 / cruise)
@@ -46,7 +46,7 @@ def test_the_default_trapezoidal_profile_has_three_equal_phases() -> None:
     assert [float(evaluate(block, t=t)["q"]) for t in (1.0, 2.0)] == pytest.approx([0.25, 0.75], rel=1e-14)
 
 
-def test_a_path_of_many_segments() -> None:
+def test_a_path_of_many_segments_blends_at_its_points() -> None:
     points = RANDOM.normal(size=(4, 2))
     block = MultiSegment(points=points, durations=[1.0, 2.0, 1.5], blend=0.4)
     assert evaluate(block, t=0.0)["q"].tolist() == points[0].tolist()
@@ -67,7 +67,7 @@ def test_a_path_of_many_segments() -> None:
 
 
 @pytest.mark.parametrize("profile", ["lspb", "quintic"])
-def test_a_straight_line_path_of_the_tool(profile: str) -> None:
+def test_a_straight_line_path_interpolates_position_and_rotation(profile: str) -> None:
     turns = Rotation.random(2, rng=RANDOM)
     T0, T1 = np.eye(4), np.eye(4)
     T0[:3, :3], T1[:3, :3] = turns.as_matrix()
@@ -84,7 +84,7 @@ def test_a_straight_line_path_of_the_tool(profile: str) -> None:
     assert evaluate(block, T0, T0, t=2.0)["T"] == pytest.approx(T0, abs=1e-14)
 
 
-def test_a_circle() -> None:
+def test_a_circular_path_agrees_with_its_closed_form() -> None:
     block = CirclePath(radius=2.0, centre=[1.0, 2.0, 3.0], frequency=0.25, phase=0.1)
     a = 2 * np.pi * 0.25 * 0.7 + 0.1
     expected = [1 + 2 * np.cos(a), 2 + 2 * np.sin(a), 3]
@@ -102,7 +102,7 @@ def test_invalid_path_parameters_are_refused() -> None:
         Trapezoidal(q0=[0, 0], qf=[1, 2, 3])
 
 
-def test_derivatives_of_a_straight_path_with_constant_orientation() -> None:
+def test_derivatives_of_a_path_with_constant_orientation_agree_with_closed_forms() -> None:
     """With constant orientation T = T0 + s (T1 - T0); a small rotation of the end is scaled by s."""
     start, end = np.eye(4), np.eye(4)
     end[:3, 3] = (0.5, 0.2, 0.1)

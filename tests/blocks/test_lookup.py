@@ -33,14 +33,14 @@ INSIDE = np.concatenate([RANDOM.uniform(a, b, 3) for a, b in pairwise(X)])
 OUTSIDE = np.array([-3.0, -1.5, 4.0, 7.0])
 
 
-def test_linear_interpolation_between_points() -> None:
+def test_linear_interpolation_agrees_with_numpy_between_points() -> None:
     table = LookupTable1D(positions=X, table=Y)
     u = np.concatenate([INSIDE, OUTSIDE])
     assert evaluate(table, u)["y"] == pytest.approx(np.interp(u, X, Y), rel=1e-14, abs=1e-15)
     assert np.array_equal(evaluate(table, X)["y"], Y)
 
 
-def test_linear_extrapolation_beyond_the_ends() -> None:
+def test_linear_extrapolation_continues_the_end_segments() -> None:
     result = evaluate(LookupTable1D(positions=X, table=Y, extrapolation="linear"), [-2.0, 4.5])["y"]
     first, last = (Y[1] - Y[0]) / (X[1] - X[0]), (Y[-1] - Y[-2]) / (X[-1] - X[-2])
     assert result == pytest.approx([Y[0] - first, Y[-1] + last], rel=1e-13)
@@ -60,7 +60,7 @@ def test_cubic_interpolation_agrees_with_scipy(n: int) -> None:
     assert held.tolist() == [y[0], y[-1]]
 
 
-def test_nearest_and_flat_interpolation() -> None:
+def test_nearest_and_flat_interpolation_return_table_entries() -> None:
     u = np.array([-5.0, -0.6, -0.5, 0.0, 0.4, 1.25, 3.4, 3.5, 9.0])
     nearest = evaluate(LookupTable1D(positions=X, table=Y, method="nearest"), u)["y"]
     assert nearest.tolist() == Y[[0, 0, 1, 1, 2, 3, 4, 4, 4]].tolist()
@@ -68,17 +68,17 @@ def test_nearest_and_flat_interpolation() -> None:
     assert flat.tolist() == Y[[0, 0, 0, 1, 1, 2, 3, 4, 4]].tolist()
 
 
-@pytest.mark.parametrize(("method", "scipys"), [("linear", "linear"), ("nearest", "nearest")])
-def test_tables_of_one_to_three_dimensions_agree_with_scipy(method: str, scipys: str) -> None:
+@pytest.mark.parametrize(("method", "scipy_method"), [("linear", "linear"), ("nearest", "nearest")])
+def test_tables_of_one_to_three_dimensions_agree_with_scipy(method: str, scipy_method: str) -> None:
     axes = [np.cumsum(RANDOM.uniform(0.2, 1, n)) for n in (3, 4, 2)]
     points = np.stack([RANDOM.uniform(axis[0], axis[-1], 10) for axis in axes])
     for dimension in (1, 2, 3):
         table = RANDOM.normal(size=[len(axis) for axis in axes[:dimension]])
-        expected = RegularGridInterpolator(axes[:dimension], table, method=scipys)(points[:dimension].T)
+        expected = RegularGridInterpolator(axes[:dimension], table, method=scipy_method)(points[:dimension].T)
         block = LookupTableND(positions=np.concatenate(axes[:dimension]), table=table, method=method)
         assert evaluate(block, *points[:dimension])["y"] == pytest.approx(expected, rel=1e-12, abs=1e-13)
     table = RANDOM.normal(size=(3, 4))
-    expected = RegularGridInterpolator(axes[:2], table, method=scipys)(points[:2].T)
+    expected = RegularGridInterpolator(axes[:2], table, method=scipy_method)(points[:2].T)
     block = LookupTable2D(positions1=axes[0], positions2=axes[1], table=table, method=method)
     assert evaluate(block, *points[:2])["y"] == pytest.approx(expected, rel=1e-12, abs=1e-13)
 
@@ -111,14 +111,14 @@ def test_prelookup_and_interpolation_make_a_lookup_table(extrapolation: str) -> 
     assert actual == pytest.approx([0.75, 0.25] @ surface[1:] @ [0.5, 0.5], rel=1e-14)
 
 
-def test_a_lookup_table_whose_points_are_signals() -> None:
+def test_the_points_of_a_lookup_table_may_be_signals() -> None:
     u = np.concatenate([INSIDE, OUTSIDE])
     assert evaluate(LookupTableDynamic(), u, X, Y)["y"] == pytest.approx(
         np.interp(u, X, Y), rel=1e-13, abs=1e-15
     )
 
 
-def test_sources() -> None:
+def test_ground_pulse_and_chirp_have_their_closed_forms() -> None:
     assert evaluate(Ground())["y"] == 0.0
     pulse = Pulse(amplitude=[2.0, 3.0], start=1.0, width=0.5)
     assert [float(evaluate(pulse, t=t)["y"][0]) for t in (0.99, 1.0, 1.49, 1.5)] == [0, 2, 2, 0]
@@ -127,7 +127,7 @@ def test_sources() -> None:
     assert evaluate(block, t=3.7)["y"] == pytest.approx(expected, rel=1e-12)
 
 
-def test_a_source_from_a_table() -> None:
+def test_a_source_from_a_table_agrees_with_numpy_and_scipy() -> None:
     values = RANDOM.normal(size=(5, 2))
     for t in (-0.3, 0.2, 2.0, 3.1):
         expected = [np.interp(t, X, column) for column in values.T]
@@ -142,11 +142,13 @@ def test_a_source_from_a_table() -> None:
 
 
 def test_inconsistent_break_points_and_tables_are_refused() -> None:
-    with pytest.raises(InputError, match=r"LookupTable1D: positions is \[0.0, 0.0\].*each greater than"):
+    with pytest.raises(
+        InputError, match=r"LookupTable1D: positions is \[0.0, 0.0\].*strictly ascending order"
+    ):
         LookupTable1D(positions=[0, 0])
-    with pytest.raises(InputError, match=r"positions1 has 3 break points for 2 entries of the table"):
+    with pytest.raises(InputError, match=r"positions1 has 3 positions for 2 entries of the table"):
         LookupTable2D(positions1=[0, 1, 2])
-    with pytest.raises(InputError, match=r"there are 3 break points for a table of shape \(2, 2\)"):
+    with pytest.raises(InputError, match=r"there are 3 positions for a table of shape \(2, 2\)"):
         LookupTableND(positions=[0, 1, 0])
     with pytest.raises(InputError, match=r"InterpolationUsingPrelookup: the table has shape \(1,\)"):
         InterpolationUsingPrelookup(table=[1.0])

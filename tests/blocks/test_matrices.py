@@ -50,13 +50,13 @@ def test_a_singular_matrix_has_the_determinant_0_and_no_finite_inverse() -> None
 
 
 @pytest.mark.parametrize("exponent", [-3, -1, 0, 1, 2, 5, 12])
-def test_matrix_powers(exponent: int) -> None:
+def test_matrix_powers_agree_with_numpy(exponent: int) -> None:
     A = RANDOM.normal(size=(3, 3)) + 2 * np.eye(3)
     expected = np.linalg.matrix_power(A, exponent)
     assert evaluate(MatrixPower(exponent=exponent), A)["y"] == pytest.approx(expected, rel=1e-10, abs=1e-12)
 
 
-def test_reshaping_diagonals_and_products() -> None:
+def test_transposes_reshapes_diagonals_and_products_agree_with_numpy() -> None:
     A = RANDOM.normal(size=(2, 3))
     assert np.array_equal(evaluate(Transpose(), A)["y"], A.T)
     assert evaluate(Transpose(), [1.0, 2.0])["y"].tolist() == [[1, 2]]

@@ -34,8 +34,8 @@ def run(
 ) -> SimulationResult:
     """Simulate a controller with its sources, recorded every 0.05 s."""
     builder = DiagramBuilder("d")
-    feeds = [builder.add(f"u{k}", source) for k, source in enumerate(sources)]
-    builder.add("pid", block, *feeds)
+    handles = [builder.add(f"u{k}", source) for k, source in enumerate(sources)]
+    builder.add("pid", block, *handles)
     options = SimulationOptions(
         stop_time=stop, sample_time=T, solver=solver, step=step, rtol=1e-10, atol=1e-12
     )
@@ -200,16 +200,16 @@ def test_back_calculation_in_a_discrete_pid_solves_its_implicit_equation(method:
 
 
 @pytest.mark.parametrize(
-    ("external_reset", "at"), [("rising", [1.0]), ("falling", [2.0]), ("either", [1.0, 2.0])]
+    ("external_reset", "reset_times"), [("rising", [1.0]), ("falling", [2.0]), ("either", [1.0, 2.0])]
 )
-def test_a_discrete_pid_is_reset_at_a_tick(external_reset: str, at: list[float]) -> None:
+def test_a_discrete_pid_is_reset_at_a_tick(external_reset: str, reset_times: list[float]) -> None:
     block = DiscretePID(P=0.0, I=1.0, external_reset=external_reset, initial_integral=5.0, sample_time=T)
     pulse = PulseGenerator(period=2.0, width=50.0, delay=1.0)
     result = run(block, Constant(value=1.0), pulse, stop=2.5)
     since = result.time.copy()
-    for instant in at:
-        after = result.time > instant - 1e-9
-        since[after] = result.time[after] - instant
+    for reset_time in reset_times:
+        after = result.time > reset_time - 1e-9
+        since[after] = result.time[after] - reset_time
     np.testing.assert_allclose(result["pid/y"], 5.0 + since, atol=1e-12)
 
 

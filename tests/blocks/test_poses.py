@@ -32,7 +32,7 @@ from armblocks.blocks import (
 )
 
 RANDOM = np.random.default_rng(23)
-TURNS = {
+ROTATIONS = {
     "zyx": lambda r, p, y: Rotation.from_euler("ZYX", [y, p, r]),
     "xyz": lambda r, p, y: Rotation.from_euler("XYZ", [y, p, r]),
     "yxz": lambda r, p, y: Rotation.from_euler("YXZ", [y, p, r]),
@@ -49,46 +49,50 @@ def random_pose(size: float = 3.0) -> np.ndarray:
     return T
 
 
-@pytest.mark.parametrize("convention", TURNS)
-def test_roll_pitch_yaw(convention: str) -> None:
+@pytest.mark.parametrize("convention", ROTATIONS)
+def test_roll_pitch_yaw_angles_agree_with_scipy(convention: str) -> None:
     for _ in range(8):
         angles = RANDOM.uniform([-3, -1.5, -3], [3, 1.5, 3])
         T = evaluate(Rpy2T(convention=convention), *angles)["T"]
-        assert T[:3, :3] == pytest.approx(TURNS[convention](*angles).as_matrix(), abs=1e-15)
+        assert T[:3, :3] == pytest.approx(ROTATIONS[convention](*angles).as_matrix(), abs=1e-15)
         assert T[3].tolist() == [0, 0, 0, 1]
         assert np.array_equal(T[:3, 3], np.zeros(3))
-        back = evaluate(T2rpy(convention=convention), T)
-        assert [back["roll"], back["pitch"], back["yaw"]] == pytest.approx(angles, abs=1e-13)
+        recovered = evaluate(T2rpy(convention=convention), T)
+        assert [recovered["roll"], recovered["pitch"], recovered["yaw"]] == pytest.approx(angles, abs=1e-13)
 
 
-@pytest.mark.parametrize("convention", TURNS)
-@pytest.mark.parametrize("off", [0.0, 1e-15, 1e-12, 1e-7, 1e-4])
-def test_angles_at_the_singular_pitch_reproduce_the_pose(convention: str, off: float) -> None:
+@pytest.mark.parametrize("convention", ROTATIONS)
+@pytest.mark.parametrize("pitch_offset", [0.0, 1e-15, 1e-12, 1e-7, 1e-4])
+def test_angles_at_the_singular_pitch_reproduce_the_pose(convention: str, pitch_offset: float) -> None:
     for sign in (1, -1):
-        T = evaluate(Rpy2T(convention=convention), 0.7, sign * (np.pi / 2 - off), -1.2)["T"]
-        back = evaluate(T2rpy(convention=convention), T)
-        recomputed = evaluate(Rpy2T(convention=convention), back["roll"], back["pitch"], back["yaw"])["T"]
+        T = evaluate(Rpy2T(convention=convention), 0.7, sign * (np.pi / 2 - pitch_offset), -1.2)["T"]
+        recovered = evaluate(T2rpy(convention=convention), T)
+        recomputed = evaluate(
+            Rpy2T(convention=convention), recovered["roll"], recovered["pitch"], recovered["yaw"]
+        )["T"]
         assert recomputed == pytest.approx(T, abs=5e-15)
-        if off < 1e-15:
-            assert back["roll"] == 0.0
+        if pitch_offset < 1e-15:
+            assert recovered["roll"] == 0.0
 
 
-def test_euler_angles() -> None:
+def test_euler_angles_agree_with_scipy() -> None:
     for theta in (0.0, 1e-9, 0.3, 2.0, np.pi - 1e-9, np.pi):
         phi, psi = RANDOM.uniform(-3, 3, 2)
         T = evaluate(Eul2T(), phi, theta, psi)["T"]
         assert T[:3, :3] == pytest.approx(
             Rotation.from_euler("ZYZ", [phi, theta, psi]).as_matrix(), abs=1e-15
         )
-        back = evaluate(T2eul(), T)
-        recomputed = evaluate(Eul2T(), back["phi"], back["theta"], back["psi"])["T"]
+        recovered = evaluate(T2eul(), T)
+        recomputed = evaluate(Eul2T(), recovered["phi"], recovered["theta"], recovered["psi"])["T"]
         assert recomputed == pytest.approx(T, abs=5e-15)
         if 0.1 < theta < 3:
-            assert [back["phi"], back["theta"], back["psi"]] == pytest.approx([phi, theta, psi], abs=1e-14)
+            assert [recovered["phi"], recovered["theta"], recovered["psi"]] == pytest.approx(
+                [phi, theta, psi], abs=1e-14
+            )
     assert evaluate(T2eul(), np.eye(4))["phi"] == 0.0
 
 
-def test_quaternions() -> None:
+def test_quaternions_agree_with_scipy() -> None:
     half_turns = [Rotation.from_rotvec(np.pi * np.array(axis)) for axis in np.eye(3)]
     for turn in [*half_turns, Rotation.identity(), *Rotation.random(12, rng=RANDOM)]:
         T = np.eye(4)
@@ -100,7 +104,7 @@ def test_quaternions() -> None:
         assert evaluate(Quaternion2T(), 3.0 * actual)["T"] == pytest.approx(T, abs=1e-15)
 
 
-def test_quaternion_algebra() -> None:
+def test_products_of_quaternions_are_products_of_rotations() -> None:
     a, b = RANDOM.normal(size=(2, 4))
     product = evaluate(QuaternionProduct(), a, b)["y"]
     Ta, Tb, Tab = (evaluate(Quaternion2T(), q)["T"] for q in (a, b, product))
@@ -124,20 +128,20 @@ def test_the_quaternion_rate_is_the_time_derivative(axes: str) -> None:
     assert evaluate(QuaternionRate(axes=axes), q, w)["y"] == pytest.approx(expected, abs=1e-9)
 
 
-def test_angle_and_axis() -> None:
+def test_angle_and_axis_agree_with_scipy() -> None:
     for angle in (1e-9, 0.3, 2.0, np.pi - 1e-9):
         axis = RANDOM.normal(size=3)
         T = evaluate(AngleAxis2T(), angle, axis)["T"]
         unit = axis / np.linalg.norm(axis)
         assert T[:3, :3] == pytest.approx(Rotation.from_rotvec(angle * unit).as_matrix(), abs=1e-15)
-        back = evaluate(T2AngleAxis(), T)
-        assert back["angle"] == pytest.approx(angle, abs=1e-15)
-        assert back["axis"] == pytest.approx(unit, abs=1e-7 if angle < 1e-6 else 1e-14)
+        recovered = evaluate(T2AngleAxis(), T)
+        assert recovered["angle"] == pytest.approx(angle, abs=1e-15)
+        assert recovered["axis"] == pytest.approx(unit, abs=1e-7 if angle < 1e-6 else 1e-14)
     nothing = evaluate(T2AngleAxis(), np.eye(4))
     assert (float(nothing["angle"]), nothing["axis"].tolist()) == (0.0, [0, 0, 0])
 
 
-def test_poses_compose_and_invert() -> None:
+def test_products_and_inverses_of_poses_are_those_of_matrices() -> None:
     A, B, C = (random_pose() for _ in range(3))
     assert evaluate(PoseProduct(inputs=3), A, B, C)["T"] == pytest.approx(A @ B @ C, abs=1e-14)
     assert evaluate(PoseInverse(), A)["Ti"] == pytest.approx(np.linalg.inv(A), abs=1e-14)
@@ -152,15 +156,15 @@ def test_poses_compose_and_invert() -> None:
 def test_twists_are_transformed_by_the_adjoint() -> None:
     T, V = random_pose(), RANDOM.normal(size=6)
 
-    def hat(V: np.ndarray) -> np.ndarray:
+    def twist_matrix(V: np.ndarray) -> np.ndarray:
         skew = evaluate(Skew(), V[3:])["S"]
         return np.vstack([np.column_stack([skew, V[:3]]), np.zeros(4)])
 
     result = evaluate(TransformTwist(), T, V)["y"]
-    assert hat(result) == pytest.approx(T @ hat(V) @ np.linalg.inv(T), abs=1e-13)
+    assert twist_matrix(result) == pytest.approx(T @ twist_matrix(V) @ np.linalg.inv(T), abs=1e-13)
 
 
-def test_differential_motion_of_both_toolbox_releases() -> None:
+def test_differential_motion_agrees_with_both_toolbox_releases() -> None:
     T1 = random_pose()
     d = RANDOM.normal(size=6) * 1e-6
     step = evaluate(Delta2Tr(), d)["T"]

@@ -26,7 +26,7 @@ number = 3
 """
 
 
-def fed(block: Block, *sources: Block) -> Diagram:
+def diagram_with_sources(block: Block, *sources: Block) -> Diagram:
     builder = DiagramBuilder("d")
     feeds = [builder.add(f"u{k}", source) for k, source in enumerate(sources)]
     builder.add("f", block, *feeds)
@@ -40,22 +40,26 @@ def run(diagram: Diagram, solver: str = "auto", step: float | None = None) -> Si
     return simulate(compiled(diagram), options)
 
 
-def test_scalars_vectors_and_the_time() -> None:
+def test_a_function_of_scalars_vectors_and_the_time_agrees_with_numpy() -> None:
     def law(q, k, t):  # type: ignore[no-untyped-def]
         return k * np.sin(q) + q[::-1] * t
 
     q = SineWave(amplitude=[1.0, 2.0, 0.5], frequency=3.0)
-    result = run(fed(PythonFunction(function=law), q, Clock()))
+    result = run(diagram_with_sources(PythonFunction(function=law), q, Clock()))
     t, q = result.time[:, None], result["u0/y"]
     np.testing.assert_allclose(result["f/y"], t * np.sin(q) + q[:, ::-1] * t, rtol=1e-13, atol=1e-15)
 
 
-def test_matrices_and_several_results() -> None:
+def test_a_function_of_matrices_with_several_results_agrees_with_numpy() -> None:
     def both(A, b):  # type: ignore[no-untyped-def]
         return A @ b, b @ A @ b, A.T
 
     A, b = np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([0.5, -1.0])
-    result = run(fed(PythonFunction(function=both, results="x, s, B"), Constant(value=A), Constant(value=b)))
+    result = run(
+        diagram_with_sources(
+            PythonFunction(function=both, results="x, s, B"), Constant(value=A), Constant(value=b)
+        )
+    )
     np.testing.assert_allclose(result["f/x"][0], A @ b)
     np.testing.assert_allclose(result["f/s"][0], b @ A @ b)
     np.testing.assert_allclose(result["f/B"][0], A.T)
@@ -81,7 +85,7 @@ def test_a_python_function_agrees_with_the_equal_expression(solver: str, step: f
 
 def test_a_file_names_the_function_and_needs_trust(tmp_path: Path) -> None:
     (tmp_path / "control.py").write_text(CODE)
-    document = ab.save_diagram(fed(PythonFunction(), SineWave()), tmp_path / "d.json")
+    document = ab.save_diagram(diagram_with_sources(PythonFunction(), SineWave()), tmp_path / "d.json")
     text = document.read_text()
     assert '"function": ""' in text
     document.write_text(text.replace('"function": ""', '"function": "control.py:law"'))
@@ -112,7 +116,7 @@ def test_a_file_names_the_function_and_needs_trust(tmp_path: Path) -> None:
 def test_invalid_references_to_functions_are_refused(reference: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "control.py").write_text(CODE)
     (tmp_path / "broken.py").write_text("1 / 0\n")
-    document = ab.save_diagram(fed(PythonFunction(), SineWave()), tmp_path / "d.json")
+    document = ab.save_diagram(diagram_with_sources(PythonFunction(), SineWave()), tmp_path / "d.json")
     document.write_text(document.read_text().replace('"function": ""', f'"function": "{reference}"'))
     with pytest.raises(FormatError, match=message):
         ab.load_diagram(document, trust=True)
@@ -120,11 +124,13 @@ def test_invalid_references_to_functions_are_refused(reference: str, message: st
 
 def test_a_function_of_a_session_cannot_be_saved(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match=r"<lambda> is not defined in a file.*move it to a file"):
-        ab.save_diagram(fed(PythonFunction(function=lambda u: 2 * u), SineWave()), tmp_path / "d.json")
+        ab.save_diagram(
+            diagram_with_sources(PythonFunction(function=lambda u: 2 * u), SineWave()), tmp_path / "d.json"
+        )
     from armblocks.formats import diagram_to_python
 
     with pytest.raises(FormatError, match=r"<lambda> cannot be written into a Python program"):
-        diagram_to_python(fed(PythonFunction(function=lambda u: 2 * u), SineWave()))
+        diagram_to_python(diagram_with_sources(PythonFunction(function=lambda u: 2 * u), SineWave()))
 
 
 def test_functions_that_cannot_be_traced_are_refused() -> None:
@@ -135,9 +141,11 @@ def test_functions_that_cannot_be_traced_are_refused() -> None:
         DiagramError,
         match=r"the function decides cannot be traced: RuntimeError[\s\S]*replace 'if' by casadi\.if_else",
     ):
-        trace_diagram(fed(PythonFunction(function=decides), SineWave()))
+        trace_diagram(diagram_with_sources(PythonFunction(function=decides), SineWave()))
     with pytest.raises(DiagramError, match="returns 3 values for the results a, b"):
-        trace_diagram(fed(PythonFunction(function=lambda u: (u, u, u), results="a b"), SineWave()))
+        trace_diagram(
+            diagram_with_sources(PythonFunction(function=lambda u: (u, u, u), results="a b"), SineWave())
+        )
     with pytest.raises(InputError, match=r"the results are 'u'.*choose other names"):
         PythonFunction(results="u")
     with pytest.raises(

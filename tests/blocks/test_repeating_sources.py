@@ -64,11 +64,11 @@ def test_a_square_wave_starts_low(units: str, frequency: float, solver: str, ste
     t, (y, area) = run(block, Integrator(), solver=solver, step=step)
     high = np.floor(t * (1 + 1e-14)) % 2
     assert y.tolist() == (6.0 * high - 3.0).tolist()
-    into = t - 2.0 * np.floor(t / 2.0 * (1 + 1e-14))
-    np.testing.assert_allclose(area, 3.0 * np.abs(into - 1.0) - 3.0, atol=1e-12)
+    phase = t - 2.0 * np.floor(t / 2.0 * (1 + 1e-14))
+    np.testing.assert_allclose(area, 3.0 * np.abs(phase - 1.0) - 3.0, atol=1e-12)
 
 
-def test_a_sine_of_the_signal_generator() -> None:
+def test_a_signal_generator_has_its_frequency_in_the_chosen_unit() -> None:
     t, (y,) = run(SignalGenerator(amplitude=3.0, frequency=0.5))
     np.testing.assert_allclose(y, 3.0 * np.sin(np.pi * t), atol=1e-13)
     t, (y,) = run(SignalGenerator(amplitude=3.0, frequency=0.5, units="rad/s"))
@@ -81,12 +81,12 @@ def test_a_repeating_sequence_is_periodic(solver: str, step: float | None) -> No
     block = RepeatingSequence(times=corners, values=values)
     t, (y, area) = run(block, Integrator(), solver=solver, step=step)
     periods = np.floor(t / 0.9 * (1 + 1e-14))
-    into = np.maximum(t - 0.9 * periods, 0.0)
-    np.testing.assert_allclose(y, np.interp(into, corners, values), atol=1e-11)
+    phase = np.maximum(t - 0.9 * periods, 0.0)
+    np.testing.assert_allclose(y, np.interp(phase, corners, values), atol=1e-11)
     areas = np.concatenate([[0.0], np.cumsum(np.diff(corners) * (np.array(values[1:]) + values[:-1]) / 2.0)])
-    piece = np.clip(np.searchsorted(corners, into, side="right") - 1, 0, 2)
-    since = into - np.array(corners)[piece]
-    mean = (np.array(values)[piece] + np.interp(into, corners, values)) / 2.0
+    piece = np.clip(np.searchsorted(corners, phase, side="right") - 1, 0, 2)
+    since = phase - np.array(corners)[piece]
+    mean = (np.array(values)[piece] + np.interp(phase, corners, values)) / 2.0
     np.testing.assert_allclose(area, periods * areas[-1] + areas[piece] + since * mean, atol=1e-11)
 
 
@@ -97,8 +97,8 @@ def test_an_interpolated_repeating_sequence_is_periodic(method: str, kind: str) 
     corners, values = [0.0, 0.1, 0.5, 0.6, 1.0], [3.0, 1.0, 4.0, 2.0, 1.5]
     block = RepeatingSequenceInterpolated(times=corners, values=values, method=method, sample_time=0.0625)
     t, (y,) = run(block)
-    into = np.floor(t / 0.0625) * 0.0625 % 1.0
-    np.testing.assert_allclose(y, interp1d(corners, values, kind=kind)(into), atol=1e-12)
+    phase = np.floor(t / 0.0625) * 0.0625 % 1.0
+    np.testing.assert_allclose(y, interp1d(corners, values, kind=kind)(phase), atol=1e-12)
 
 
 def test_stairs_and_counters_count_ticks() -> None:
@@ -150,7 +150,7 @@ def test_outputs_of_sampled_lags_agree_with_their_transfer_functions(
     np.testing.assert_allclose(y[at_ticks], signal.lfilter(numerator, denominator, u[at_ticks]), atol=1e-13)
 
 
-def test_initial_values_of_sampled_transfer_functions() -> None:
+def test_initial_values_of_sampled_transfer_functions_are_their_previous_values() -> None:
     _, (u, y) = run(
         SineWave(phase=0.4),
         TransferFunctionLeadOrLag(pole=0.9, zero=0.5, initial=2.0, initial_input=3.0, sample_time=0.1),

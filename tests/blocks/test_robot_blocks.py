@@ -71,7 +71,7 @@ def test_a_trajectory_is_the_polynomial_of_the_paper() -> None:
         assert result["qd"] == pytest.approx(speed, rel=1e-14, abs=1e-15)
 
 
-def test_a_trajectory_stands_still_after_its_end() -> None:
+def test_a_trajectory_is_at_rest_after_its_end() -> None:
     result = evaluate(JTraj(q0=[0.0], qf=[1.0], tmax=2.0), t=2.5)
     assert [float(result[name][0]) for name in ("q", "qd", "qdd")] == [1.0, 0.0, 0.0]
 

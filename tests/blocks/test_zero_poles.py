@@ -43,7 +43,7 @@ def run(
 
 @SOLVERS
 @pytest.mark.parametrize(("zeros", "poles", "gain"), SYSTEMS)
-def test_step_responses(
+def test_step_responses_agree_with_scipy(
     zeros: list[complex], poles: list[complex], gain: float, solver: str, step: float | None
 ) -> None:
     t, _, y = run(ZeroPole(zeros=zeros, poles=poles, gain=gain), Step(time=0.0), 0.02, solver, step)
@@ -79,7 +79,7 @@ def test_thirty_close_poles_are_realised_accurately() -> None:
     ("zeros", "poles"),
     [([], [0.5]), ([0.2, -0.4], [0.5, 0.5]), ([1j, -1j], [0.9, 0.3 + 0.6j, 0.3 - 0.6j]), ([0.0], [0.0, 0.5])],
 )
-def test_sampled_systems(zeros: list[complex], poles: list[complex]) -> None:
+def test_sampled_systems_agree_with_scipy(zeros: list[complex], poles: list[complex]) -> None:
     block = DiscreteZeroPole(zeros=zeros, poles=poles, gain=1.5, sample_time=0.1)
     _, u, y = run(block, SineWave(frequency=3.0, phase=0.4), 0.1)
     b, a = signal.zpk2tf(zeros, poles, 1.5)
@@ -124,7 +124,7 @@ def test_filters_agree_with_scipy(design: str, kind: str, order: int) -> None:
 
 
 @SOLVERS
-def test_a_filter_in_a_run(solver: str, step: float | None) -> None:
+def test_a_simulated_filter_agrees_with_scipy(solver: str, step: float | None) -> None:
     t, _, y = run(AnalogFilter(order=4, edge=6.0), Step(time=0.0), 0.02, solver, step)
     _, expected = signal.step(signal.butter(4, 6.0, analog=True), T=t)
     np.testing.assert_allclose(y, expected, atol=1e-7)

@@ -14,7 +14,7 @@ from typer.testing import CliRunner, Result
 
 from armblocks.cli.main import app
 
-command_made_once = cache(get_command)
+cached_command = cache(get_command)
 """Built once: otherwise Typer's runner reads the signatures of all commands in each call."""
 
 
@@ -22,7 +22,7 @@ command_made_once = cache(get_command)
 def invoke(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
     """Return a function that calls the command line in this process, from an empty folder."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("typer.testing._get_command", command_made_once)
+    monkeypatch.setattr("typer.testing._get_command", cached_command)
 
     def call(*arguments: str, columns: int = 80) -> Result:
         return CliRunner().invoke(app, list(arguments), env={"COLUMNS": str(columns), "ARMBLOCKS_DEBUG": ""})
@@ -31,7 +31,7 @@ def invoke(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Res
 
 
 @pytest.fixture
-def refused(invoke: Callable[..., Result]) -> Callable[..., str]:
+def refusal(invoke: Callable[..., Result]) -> Callable[..., str]:
     """Return a function that calls the command line with bad input and returns the message."""
 
     def call(*arguments: str) -> str:

@@ -67,14 +67,14 @@ def test_trim_of_a_diagram_without_states_says_that_there_are_none(invoke: Invok
     assert "--free jtraj.q0 --output rne/tau=0.5" in result.stdout
 
 
-def test_unreadable_or_unknown_options_are_refused(refused: Callable[..., str]) -> None:
-    assert "--free is given without --trim" in refused("linearize", "falling_pendulum", "--free", "a.b")
-    assert "is not of the form NAME=VALUE" in refused("trim", "falling_pendulum", "--fix", "q")
-    assert "'up' is not a number" in refused("trim", "falling_pendulum", "--fix", "pendulum/q=up")
-    assert "the range of 'pendulum/q' has 1 numbers" in refused(
+def test_unreadable_or_unknown_options_are_refused(refusal: Callable[..., str]) -> None:
+    assert "--free is given without --trim" in refusal("linearize", "falling_pendulum", "--free", "a.b")
+    assert "is not of the form NAME=VALUE" in refusal("trim", "falling_pendulum", "--fix", "q")
+    assert "'up' is not a number" in refusal("trim", "falling_pendulum", "--fix", "pendulum/q=up")
+    assert "the bounds of 'pendulum/q' have 1 numbers" in refusal(
         "trim", "falling_pendulum", "--bound", "pendulum/q=1"
     )
-    assert "no operating point was found" in refused("trim", "falling_pendulum")
-    assert "there is no block named 'nothing'" in refused(
+    assert "no operating point was found" in refusal("trim", "falling_pendulum")
+    assert "there is no block named 'nothing'" in refusal(
         "linearize", "falling_pendulum", "--input", "nothing"
     )

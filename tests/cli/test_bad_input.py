@@ -12,43 +12,43 @@ from typer.testing import Result
 
 from interruptible import killed_at_the_end, start_interruptible
 
-Refused = Callable[..., str]
+Refusal = Callable[..., str]
 Write = Callable[..., str]
 
 SCOPE = {"scope": ("Scope", {"inputs": 1})}
 
 
-def test_an_unknown_model_is_refused_with_the_nearest_name(refused: Refused) -> None:
-    assert "did you mean 'kr180model'?" in refused("run", "kr180modle")
+def test_an_unknown_model_is_refused_with_the_nearest_name(refusal: Refusal) -> None:
+    assert "did you mean 'kr180model'?" in refusal("run", "kr180modle")
 
 
-def test_an_unknown_robot_is_refused_with_the_nearest_name(refused: Refused) -> None:
-    text = refused("show", "puma650")
+def test_an_unknown_robot_is_refused_with_the_nearest_name(refusal: Refusal) -> None:
+    text = refusal("show", "puma650")
     assert "there is no" in text
     assert "did you mean 'puma560'?" in text
 
 
-def test_a_missing_file_is_named(refused: Refused) -> None:
-    assert "nowhere.json" in refused("run", "nowhere.json")
+def test_a_missing_file_is_named(refusal: Refusal) -> None:
+    assert "nowhere.json" in refusal("run", "nowhere.json")
 
 
-def test_a_file_that_is_not_json_is_named(refused: Refused, tmp_path: Path) -> None:
+def test_a_file_that_is_not_json_is_named(refusal: Refusal, tmp_path: Path) -> None:
     (tmp_path / "broken.json").write_text("{", encoding="utf-8")
-    assert "broken.json" in refused("run", "broken.json")
+    assert "broken.json" in refusal("run", "broken.json")
 
 
-def test_an_unknown_command_is_refused(refused: Refused) -> None:
-    assert "No such command" in refused("simulate")
+def test_an_unknown_command_is_refused(refusal: Refusal) -> None:
+    assert "No such command" in refusal("simulate")
 
 
-def test_an_unknown_solver_is_refused_with_the_nearest_name(refused: Refused, write_diagram: Write) -> None:
+def test_an_unknown_solver_is_refused_with_the_nearest_name(refusal: Refusal, write_diagram: Write) -> None:
     path = write_diagram({"i": ("Integrator", {}), "c": ("Constant", {"value": 1.0})}, "c/y -> i/u")
-    assert "did you mean 'heun'?" in refused("run", path, "--solver", "huen")
+    assert "did you mean 'heun'?" in refusal("run", path, "--solver", "huen")
 
 
 @pytest.mark.parametrize("time", ["-1", "nan", "inf"])
-def test_a_negative_or_infinite_stop_time_is_refused(time: str, refused: Refused) -> None:
-    text = refused("run", "kr180model", f"--stop-time={time}")
+def test_a_negative_or_infinite_stop_time_is_refused(time: str, refusal: Refusal) -> None:
+    text = refusal("run", "kr180model", f"--stop-time={time}")
     assert "stop_time is" in text
     assert "a finite time in s, 0 or more" in text
     assert "give another stop_time" in text
@@ -57,90 +57,90 @@ def test_a_negative_or_infinite_stop_time_is_refused(time: str, refused: Refused
 @pytest.mark.parametrize(
     "option", ["--step=0", "--step=-1", "--step=nan", "--rtol=0", "--rtol=nan", "--atol=-1"]
 )
-def test_bad_settings_of_the_solver_are_refused(option: str, refused: Refused, write_diagram: Write) -> None:
+def test_bad_settings_of_the_solver_are_refused(option: str, refusal: Refusal, write_diagram: Write) -> None:
     path = write_diagram({"i": ("Integrator", {}), "c": ("Constant", {"value": 1.0})}, "c/y -> i/u")
-    assert option[2:].split("=")[0] in refused("run", path, option)
+    assert option[2:].split("=")[0] in refusal("run", path, option)
 
 
-def test_a_stop_time_that_is_not_a_number_is_refused(refused: Refused) -> None:
-    assert "stop-time" in refused("run", "kr180model", "--stop-time", "ten")
+def test_a_stop_time_that_is_not_a_number_is_refused(refusal: Refusal) -> None:
+    assert "stop-time" in refusal("run", "kr180model", "--stop-time", "ten")
 
 
-def test_an_assignment_without_a_block_is_refused_with_the_required_form(refused: Refused) -> None:
-    assert "block.parameter=value" in refused("run", "kr180model", "--set", "tmax=5")
+def test_an_assignment_without_a_block_is_refused_with_the_required_form(refusal: Refusal) -> None:
+    assert "block.parameter=value" in refusal("run", "kr180model", "--set", "tmax=5")
 
 
-def test_an_assignment_to_an_unknown_block_is_refused_with_the_nearest_name(refused: Refused) -> None:
-    assert "did you mean 'jtraj'?" in refused("run", "kr180model", "--set", "jtrja.tmax=5")
+def test_an_assignment_to_an_unknown_block_is_refused_with_the_nearest_name(refusal: Refusal) -> None:
+    assert "did you mean 'jtraj'?" in refusal("run", "kr180model", "--set", "jtrja.tmax=5")
 
 
-def test_an_assignment_to_an_unknown_parameter_is_refused_with_the_nearest_name(refused: Refused) -> None:
-    assert "did you mean 'tmax'?" in refused("run", "kr180model", "--set", "jtraj.tmxa=5")
+def test_an_assignment_to_an_unknown_parameter_is_refused_with_the_nearest_name(refusal: Refusal) -> None:
+    assert "did you mean 'tmax'?" in refusal("run", "kr180model", "--set", "jtraj.tmxa=5")
 
 
 @pytest.mark.parametrize("value", ["nan", "inf", "-1", "0", "[1 2]", "text"])
-def test_an_assigned_value_of_the_wrong_kind_is_refused(value: str, refused: Refused) -> None:
-    assert "tmax" in refused("run", "kr180model", "--set", f"jtraj.tmax={value}")
+def test_an_assigned_value_of_the_wrong_kind_is_refused(value: str, refusal: Refusal) -> None:
+    assert "tmax" in refusal("run", "kr180model", "--set", f"jtraj.tmax={value}")
 
 
-def test_an_assigned_vector_of_the_wrong_length_is_refused(refused: Refused) -> None:
-    assert "q0" in refused("run", "kr180model", "--set", "jtraj.q0=[1 2 3]")
+def test_an_assigned_vector_of_the_wrong_length_is_refused(refusal: Refusal) -> None:
+    assert "q0" in refusal("run", "kr180model", "--set", "jtraj.q0=[1 2 3]")
 
 
-def test_python_code_as_a_value_is_refused(refused: Refused) -> None:
-    text = refused("run", "kr180model", "--set", "jtraj.tmax=__import__('os')")
+def test_python_code_as_a_value_is_refused(refusal: Refusal) -> None:
+    text = refusal("run", "kr180model", "--set", "jtraj.tmax=__import__('os')")
     assert "no function named '__import__'" in text
 
 
-def test_a_folder_that_cannot_be_created_is_refused_before_the_run(refused: Refused, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_created_is_refused_before_the_run(refusal: Refusal, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
-    text = refused("run", "kr180model", "--out", "file/inside")
+    text = refusal("run", "kr180model", "--out", "file/inside")
     assert "the folder cannot be written" in text
     assert "--out" in text
 
 
-def test_two_drivers_of_an_input_are_refused(refused: Refused, write_diagram: Write) -> None:
+def test_two_drivers_of_an_input_are_refused(refusal: Refusal, write_diagram: Write) -> None:
     blocks = {"a": ("Constant", {"value": 1.0}), "b": ("Constant", {"value": 2.0}), "i": ("Integrator", {})}
-    assert "two drivers" in refused("run", write_diagram(blocks, "a/y -> i/u", "b/y -> i/u"))
+    assert "two drivers" in refusal("run", write_diagram(blocks, "a/y -> i/u", "b/y -> i/u"))
 
 
-def test_an_unconnected_input_is_refused(refused: Refused, write_diagram: Write) -> None:
-    text = refused("run", write_diagram({"i": ("Integrator", {})}))
+def test_an_unconnected_input_is_refused(refusal: Refusal, write_diagram: Write) -> None:
+    text = refusal("run", write_diagram({"i": ("Integrator", {})}))
     assert "i/u" in text or "'i'" in text
     assert "connect" in text
 
 
-def test_mismatched_widths_are_refused(refused: Refused, write_diagram: Write) -> None:
+def test_mismatched_widths_are_refused(refusal: Refusal, write_diagram: Write) -> None:
     blocks = {
         "a": ("Constant", {"value": [1.0, 2.0]}),
         "b": ("Constant", {"value": [1.0, 2.0, 3.0]}),
         "sum": ("Sum", {"signs": "++"}),
         "end": ("Terminator", {}),
     }
-    text = refused("run", write_diagram(blocks, "a/y -> sum/u1", "b/y -> sum/u2", "sum/y -> end/u"))
+    text = refusal("run", write_diagram(blocks, "a/y -> sum/u1", "b/y -> sum/u2", "sum/y -> end/u"))
     assert "sum" in text
     assert "2" in text
     assert "3" in text
 
 
 def test_the_message_about_an_algebraic_loop_lists_its_signals(
-    refused: Refused, write_diagram: Write
+    refusal: Refusal, write_diagram: Write
 ) -> None:
     blocks = {"first": ("Gain", {"gain": 2.0}), "second": ("Gain", {"gain": 0.5})}
-    text = refused("run", write_diagram(blocks, "first/y -> second/u", "second/y -> first/u"))
+    text = refusal("run", write_diagram(blocks, "first/y -> second/u", "second/y -> first/u"))
     assert "algebraic loop" in text
     assert "first" in text
     assert "second" in text
 
 
 def test_an_unknown_block_type_is_refused_with_the_nearest_name(
-    refused: Refused, write_diagram: Write
+    refusal: Refusal, write_diagram: Write
 ) -> None:
-    assert "did you mean 'Constant'?" in refused("run", write_diagram({"c": ("Constnat", {})}))
+    assert "did you mean 'Constant'?" in refusal("run", write_diagram({"c": ("Constnat", {})}))
 
 
 def test_the_message_about_an_infinite_signal_names_the_block_that_computed_it(
-    refused: Refused, write_diagram: Write, tmp_path: Path
+    refusal: Refusal, write_diagram: Write, tmp_path: Path
 ) -> None:
     # 1 / (t - 1) becomes infinite at t = 1; the blocks after it are not the cause.
     blocks = {
@@ -160,7 +160,7 @@ def test_the_message_about_an_infinite_signal_names_the_block_that_computed_it(
         "after/y -> end/u",
     )
     path = write_diagram(blocks, *wires, stop_time=2.0, sample_time=0.25)
-    text = refused("run", path, "--out", "kept", "--no-figures")
+    text = refusal("run", path, "--out", "kept", "--no-figures")
     assert "quotient" in text
     assert "1 s" in text or "t = 1" in text
     # The report has the samples before that time.
@@ -187,17 +187,17 @@ one = robot(L, 'one');
     ],
 )
 def test_an_impossible_robot_is_refused_with_the_line_of_its_script(
-    mass: str, motor: str, gear: str, place: str, refused: Refused, tmp_path: Path
+    mass: str, motor: str, gear: str, place: str, refusal: Refusal, tmp_path: Path
 ) -> None:
     (tmp_path / "bad.m").write_text(ROBOT_SCRIPT.format(mass=mass, motor=motor, gear=gear), encoding="utf-8")
-    assert f"where {place}" in refused("show", "bad.m")
+    assert f"where {place}" in refusal("show", "bad.m")
 
 
 def test_unsupported_code_in_a_robot_script_is_refused_with_its_line(
-    refused: Refused, tmp_path: Path
+    refusal: Refusal, tmp_path: Path
 ) -> None:
     (tmp_path / "odd.m").write_text("a = 1;\nsystem('rm -rf x');\n", encoding="utf-8")
-    text = refused("show", "odd.m")
+    text = refusal("show", "odd.m")
     assert "odd.m:2" in text
     assert "system" in text
 

@@ -62,9 +62,9 @@ def test_options_that_exclude_each_other_are_refused(invoke: Invoke) -> None:
     both = invoke("blocks", "Gain", "--search", "gain")
     assert both.exit_code == 2
     assert "the block 'Gain' and the search 'gain' are both given" in both.stderr
-    nameless = invoke("blocks", "--save", "gain.json")
-    assert nameless.exit_code == 2
-    assert "--save needs a block" in nameless.stderr
+    without_name = invoke("blocks", "--save", "gain.json")
+    assert without_name.exit_code == 2
+    assert "--save needs a block" in without_name.stderr
 
 
 def test_a_saved_example_is_a_diagram_that_runs(invoke: Invoke, tmp_path: Path) -> None:

@@ -77,16 +77,16 @@ def test_list_prints_all_names_of_a_category(kind: str, invoke: Invoke) -> None:
     assert set(NAMES[kind]()) <= set(result.stdout.split())
 
 
-COMPLETED = {
+COMPLETIONS = {
     "run kr180mo": ["kr180model"],
     "show joint_": ["joint_servos"],
     "bench --robot twol": ["twolink"],
     "trim mo": ["models/", "motor.json"],
     "diff falling_pendulum models/a": ["models/arm.json"],
     "studio nowhere/a": [],
-    "lin": ["linearize"],
+    "lin": ["linearize", "lint"],
 }
-COMPLETE = """
+COMPLETION_SCRIPT = """
 import contextlib, io, json, os, sys
 from armblocks.cli.main import app
 
@@ -106,14 +106,14 @@ def test_the_shell_completes_names_and_files_without_a_heavy_import(tmp_path: Pa
     for name in ("motor.json", "model.txt", "models/arm.json"):
         (tmp_path / name).touch()
     completed = subprocess.run(
-        [sys.executable, "-c", COMPLETE, json.dumps(list(COMPLETED))],
+        [sys.executable, "-c", COMPLETION_SCRIPT, json.dumps(list(COMPLETIONS))],
         env={**os.environ, "_ARMBLOCKS_COMPLETE": "complete_bash"},
         cwd=tmp_path,
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
     )
-    assert json.loads(completed.stdout or "0") == [COMPLETED, []], completed.stderr
+    assert json.loads(completed.stdout or "0") == [COMPLETIONS, []], completed.stderr
 
 
 def test_bench_prints_a_time_for_every_method(invoke: Invoke) -> None:

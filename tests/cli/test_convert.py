@@ -1,11 +1,14 @@
 """``armblocks convert``: conversion to other formats; existing files are replaced only with ``--force``."""
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
+from numpy.testing import assert_allclose
 from typer.testing import Result
 
 import armblocks as ab
+from armblocks.errors import ArmblocksWarning
 
 Invoke = Callable[..., Result]
 SCRIPT = "L1 = link([0 1 0 0 0], 'standard');\nL{1} = L1;\narm = robot(L, 'one');\n"
@@ -38,15 +41,27 @@ def test_an_existing_file_is_replaced_only_with_force(invoke: Invoke, tmp_path: 
 
 
 def test_conversions_that_do_not_exist_are_refused(invoke: Invoke, tmp_path: Path) -> None:
-    refused = {
+    refusals = {
         ("kr180", "arm.py"): "a robot cannot be written as '.py'",
         ("kr180model", "model.txt"): "a diagram cannot be written as '.txt'",
         ("model.py", "model.json"): "a Python program is not converted, because it would have to be run",
-        ("falling_pendulum", "model.py"): "neither a shipped one nor that of a file",
+        ("falling_pendulum", "model.py"): "neither shipped nor loaded from a file",
         ("kr181", "arm.json"): "no shipped robot, diagram or library named 'kr181'",
     }
-    for arguments, words in refused.items():
+    for arguments, words in refusals.items():
         result = invoke("convert", *arguments)
         assert result.exit_code == 2
         assert words in result.stderr
     assert not list(tmp_path.iterdir())
+
+
+def test_save_robot_and_convert_write_urdf(invoke: Invoke, tmp_path: Path) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ArmblocksWarning)
+        result = invoke("convert", "twolink", "two.urdf")
+        assert result.exit_code == 0, result.output
+        path = ab.save_robot(ab.load_robot("twolink"), tmp_path / "again.urdf")
+        assert path.read_bytes() == (tmp_path / "two.urdf").read_bytes()
+        arm = ab.load_robot(path)
+    expected = ab.load_robot("twolink").fkine([0.3, 0.4])
+    assert_allclose(arm.fkine([0.3, 0.4]), expected, atol=1e-12)

@@ -15,7 +15,7 @@ Invoke = Callable[..., Result]
 FIRST_BYTES = {"svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF-"}
 
 
-def nested() -> Diagram:
+def nested_diagram() -> Diagram:
     inner = DiagramBuilder("amplifier")
     inner.add("Out1", Outport(), inner.add("twice", Gain(gain=2.0), inner.add("In1", Inport())))
     builder = DiagramBuilder("outer")
@@ -40,7 +40,7 @@ def test_every_format_is_written_and_two_drawings_are_equal(
 
 
 def test_the_sheet_option_draws_the_blocks_of_a_subsystem(invoke: Invoke, tmp_path: Path) -> None:
-    ab.save_diagram(nested(), tmp_path / "outer.json")
+    ab.save_diagram(nested_diagram(), tmp_path / "outer.json")
     assert invoke("diagram", "outer.json", "--sheet", "amplifier", "--dark").exit_code == 0
     text = (tmp_path / "outer-amplifier.svg").read_text(encoding="utf-8")
     assert "twice (Gain)" in text and "scope (Scope)" not in text
@@ -48,13 +48,13 @@ def test_the_sheet_option_draws_the_blocks_of_a_subsystem(invoke: Invoke, tmp_pa
 
 
 def test_drawings_in_dark_and_light_differ(tmp_path: Path) -> None:
-    diagram = nested()
+    diagram = nested_diagram()
     for kind in DRAWING_FORMATS:
         assert drawing_bytes(diagram, kind, theme="light") != drawing_bytes(diagram, kind, theme="dark")
 
 
 def test_unknown_sheets_and_suffixes_are_refused(invoke: Invoke, tmp_path: Path) -> None:
-    ab.save_diagram(nested(), tmp_path / "outer.json")
+    ab.save_diagram(nested_diagram(), tmp_path / "outer.json")
     result = invoke("diagram", "outer.json", "--sheet", "amplifer")
     assert result.exit_code == 2
     assert "sheet" in result.stderr and "amplifier" in result.stderr

@@ -17,7 +17,7 @@ Invoke = Callable[..., Result]
 
 
 @pytest.fixture
-def changed() -> Diagram:
+def changed_diagram() -> Diagram:
     """The paper's diagram with another duration and stop time."""
     diagram = with_parameters(ab.load_diagram("kr180model"), {"jtraj.tmax": 5.0})
     return dataclasses.replace(diagram, settings=dataclasses.replace(diagram.settings, stop_time=5.0))
@@ -28,13 +28,13 @@ def test_equal_diagrams_give_exit_code_0(invoke: Invoke, tmp_path: Path) -> None
     ab.save_diagram(dataclasses.replace(diagram, layout={}, name="other"), tmp_path / "copy.json")
     result = invoke("diff", "kr180model", "copy.json")
     assert result.exit_code == 0, result.output
-    assert result.stdout == "kr180model and copy.json are the same, layout aside\n"
+    assert result.stdout == "kr180model and copy.json are the same except for layout\n"
 
 
 def test_changes_are_lines_with_both_values_and_give_exit_code_1(
-    invoke: Invoke, tmp_path: Path, changed: Diagram
+    invoke: Invoke, tmp_path: Path, changed_diagram: Diagram
 ) -> None:
-    ab.save_diagram(changed, tmp_path / "new.json")
+    ab.save_diagram(changed_diagram, tmp_path / "new.json")
     result = invoke("diff", "kr180model", "new.json")
     assert result.exit_code == 1, result.output
     assert "kr180model -> new.json: 2 differences" in result.stdout
@@ -42,8 +42,10 @@ def test_changes_are_lines_with_both_values_and_give_exit_code_1(
     assert "  ~ stop_time: 10 -> 5\n" in result.stdout
 
 
-def test_the_json_output_has_the_same_changes(invoke: Invoke, tmp_path: Path, changed: Diagram) -> None:
-    ab.save_diagram(changed, tmp_path / "new.json")
+def test_the_json_output_has_the_same_changes(
+    invoke: Invoke, tmp_path: Path, changed_diagram: Diagram
+) -> None:
+    ab.save_diagram(changed_diagram, tmp_path / "new.json")
     result = invoke("diff", "kr180model", "new.json", "--json")
     assert result.exit_code == 1
     message = json.loads(result.stdout)
@@ -89,8 +91,8 @@ def test_values_with_the_same_short_text_are_listed_with_their_difference(
     assert "(differs in 1 of 501 entries)" in " ".join(invoke("diff", "a.json", "b.json").stdout.split())
 
 
-def test_an_unknown_diagram_is_refused(refused: Callable[..., str]) -> None:
-    assert "kr180modle" in refused("diff", "kr180model", "kr180modle")
+def test_an_unknown_diagram_is_refused(refusal: Callable[..., str]) -> None:
+    assert "kr180modle" in refusal("diff", "kr180model", "kr180modle")
 
 
 def test_different_numbers_have_different_texts() -> None:

@@ -19,7 +19,7 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in ("index", "simulation", "reference/blocks", "reference/blocks/Gain"):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / f"{name}.html").touch()
-    monkeypatch.setattr(docs, "INSTALLED", folder)
+    monkeypatch.setattr(docs, "INSTALLED_PAGES", folder)
     return folder
 
 
@@ -43,10 +43,10 @@ def test_a_page_or_a_block_is_opened(
 
 
 def test_page_names_are_completed_and_unknown_pages_are_refused(
-    site: Path, refused: Callable[..., str]
+    site: Path, refusal: Callable[..., str]
 ) -> None:
     assert docs.complete_pages("sim") == ["simulation"]
-    text = refused("docs", "simulatoin")
+    text = refusal("docs", "simulatoin")
     assert "there is no page of the documentation named 'simulatoin'" in text
     assert "did you mean 'simulation'?" in text
 

@@ -125,11 +125,11 @@ def test_an_entry_that_the_model_does_not_allow_is_named(
 
     content = document(model(SETS).build())
     content["parameter_sets"] = {"stiff": {path: value}}
-    with pytest.raises(ArmblocksError) as refused:
+    with pytest.raises(ArmblocksError) as caught:
         read(content)
-    assert what in str(refused.value)
-    assert "servo.json:" in refused.value.where
-    assert f'"{path}"' in refused.value.where or path in refused.value.where
+    assert what in str(caught.value)
+    assert "servo.json:" in caught.value.where
+    assert f'"{path}"' in caught.value.where or path in caught.value.where
 
     # The editor opens the file, and the error is raised when the set is applied.
     draft = read(content, draft=True)
@@ -157,18 +157,18 @@ def test_an_entry_that_the_model_does_not_allow_is_named(
 @pytest.mark.parametrize("draft", [False, True])
 def test_malformed_sets_of_a_file_are_refused(sets: Any, what: str, draft: bool) -> None:
     content = {**document(model({}).build()), "parameter_sets": sets}
-    with pytest.raises((FormatError, DiagramError, UnknownNameError)) as refused:
+    with pytest.raises((FormatError, DiagramError, UnknownNameError)) as caught:
         read(content, draft=draft)
-    assert what in str(refused.value)
-    assert "servo.json:" in refused.value.where
+    assert what in str(caught.value)
+    assert "servo.json:" in caught.value.where
 
 
 @pytest.mark.parametrize(("name", "fix"), [("x" * 201, "shorten it"), ("a\0", "rename it")])
 def test_the_message_about_a_name_of_a_set_has_a_remedy(name: str, fix: str) -> None:
-    with pytest.raises(DiagramError) as refused:
+    with pytest.raises(DiagramError) as caught:
         model({}).parameter_set(name, {})
-    assert refused.value.fix == fix
-    assert "1 to 200 characters, other than those of another set" in refused.value.allowed
+    assert caught.value.fix == fix
+    assert "1 to 200 characters, other than those of another set" in caught.value.allowed
 
 
 def test_unknown_sets_are_refused_with_the_nearest_name() -> None:

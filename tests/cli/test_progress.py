@@ -10,17 +10,17 @@ from armblocks.cli.progress import RunProgress
 
 
 @pytest.mark.parametrize(
-    ("spent", "fraction", "message"),
+    ("elapsed", "fraction", "message"),
     [(10.0, 0.5, "about 10 s left"), (60.0, 0.1, "about 9 min left"), (3600.0, 0.25, "about 3.0 h left")],
 )
 def test_a_long_run_shows_the_remaining_time(
-    spent: float, fraction: float, message: str, monkeypatch: pytest.MonkeyPatch
+    elapsed: float, fraction: float, message: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    now = [100.0]
-    monkeypatch.setattr(module.time, "perf_counter", lambda: now[0])
+    clock_time = [100.0]
+    monkeypatch.setattr(module.time, "perf_counter", lambda: clock_time[0])
     text = io.StringIO()
     with RunProgress("model", Console(file=text, width=200)) as progress:
-        now[0] += spent
+        clock_time[0] += elapsed
         progress(1.0, fraction, 3.0)
     assert f"t = 1 s, 3 x real time, {message}" in text.getvalue()
 
@@ -29,20 +29,20 @@ def test_a_long_run_shows_the_remaining_time(
 def test_the_speed_relative_to_real_time_is_shown(
     factor: float, message: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    now = [100.0]
-    monkeypatch.setattr(module.time, "perf_counter", lambda: now[0])
+    clock_time = [100.0]
+    monkeypatch.setattr(module.time, "perf_counter", lambda: clock_time[0])
     text = io.StringIO()
     with RunProgress("model", Console(file=text, width=200)) as progress:
-        now[0] += 60.0
+        clock_time[0] += 60.0
         progress(1.0, 0.5, factor)
     assert f"t = 1 s, {message} x real time" in text.getvalue()
 
 
 def test_a_run_that_is_nearly_finished_shows_no_remaining_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    now = [100.0]
-    monkeypatch.setattr(module.time, "perf_counter", lambda: now[0])
+    clock_time = [100.0]
+    monkeypatch.setattr(module.time, "perf_counter", lambda: clock_time[0])
     text = io.StringIO()
     with RunProgress("model", Console(file=text, width=200)) as progress:
-        now[0] += 5.0
+        clock_time[0] += 5.0
         progress(1.0, 0.9, 3.0)
     assert "left" not in text.getvalue()

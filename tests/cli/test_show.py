@@ -12,7 +12,7 @@ from armblocks.robot.dh_table import dh_table, kinematics_text
 from armblocks.spatial import transl
 
 
-def printed(robot: Robot, width: int = 80) -> str:
+def printed_robot(robot: Robot, width: int = 80) -> str:
     stream = io.StringIO()
     print_robot(robot, Console(width=width, file=stream, highlight=False, markup=False))
     return stream.getvalue()
@@ -34,7 +34,7 @@ def tree() -> Robot:
 
 
 def test_a_tree_is_printed_by_parents_and_axes(tree: Robot) -> None:
-    lines = [" ".join(line.split()) for line in printed(tree).splitlines()]
+    lines = [" ".join(line.split()) for line in printed_robot(tree).splitlines()]
     assert "torso (3 axis, PRR)" in lines
     assert "trunk (base) prismatic 0 0 1 0, 0, 0.5" in lines
     assert "right trunk revolute 0 1 0 0, -0.2, 0" in lines
@@ -48,12 +48,12 @@ def test_a_tree_as_text_has_a_line_for_each_link(tree: Robot) -> None:
 
 
 def test_a_prismatic_joint_has_limits_in_metres(tree: Robot) -> None:
-    lines = [" ".join(line.split()) for line in printed(tree).splitlines()]
+    lines = [" ".join(line.split()) for line in printed_robot(tree).splitlines()]
     assert "trunk -0.5 m 1.25 m 2 m/s 300 N" in lines
 
 
 def test_a_base_that_is_not_the_identity_is_printed(tree: Robot) -> None:
-    text = printed(tree)
+    text = printed_robot(tree)
     assert "base =\n" in text
     assert "tool = identity" in text
 
@@ -68,7 +68,7 @@ def test_the_header_names_modified_denavit_hartenberg_parameters() -> None:
     robot = Robot(
         name="craig", links=(modified_dh("one", alpha=0.5), modified_dh("two", parent="one", a=1.0))
     )
-    assert printed(robot).startswith("craig (2 axis, RR, modDH)\n")
+    assert printed_robot(robot).startswith("craig (2 axis, RR, modDH)\n")
 
 
 @pytest.mark.parametrize("width", [60, 80, 160])
@@ -76,7 +76,7 @@ def test_the_names_of_many_links_are_wrapped_to_the_width(width: int) -> None:
     links = tuple(
         standard_dh(f"link{k}", a=0.1, mass=1.0 + k, parent=f"link{k - 1}" if k else None) for k in range(20)
     )
-    text = printed(Robot(name="snake", links=links), width)
+    text = printed_robot(Robot(name="snake", links=links), width)
     assert max(len(line.rstrip()) for line in text.splitlines()) <= max(
         width, 66
     )  # the D-H table with these names is 65 columns wide

@@ -1,5 +1,4 @@
-"""Hand-written files for ``armblocks run``: invalid files are refused, valid files agree with closed
-forms."""
+"""Diagram files for ``armblocks run``: invalid ones are refused, valid ones agree with closed forms."""
 
 from __future__ import annotations
 
@@ -29,12 +28,12 @@ def block(kind: str, **parameters: Any) -> dict[str, Any]:
     return {"type": kind, "parameters": parameters}
 
 
-FED = {"c": block("Constant", value=1.0), "x": block("Integrator")}
+DRIVEN_INTEGRATOR = {"c": block("Constant", value=1.0), "x": block("Integrator")}
 
-HOSTILE: dict[str, tuple[str | bytes, str]] = {
+INVALID_FILES: dict[str, tuple[str | bytes, str]] = {
     "nothing": ("", "tried.json"),
     "a list": ("[1, 2, 3]", "tried.json:1"),
-    "another alphabet": (document(FED, "c/y -> x/u").encode("utf-16"), "not UTF-8"),
+    "another alphabet": (document(DRIVEN_INTEGRATOR, "c/y -> x/u").encode("utf-16"), "not UTF-8"),
     "a key twice": ('{"format": 1, "format": 1, "name": "a", "blocks": {}}', "'format'"),
     "not a number": (document({"c": block("Constant", value=math.nan)}), "NaN"),
     "too large a number": (
@@ -49,9 +48,9 @@ HOSTILE: dict[str, tuple[str | bytes, str]] = {
         "did you mean 'value'?",
     ),
     "text in place of a number": (document({"c": block("Constant", value="one")}), "c"),
-    "a connection without an arrow": (document(FED, "c/y to x/u"), "c/y to x/u"),
-    "a connection to an unknown port": (document(FED, "c/y -> x/v"), "'v'"),
-    "a connection to an unknown block": (document(FED, "c/y -> z/u"), "'z'"),
+    "a connection without an arrow": (document(DRIVEN_INTEGRATOR, "c/y to x/u"), "c/y to x/u"),
+    "a connection to an unknown port": (document(DRIVEN_INTEGRATOR, "c/y -> x/v"), "'v'"),
+    "a connection to an unknown block": (document(DRIVEN_INTEGRATOR, "c/y -> z/u"), "'z'"),
     "a name with a slash": (document({"a/b": block("Constant")}), "'/'"),
     "code in a formula": (
         document({"c": block("Clock"), "f": block("Expression", formula="open('x','w')")}, "c/y -> f/u"),
@@ -71,12 +70,15 @@ HOSTILE: dict[str, tuple[str | bytes, str]] = {
         document({"c": block("Clock"), "f": block("ToFile", file="../../stolen.csv")}, "c/y -> f/u"),
         "stolen.csv",
     ),
-    "an infinite stop time": (document(FED, "c/y -> x/u", settings={"stop_time": "inf"}), "stop_time"),
-    "a tolerance of zero": (document(FED, "c/y -> x/u", settings={"rtol": 0}), "rtol"),
+    "an infinite stop time": (
+        document(DRIVEN_INTEGRATOR, "c/y -> x/u", settings={"stop_time": "inf"}),
+        "stop_time",
+    ),
+    "a tolerance of zero": (document(DRIVEN_INTEGRATOR, "c/y -> x/u", settings={"rtol": 0}), "rtol"),
 }
 
 
-@pytest.mark.parametrize(("content", "words"), HOSTILE.values(), ids=HOSTILE.keys())
+@pytest.mark.parametrize(("content", "words"), INVALID_FILES.values(), ids=INVALID_FILES.keys())
 def test_a_bad_file_is_refused_with_one_message_and_writes_nothing(
     content: str | bytes, words: str, invoke: Callable[..., Result], tmp_path: Path
 ) -> None:
@@ -99,7 +101,9 @@ def test_a_bad_file_is_refused_with_one_message_and_writes_nothing(
 
 SAMPLES = {"stop_time": 5.0, "sample_time": 0.25}
 
-GOOD: dict[str, tuple[str, Callable[[Signals], tuple[NDArray[np.float64], NDArray[np.float64]]], float]] = {
+VALID_FILES: dict[
+    str, tuple[str, Callable[[Signals], tuple[NDArray[np.float64], NDArray[np.float64]]], float]
+] = {
     "the integral of a sine": (
         document({"s": block("SineWave"), "x": block("Integrator")}, "s/y -> x/u", settings=SAMPLES),
         lambda s: (s["x/y"], 1 - np.cos(s["time"])),
@@ -240,7 +244,7 @@ GOOD: dict[str, tuple[str, Callable[[Signals], tuple[NDArray[np.float64], NDArra
 }
 
 
-@pytest.mark.parametrize(("content", "compare", "error"), GOOD.values(), ids=GOOD.keys())
+@pytest.mark.parametrize(("content", "compare", "error"), VALID_FILES.values(), ids=VALID_FILES.keys())
 def test_the_run_of_a_good_file_agrees_with_its_closed_form(
     content: str, compare: Any, error: float, invoke: Callable[..., Result], tmp_path: Path
 ) -> None:

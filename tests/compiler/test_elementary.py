@@ -38,7 +38,7 @@ def uniform(low: float, high: float) -> Values:
 ANGLES = np.concatenate(
     [powers(-40, 31), powers(31, 1023.9), uniform(-10, 10), [6381956970095103.0 * 2.0**797]]
 )
-UNIT = np.concatenate([uniform(-1, 1), np.abs(powers(-50, 0)), 1 - np.abs(powers(-52, -1))])
+UNIT_INTERVAL = np.concatenate([uniform(-1, 1), np.abs(powers(-50, 0)), 1 - np.abs(powers(-52, -1))])
 HYPERBOLIC = np.concatenate([uniform(-3, 3), powers(-60, 9.46)])
 PAIRS = (
     np.concatenate([powers(-3, 3), powers(-500, 500)]),
@@ -50,8 +50,8 @@ CASES: dict[str, tuple[Opcode, Callable[..., Any], tuple[Values, ...], float]] =
     "sin": (Opcode.SIN, np.sin, (ANGLES,), 1.1),
     "cos": (Opcode.COS, np.cos, (ANGLES,), 1.1),
     "tan": (Opcode.TAN, np.tan, (ANGLES,), 1.5),
-    "asin": (Opcode.ASIN, np.arcsin, (UNIT,), 1.0),
-    "acos": (Opcode.ACOS, np.arccos, (np.concatenate([UNIT, -UNIT]),), 1.0),
+    "asin": (Opcode.ASIN, np.arcsin, (UNIT_INTERVAL,), 1.0),
+    "acos": (Opcode.ACOS, np.arccos, (np.concatenate([UNIT_INTERVAL, -UNIT_INTERVAL]),), 1.0),
     "atan": (Opcode.ATAN, np.arctan, (np.concatenate([uniform(-4, 4), powers(-60, 60)]),), 1.0),
     "atan2": (Opcode.ATAN2, np.arctan2, PAIRS, 1.0),
     "sinh": (Opcode.SINH, np.sinh, (HYPERBOLIC,), 1.0),
@@ -59,7 +59,7 @@ CASES: dict[str, tuple[Opcode, Callable[..., Any], tuple[Values, ...], float]] =
     "tanh": (Opcode.TANH, np.tanh, (HYPERBOLIC,), 1.0),
     "asinh": (Opcode.ASINH, np.arcsinh, (np.concatenate([uniform(-3, 3), powers(-60, 1000)]),), 1.0),
     "acosh": (Opcode.ACOSH, np.arccosh, (1 + np.abs(powers(-50, 1000)),), 1.0),
-    "atanh": (Opcode.ATANH, np.arctanh, (UNIT,), 1.0),
+    "atanh": (Opcode.ATANH, np.arctanh, (UNIT_INTERVAL,), 1.0),
     "exp": (Opcode.EXP, np.exp, (np.concatenate([uniform(-3, 3), uniform(-708, 709.7)]),), 1.0),
     "expm1": (Opcode.EXPM1, np.expm1, (np.concatenate([powers(-60, 2), uniform(-708, 709.7)]),), 1.0),
     "log": (
@@ -71,14 +71,14 @@ CASES: dict[str, tuple[Opcode, Callable[..., Any], tuple[Values, ...], float]] =
     "log1p": (
         Opcode.LOG1P,
         np.log1p,
-        (np.concatenate([np.abs(powers(-60, 1000)), -(UNIT[:COUNT] ** 2)]),),
+        (np.concatenate([np.abs(powers(-60, 1000)), -(UNIT_INTERVAL[:COUNT] ** 2)]),),
         0.6,
     ),
     "hypot": (Opcode.HYPOT, np.hypot, PAIRS, 0.6),
 }
 
 
-def units_off(actual: Values, reference: NDArray[np.longdouble]) -> Values:
+def errors_in_units(actual: Values, reference: NDArray[np.longdouble]) -> Values:
     """Return errors in units in the last place of the result."""
     size = np.spacing(np.abs(reference).astype(np.float64))
     return np.abs((actual.astype(np.longdouble) - reference) / size).astype(np.float64)
@@ -92,14 +92,17 @@ def test_errors_stay_below_two_units_in_the_last_place(name: str) -> None:
         np.abs(extended) > 1e-300
     )  # smaller results are close to the subnormal range, where a unit is relatively large
     actual = native(single_operation(opcode), 8)(*arguments)
-    error = units_off(actual, extended)[ordinary]
+    error = errors_in_units(actual, extended)[ordinary]
     assert error.max() < allowed + (0.0 if EXTENDED else 1.0)
 
 
 def test_error_function_is_within_two_units_of_the_c_library() -> None:
     x = np.concatenate([uniform(-6.5, 6.5), powers(-60, 3)])
     reference = np.array([math.erf(value) for value in x])
-    assert units_off(native(single_operation(Opcode.ERF), 8)(x), reference.astype(np.longdouble)).max() < 2.0
+    assert (
+        errors_in_units(native(single_operation(Opcode.ERF), 8)(x), reference.astype(np.longdouble)).max()
+        < 2.0
+    )
 
 
 def test_powers_are_within_one_unit() -> None:
@@ -109,14 +112,14 @@ def test_powers_are_within_one_unit() -> None:
         extended = base.astype(np.longdouble) ** exponent.astype(np.longdouble)
     ordinary = (extended > 1e-300) & (extended < 1e300)
     actual = native(single_operation(Opcode.POWER), 8)(base, exponent)
-    error = units_off(actual[ordinary], extended[ordinary])
+    error = errors_in_units(actual[ordinary], extended[ordinary])
     assert error.max() < (1.0 if EXTENDED else 2.0)
 
 
 def test_angles_next_to_a_multiple_of_a_right_angle_are_reduced_exactly() -> None:
     # The double nearest to a multiple of pi/2 (Muller, Elementary Functions, 2016, chapter 11).
-    worst = np.array([6381956970095103.0 * 2.0**797])
-    cosine = native(single_operation(Opcode.COS), 1)(worst)
+    hardest_angle = np.array([6381956970095103.0 * 2.0**797])
+    cosine = native(single_operation(Opcode.COS), 1)(hardest_angle)
     np.testing.assert_allclose(cosine, [-4.6871659242546277e-19], rtol=2e-16)
     near = np.array([np.pi, 2 * np.pi, 1e6 * np.pi, 1e9 * np.pi, 1e15 * np.pi, 1e22])
     expected = [math.sin(value) for value in near]

@@ -213,7 +213,7 @@ def test_arguments_outside_the_fast_path_are_passed_to_the_fallback(kernel: Kern
         calls.append((arguments, options))
         return "fallback"
 
-    builtin = kernel.entry_before(fallback)
+    builtin = kernel.entry_with_fallback(fallback)
     a, b = arguments(6)
     assert same_bits(builtin(a, b), kernel(a, b))
     assert builtin(a, b, payload=3) == "fallback"
@@ -226,14 +226,14 @@ def test_errors_of_the_fallback_pass_through(kernel: Kernel) -> None:
         raise ZeroDivisionError("from the fallback")
 
     with pytest.raises(ZeroDivisionError, match="from the fallback"):
-        kernel.entry_before(fallback)(1)
+        kernel.entry_with_fallback(fallback)(1)
 
 
 def test_with_an_unknown_binary_interface_the_kernel_itself_is_called(
     kernel: Kernel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(entry, "_addresses", lambda: None)
-    called = kernel.entry_before(kernel)
+    called = kernel.entry_with_fallback(kernel)
     assert called is kernel
     a, b = arguments(7)
     assert same_bits(called(a, b), kernel.entry(a, b))
@@ -248,7 +248,7 @@ def test_wrong_offsets_of_the_array_structure_are_detected(monkeypatch: pytest.M
         entry._addresses.cache_clear()
 
 
-def test_random_mixtures_of_arguments(kernel: Kernel) -> None:
+def test_random_arguments_give_the_results_and_errors_of_the_kernel(kernel: Kernel) -> None:
     rng = np.random.default_rng(8)
     pool = [*odd_arguments().values(), np.zeros(2), None, "x", 1.0, *arguments(9)]
     for _ in range(300):
@@ -332,7 +332,7 @@ def test_batches_and_options_do_not_call_python(kernel: Kernel, several: Kernel)
     def fallback(*arguments: object, **options: object) -> None:
         raise AssertionError(f"{arguments} {options}")
 
-    builtin = kernel.entry_before(fallback)
+    builtin = kernel.entry_with_fallback(fallback)
     a, b = arguments(10)
     out = np.empty(11)
     assert builtin(a, b, out=out, threads=1) is out
@@ -347,11 +347,11 @@ def test_batches_and_options_do_not_call_python(kernel: Kernel, several: Kernel)
             assert same_bits(out, expected)
     t = np.arange(5.0)
     expected = several(t, np.eye(2))
-    actual = several.entry_before(fallback)(t, np.eye(2))
+    actual = several.entry_with_fallback(fallback)(t, np.eye(2))
     assert all(map(same_bits, actual, expected))
 
 
-def test_batches_of_several_threads_at_the_same_time(kernel: Kernel) -> None:
+def test_simultaneous_batches_of_several_threads_are_correct(kernel: Kernel) -> None:
     a, b = (np.random.default_rng(k).normal(size=(600, 3)) for k in (1, 2))
     expected = kernel(a, b)
     results: list[np.ndarray] = []

@@ -37,31 +37,31 @@ def test_compiled_code_agrees_with_interpreter_and_casadi(kernel: Kernel) -> Non
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 7, 8, 9, 15, 16, 17, 100])
 def test_a_batch_equals_single_calls_bit_for_bit(kernel: Kernel, count: int) -> None:
     a, b = samples(count)
-    together = kernel(a, b)
-    assert together.shape == (count, 11)
+    batch = kernel(a, b)
+    assert batch.shape == (count, 11)
     for k in range(count):
-        assert same_bits(together[k], kernel(a[k], b[k]))
-        assert same_bits(together[k], kernel.entry(a[k], b[k]))
-    assert same_bits(kernel.columns(a, b), together.T.copy())
+        assert same_bits(batch[k], kernel(a[k], b[k]))
+        assert same_bits(batch[k], kernel.entry(a[k], b[k]))
+    assert same_bits(kernel.columns(a, b), batch.T.copy())
 
 
 def test_a_huge_angle_or_a_nan_does_not_affect_other_samples(kernel: Kernel) -> None:
     a, b = samples(64)
-    clean = kernel(a, b)
+    without_special_values = kernel(a, b)
     a[5, 0], a[20, 1], b[33, 2], a[50, 2] = 1e300, np.nan, np.inf, 1e18
-    mixed_up = kernel(a, b)
+    with_special_values = kernel(a, b)
     others = np.setdiff1d(np.arange(64), [5, 20, 33, 50])
-    assert same_bits(mixed_up[others], clean[others])
+    assert same_bits(with_special_values[others], without_special_values[others])
     for k in (5, 20, 33, 50):
-        assert same_bits(mixed_up[k], kernel(a[k], b[k]))
+        assert same_bits(with_special_values[k], kernel(a[k], b[k]))
 
 
 def test_the_number_of_threads_does_not_change_the_bits(kernel: Kernel) -> None:
     a, b = samples(20_011)
-    once = kernel(a, b)
+    single_thread = kernel(a, b)
     for threads in (2, 3, 8):
-        assert same_bits(kernel(a, b, threads=threads), once)
-        assert same_bits(kernel.columns(a, b, threads=threads), once.T.copy())
+        assert same_bits(kernel(a, b, threads=threads), single_thread)
+        assert same_bits(kernel.columns(a, b, threads=threads), single_thread.T.copy())
 
 
 def test_calls_from_many_threads_at_once_are_safe() -> None:
@@ -87,8 +87,8 @@ def test_an_input_of_one_sample_is_broadcast(kernel: Kernel) -> None:
 
 def test_columns_accepts_arrays_in_column_major_order(kernel: Kernel) -> None:
     a, b = samples(37)
-    turned = np.asfortranarray(a)
-    assert same_bits(kernel.columns(turned, b), kernel.columns(a, b))
+    column_major = np.asfortranarray(a)
+    assert same_bits(kernel.columns(column_major, b), kernel.columns(a, b))
     assert kernel.columns(a[0], b[0]).shape == (11,)
 
 
@@ -131,7 +131,7 @@ def test_rows_of_every_width_are_transposed_into_lanes(size: int) -> None:
         assert np.array_equal(kernel.columns(a), np.roll(a, -1, axis=1).T)
 
 
-def test_a_kernel_with_several_outputs_and_matrices() -> None:
+def test_a_kernel_with_several_outputs_and_matrices_agrees_with_numpy() -> None:
     inputs = signature(("t", ()), ("A", (2, 3)), ("none", (0,)))
     outputs = signature(("B", (3, 2)), ("s", ()), ("empty", (0,)), ("stack", (2, 1, 3)))
 
@@ -225,6 +225,6 @@ def test_random_arithmetic_equals_the_interpreter_bit_for_bit(trees: list[object
     a, b = rng.normal(size=(21, 3)), rng.normal(size=(21, 2))
     a[3], b[4], a[7, 1], b[8] = 0.0, -0.0, np.inf, np.nan
     expected = interpret(kernel.tape, [a, b])[0]
-    together = kernel(a, b)
-    assert same_bits(together, expected)
+    batch = kernel(a, b)
+    assert same_bits(batch, expected)
     assert all(same_bits(kernel(a[k], b[k]), expected[k]) for k in range(21))

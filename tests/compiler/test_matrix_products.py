@@ -8,7 +8,7 @@ from casadi import SX, mtimes, sum1, vertcat
 
 from armblocks.compiler import compile_function
 from armblocks.compiler.interpret import interpret, multiply_add
-from armblocks.compiler.matrix_products import FEWEST_ENTRIES, MOST_ROWS
+from armblocks.compiler.matrix_products import MAX_ROWS, MIN_ENTRIES
 from armblocks.compiler.opcodes import Opcode
 from armblocks.compiler.tape import Tape
 from armblocks.equations import Signature, Slot, TracedFunction
@@ -34,7 +34,7 @@ def traced(m: int, n: int) -> TracedFunction:
     return TracedFunction.trace("products", inputs, outputs, equations)
 
 
-def chained(A: np.ndarray, x: np.ndarray, start: np.ndarray | None) -> np.ndarray:
+def sum_in_order(A: np.ndarray, x: np.ndarray, start: np.ndarray | None) -> np.ndarray:
     """``start + A x`` term by term; without ``start`` the sum begins with -0, which changes no product."""
     total = np.full(len(A), -0.0) if start is None else start
     for j, factor in enumerate(x):
@@ -57,25 +57,25 @@ def test_a_product_equals_the_sum_of_its_terms_in_order_bit_for_bit(m: int, n: i
     plain, added, bent, twice = kernel(x, p, c)
     A = p[2 : 2 + m * n].reshape(m, n)
     for k in range(samples):
-        np.testing.assert_array_equal(plain[k], chained(A, x[k], None))
-        np.testing.assert_array_equal(np.signbit(plain[k]), np.signbit(chained(A, x[k], None)))
-        np.testing.assert_array_equal(added[k], chained(A, x[k, ::-1], c[k]))
+        np.testing.assert_array_equal(plain[k], sum_in_order(A, x[k], None))
+        np.testing.assert_array_equal(np.signbit(plain[k]), np.signbit(sum_in_order(A, x[k], None)))
+        np.testing.assert_array_equal(added[k], sum_in_order(A, x[k, ::-1], c[k]))
     np.testing.assert_allclose(bent, x**2 @ A.T + p[0] * c, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(twice, np.outer(plain.sum(axis=1), A.sum(axis=1)), rtol=1e-9, atol=1e-9)
-    every = (plain, added, bent, twice)
+    expected = (plain, added, bent, twice)
     single = [np.array(results) for results in zip(*(kernel(x[k], p, c[k]) for k in range(samples)))]
-    own = np.tile(p, (samples, 1))
-    for other in (single, kernel(x, own, c), [part.T for part in kernel.columns(x, p, c)]):
-        for results, known in zip(other, every):
+    repeated_parameters = np.tile(p, (samples, 1))
+    for other in (single, kernel(x, repeated_parameters, c), [part.T for part in kernel.columns(x, p, c)]):
+        for results, known in zip(other, expected):
             np.testing.assert_array_equal(results, known)
-    read = interpret(kernel.tape, [x, p, c])
-    np.testing.assert_array_equal(read[0], plain)
-    np.testing.assert_array_equal(read[1], added)
+    interpreted = interpret(kernel.tape, [x, p, c])
+    np.testing.assert_array_equal(interpreted[0], plain)
+    np.testing.assert_array_equal(interpreted[1], added)
 
 
 def test_small_matrices_are_not_replaced_by_products() -> None:
     n = 15
-    assert n * n < FEWEST_ENTRIES
+    assert n * n < MIN_ENTRIES
     ends = Signature((Slot("A", (n, n)), Slot("x", (n,)))), Signature((Slot("y", (n,)),))
     kernel = compile_function(TracedFunction.trace("small", *ends, lambda A, x: [mtimes(A, x)]))
     opcodes = [operation.opcode for operation in kernel.tape.operations]
@@ -84,13 +84,13 @@ def test_small_matrices_are_not_replaced_by_products() -> None:
 
 
 def test_a_tall_matrix_is_split_into_several_products() -> None:
-    m, n = MOST_ROWS + 9, 30
+    m, n = MAX_ROWS + 9, 30
     ends = Signature((Slot("A", (m, n)), Slot("x", (n,)))), Signature((Slot("y", (m,)),))
     kernel = compile_function(TracedFunction.trace("tall", *ends, lambda A, x: [mtimes(A, x)]))
     random = np.random.default_rng(5)
     A, x = random.normal(size=(m, n)), random.normal(size=n)
     assert [operation.opcode for operation in kernel.tape.operations].count(Opcode.PRODUCT) == 2
-    np.testing.assert_array_equal(kernel(A, x), chained(A, x, None))
+    np.testing.assert_array_equal(kernel(A, x), sum_in_order(A, x, None))
 
 
 def test_the_operation_count_of_a_product_is_that_of_its_multiply_adds() -> None:

@@ -16,7 +16,7 @@ from armblocks.compiler.interpret import interpret
 from armblocks.compiler.ir_text import Module
 from armblocks.compiler.llvm_ir import emit_function
 from armblocks.compiler.native import Effort, compile_object, load_code
-from armblocks.compiler.pieces import ACCESS_WEIGHT, LENGTH, cut, is_long
+from armblocks.compiler.pieces import ACCESS_WEIGHT, PIECE_WEIGHT, divide, is_long
 from armblocks.compiler.target import Target
 from armblocks.equations import TracedFunction, signature
 from armblocks.errors import InputError
@@ -58,7 +58,9 @@ def _count(count: int) -> list[int]:
     return [*range(0, total, 7), -1, -2]
 
 
-def test_a_long_function_in_pieces_equals_the_uncut_one_bit_for_bit(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_function_in_pieces_equals_the_undivided_one_bit_for_bit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     traced = long_function(600)
     tape = tape_from(traced)
     assert is_long(tape)
@@ -71,7 +73,7 @@ def test_a_long_function_in_pieces_equals_the_uncut_one_bit_for_bit(monkeypatch:
     singles = [divided(x[row], u[row]) for row in range(21)]
     message = [interpret(tape, [x[row], u[row]]) for row in (0, 7, 19)]
     monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
-    monkeypatch.setattr(pieces, "LONGEST", 10**9)
+    monkeypatch.setattr(pieces, "MAX_WEIGHT", 10**9)
     whole = compile_function(traced)(x, u)
     for slot in (0, 1):
         np.testing.assert_array_equal(actual[slot], whole[slot])
@@ -86,25 +88,25 @@ def test_every_operation_and_store_is_in_one_piece_of_limited_length() -> None:
     stores = {
         k: (register,) for k, register in enumerate(register for part in tape.outputs for register in part)
     }
-    division = cut(tape, stores)
+    division = divide(tape, stores)
     operations = [k for piece in division.pieces for k in range(piece.first, piece.last)]
     assert operations == list(range(len(tape.operations)))
     assert sorted(k for piece in division.pieces for k in piece.stores) == sorted(stores)
     for piece in division.pieces:
-        assert piece.last - piece.first + ACCESS_WEIGHT * len(piece.stores) <= 2 * LENGTH
+        assert piece.last - piece.first + ACCESS_WEIGHT * len(piece.stores) <= 2 * PIECE_WEIGHT
     # Storage is reused: the last 300 values are in use, not all 1500.
-    assert division.size < 2 * LAG + LENGTH
+    assert division.size < 2 * LAG + PIECE_WEIGHT
 
 
-@pytest.mark.parametrize("effort", ["LONG", "VERY_LONG"])
+@pytest.mark.parametrize("effort", ["LONG_MODULE", "VERY_LONG_MODULE"])
 def test_less_optimisation_does_not_change_the_bits(effort: str, monkeypatch: pytest.MonkeyPatch) -> None:
     traced = long_function(600)
     x, u = np.random.default_rng(1).normal(size=(2, 11, 3))
     expected = divided_function()(x[:, :2], u)
     monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
-    monkeypatch.setattr(native, "LONG", 0)
-    if effort == "VERY_LONG":
-        monkeypatch.setattr(native, "VERY_LONG", 0)
+    monkeypatch.setattr(native, "LONG_MODULE", 0)
+    if effort == "VERY_LONG_MODULE":
+        monkeypatch.setattr(native, "VERY_LONG_MODULE", 0)
     quick = compile_function(traced)(x[:, :2], u)
     for one, other in zip(expected, quick):
         np.testing.assert_array_equal(one, other)
@@ -153,5 +155,5 @@ def test_an_environment_variable_limits_the_optimisation_effort(monkeypatch: pyt
         load_code(("empty",), lambda: "")
 
 
-def test_the_longest_uncut_function_is_at_least_twice_as_long_as_a_piece() -> None:
-    assert pieces.LONGEST >= 2 * LENGTH
+def test_the_longest_undivided_function_is_at_least_twice_as_long_as_a_piece() -> None:
+    assert pieces.MAX_WEIGHT >= 2 * PIECE_WEIGHT

@@ -9,7 +9,7 @@ import pytest
 from small_functions import mixed, same_bits
 
 from armblocks.compiler import compile_function
-from armblocks.compiler.result_memory import LARGE, ResultMemory, new_result, result_memory
+from armblocks.compiler.result_memory import MIN_REUSED, ResultMemory, new_result, result_memory
 
 
 def address(array: np.ndarray) -> int:
@@ -83,8 +83,8 @@ def test_no_two_results_share_memory() -> None:
 
 
 def test_small_results_own_their_memory() -> None:
-    assert new_result((LARGE - 1,)).flags.owndata
-    assert not new_result((LARGE,)).flags.owndata
+    assert new_result((MIN_REUSED - 1,)).flags.owndata
+    assert not new_result((MIN_REUSED,)).flags.owndata
 
 
 @pytest.fixture
@@ -99,7 +99,7 @@ def no_collection() -> Iterator[None]:
 def test_large_batches_in_pool_memory_are_correct() -> None:
     kernel = compile_function(mixed())
     rng = np.random.default_rng(1)
-    count = LARGE // 11 + 100
+    count = MIN_REUSED // 11 + 100
     a, b = rng.normal(size=(count, 3)), rng.normal(size=(count, 3))
     expected = kernel.entry(a, b, out=np.empty((count, 11)))
     first = kernel.entry(a, b)

@@ -78,5 +78,5 @@ def test_a_computed_table_is_refused() -> None:
         Signature((Slot("entry", ()),)),
         equations,
     )
-    with pytest.raises(CompileError, match=r"a table that is not a parameter.*give the numbers"):
+    with pytest.raises(CompileError, match=r"a table that is not a parameter.*pass the table as a parameter"):
         compile_function(function)

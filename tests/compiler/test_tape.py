@@ -111,11 +111,11 @@ def test_bytes_and_digest_identify_a_tape() -> None:
 
 @pytest.mark.parametrize("cut", [0, 10, 60, -8, -1])
 def test_damaged_bytes_are_refused(cut: int) -> None:
-    with pytest.raises(CompileError, match=r"these bytes are not a tape.*what Tape\.to_bytes gave"):
+    with pytest.raises(CompileError, match=r"these bytes are not a tape.*bytes from Tape\.to_bytes"):
         Tape.from_bytes(tape_from(mixed()).to_bytes()[:cut])
 
 
-def test_the_operation_count_of_a_tape() -> None:
+def test_the_operation_count_of_a_tape_is_that_of_its_operations() -> None:
     tape = tape_from(mixed())
     count = tape.count
     assert dict(count.functions) == {

@@ -27,8 +27,8 @@ from armblocks.diagram import (
 )
 from armblocks.diagram.block_equations import BlockEquations, Group
 from armblocks.diagram.features import Arguments, SlotKind, features_of
-from armblocks.diagram.flat_values import natural, spread, tunable_slots
-from armblocks.diagram.implicit import steps_with
+from armblocks.diagram.flat_values import broadcast_column, named_values, tunable_slots
+from armblocks.diagram.implicit import has_discontinuity
 from armblocks.equations import Slot
 from armblocks.errors import InputError
 from armblocks.face.model import compile_diagram
@@ -50,8 +50,8 @@ ROBOT = Robot(
     ),
 )
 
-KINDS = list(BLOCKS.values())
-each_kind = pytest.mark.parametrize("kind", KINDS, ids=BLOCKS)
+BLOCK_TYPES = list(BLOCKS.values())
+each_block_type = pytest.mark.parametrize("kind", BLOCK_TYPES, ids=BLOCKS)
 """Parametrizes slow tests by block type; fast tests loop over all block types in one test."""
 
 
@@ -62,7 +62,7 @@ def make(kind: type[Block], **values: object) -> Block:
 
 
 def test_every_block_is_pickled() -> None:
-    for kind in KINDS:
+    for kind in BLOCK_TYPES:
         block = make(kind)
         assert pickle.loads(pickle.dumps(block)) == block, kind.type_name()
 
@@ -89,14 +89,14 @@ def all_equations(block: Block, shapes: Shapes) -> Function:
     features = features_of(block, shapes)
     states = (*features.states, *features.discrete, *features.modes, *features.conditions, *features.delays)
     rates = [Slot(f"{name}'", shapes[name]) for name in features.differentiated_inputs]
-    ends = [
+    arguments = [
         [Slot(state.name, state.shape) for state in states],
         [Slot(name, shape) for name, shape in shapes.items()] + rates,
         [Slot(guard.name, guard.shape) for guard in features.guards],
         list(tunable_slots(block)),
     ]
-    t, *symbols = SX.sym("t"), *(SX.sym("s", sum(slot.size for slot in slots)) for slots in ends)
-    x, u, e, p = (dict(natural(slots, symbol)) for slots, symbol in zip(ends, symbols))
+    t, *symbols = SX.sym("t"), *(SX.sym("s", sum(slot.size for slot in slots)) for slots in arguments)
+    x, u, e, p = (dict(named_values(slots, symbol)) for slots, symbol in zip(arguments, symbols))
     if block.sampled:
         p["T"] = SX(0.1)
     results = [
@@ -104,26 +104,27 @@ def all_equations(block: Block, shapes: Shapes) -> Function:
         for kind, equation in features.equations.items()
         if kind is not SlotKind.RESET or features.guards
     ]
-    results += [features.starts(p), features.history(p), features.held(p), features.guesses(p)]
+    results += [features.initial_states(p), features.initial_history(p)]
+    results += [features.initial_outputs(p), features.initial_guesses(p)]
     results += [{name: bound[k] for name, bound in features.delay_bounds(p).items()} for k in (0, 1)]
     results += [dict(enumerate(map(SX, features.breakpoints(p))))]
     return Function("f", [t, *symbols], [SX(value) for group in results for value in group.values()])
 
 
-def numbers(equations: Function, values: Block, minimum: float = 0.1) -> list[np.ndarray]:
-    """Evaluate equations at fixed pseudo-random t, x, u and the parameters of the block ``values``.
+def evaluated(equations: Function, block: Block, minimum: float = 0.1) -> list[np.ndarray]:
+    """Evaluate equations at t = 0.37, fixed pseudo-random x, u and e, and the parameters of ``block``.
 
-    States and inputs lie between ``minimum`` and ``minimum + 0.8``.
+    States, inputs and events lie between ``minimum`` and ``minimum + 0.8``.
     """
     random = np.random.default_rng(1)
-    tunables = [np.ravel(values.parameter_value(rule.name)) for rule in values.parameters() if rule.tunable]
+    tunables = [np.ravel(block.parameter_value(rule.name)) for rule in block.parameters() if rule.tunable]
     points = [0.37, *(random.uniform(minimum, minimum + 0.8, equations.numel_in(k)) for k in (1, 2, 3))]
     points.append(np.concatenate([*tunables, []]))
     return [np.asarray(value) for value in equations.call([np.asarray(point) for point in points])]
 
 
 def test_every_block_has_a_title_and_a_summary_of_one_line() -> None:
-    for kind in KINDS:
+    for kind in BLOCK_TYPES:
         assert kind.summary().endswith((".", "…")), kind
         assert "\n" not in kind.summary(), kind
         assert kind.title, kind
@@ -131,7 +132,7 @@ def test_every_block_has_a_title_and_a_summary_of_one_line() -> None:
 
 
 def test_every_block_is_exported_by_its_name() -> None:
-    for kind in KINDS:
+    for kind in BLOCK_TYPES:
         assert kind.type_name() in blocks.__all__
         assert getattr(blocks, kind.type_name()) is kind
 
@@ -149,7 +150,7 @@ def test_the_library_finds_every_class_with_a_title_without_importing_it() -> No
 
 
 def test_the_folder_of_every_block_is_its_family() -> None:
-    for kind in KINDS:
+    for kind in BLOCK_TYPES:
         if kind.__module__.startswith("armblocks.blocks."):
             assert kind.__module__.split(".")[2] == BLOCKS.family_of(kind)
     folders = {path.parent.name for path in Path(blocks.__file__).parent.glob("*/__init__.py")}
@@ -158,9 +159,9 @@ def test_the_folder_of_every_block_is_its_family() -> None:
 
 def test_every_block_is_immutable_and_has_no_subclasses() -> None:
     # A block type derives from Block, or from one common base class of several types in one file.
-    for kind in KINDS:
+    for kind in BLOCK_TYPES:
         (base,) = kind.__bases__
-        assert base is Block or (base.__bases__ == (Block,) and base not in KINDS), kind
+        assert base is Block or (base.__bases__ == (Block,) and base not in BLOCK_TYPES), kind
         assert [sub for sub in kind.__subclasses__() if sub.__module__.startswith("armblocks")] == [], kind
         block = make(kind)
         with pytest.raises(dataclasses.FrozenInstanceError):
@@ -168,7 +169,7 @@ def test_every_block_is_immutable_and_has_no_subclasses() -> None:
 
 
 def test_blocks_with_equal_parameters_are_equal_and_have_equal_hashes() -> None:
-    for kind in KINDS:
+    for kind in BLOCK_TYPES:
         one, other = make(kind), make(kind)
         assert one == other
         assert hash(one) == hash(other)
@@ -176,7 +177,7 @@ def test_blocks_with_equal_parameters_are_equal_and_have_equal_hashes() -> None:
 
 
 def test_ports_and_parameters_of_every_block_are_documented() -> None:
-    for kind in KINDS:
+    for kind in BLOCK_TYPES:
         block = make(kind)
         for ports in (block.input_ports(), (*block.output_ports(), *block.record_ports())):
             names = [port.name for port in ports]
@@ -187,24 +188,24 @@ def test_ports_and_parameters_of_every_block_are_documented() -> None:
 
 
 def test_a_block_built_from_its_parameter_values_is_equal() -> None:
-    for kind in KINDS:
+    for kind in BLOCK_TYPES:
         block = make(kind)
         values = {rule.name: block.parameter_value(rule.name) for rule in kind.parameters()}
         assert kind(**values) == block
 
 
-@each_kind
+@each_block_type
 def test_equations_have_the_inferred_shapes(kind: type[Block]) -> None:
     block = make(kind)
-    tried = list(fitting_shapes(block))
-    assert tried, "no input shapes fit"
+    candidates = list(fitting_shapes(block))
+    assert candidates, "no input shapes fit"
     if kind.virtual:  # a virtual block has no equations; diagram/test_hierarchy.py tests its connections
-        assert numbers(all_equations(block, tried[0]), block) == []
+        assert evaluated(all_equations(block, candidates[0]), block) == []
         return
-    for shapes in tried:
+    for shapes in candidates:
         equations = block_equations(block, shapes)
-        stated = {port.name: port.shape for port in block.output_ports() if port.shape is not None}
-        inferred = {**stated, **block.output_shapes(shapes)}
+        declared = {port.name: port.shape for port in block.output_ports() if port.shape is not None}
+        inferred = {**declared, **block.output_shapes(shapes)}
         assert set(inferred) == {port.name for port in block.output_ports()}
         traced = {
             slot.name: slot.shape
@@ -215,7 +216,7 @@ def test_equations_have_the_inferred_shapes(kind: type[Block]) -> None:
         assert traced == {name: inferred[name] for name in inferred if name not in block.time_derivatives}
 
 
-@each_kind
+@each_block_type
 def test_equations_are_pure_and_read_tunable_parameters_only_from_p(kind: type[Block]) -> None:
     block = make(kind)
     other = make(
@@ -229,27 +230,27 @@ def test_equations_are_pure_and_read_tunable_parameters_only_from_p(kind: type[B
         },
     )
     for shapes in fitting_shapes(block):
-        first = numbers(all_equations(block, shapes), block)
+        first = evaluated(all_equations(block, shapes), block)
         for repeated in (block, other):
-            for one, two in zip(first, numbers(all_equations(repeated, shapes), block), strict=True):
+            for one, two in zip(first, evaluated(all_equations(repeated, shapes), block), strict=True):
                 assert np.array_equal(one, two, equal_nan=True)
 
 
-@each_kind
+@each_block_type
 def test_initial_values_have_the_shapes_of_the_states(kind: type[Block]) -> None:
     block = make(kind)
     slots = list(tunable_slots(block))
-    p = natural(slots, SX.sym("p", sum(slot.size for slot in slots)))
+    p = named_values(slots, SX.sym("p", sum(slot.size for slot in slots)))
     for shapes in fitting_shapes(block):
         states = (*block.states(shapes), *block.discrete_states(shapes))
         start = block.initial_states(p)
         assert set(start) == {state.name for state in states}
         for state in states:
-            assert spread(SX(start[state.name]), state.shape).numel() == Slot("", state.shape).size
+            assert broadcast_column(SX(start[state.name]), state.shape).numel() == Slot("", state.shape).size
             assert state.doc
 
 
-@each_kind
+@each_block_type
 def test_every_choice_of_a_parameter_has_finite_equations(kind: type[Block]) -> None:
     for rule in kind.parameters():
         for choice in rule.choices:
@@ -257,25 +258,25 @@ def test_every_choice_of_a_parameter_has_finite_equations(kind: type[Block]) -> 
             for shapes in fitting_shapes(block):
                 # acosh is not defined below 1, asin not above
                 equations = all_equations(block, shapes)
-                tried = (numbers(equations, block, minimum) for minimum in (0.1, 1.1))
-                assert any(all(np.isfinite(value).all() for value in values) for values in tried)
+                results = (evaluated(equations, block, minimum) for minimum in (0.1, 1.1))
+                assert any(all(np.isfinite(value).all() for value in values) for values in results)
 
 
 WITHOUT_JUMPS = {
-    "MathFunction": "the cube root has the sign of its argument",
-    "Sqrt": "the signed root has the sign of its argument",
-    "T2AngleAxis": "the same angle and axis from the largest diagonal entry",
-    "T2Quaternion": "the same quaternion from its largest entry",
+    "MathFunction": "the cube root, sign(u) abs(u)^(1/3), is continuous",
+    "Sqrt": "the signed root, sign(u) sqrt(abs(u)), is continuous",
+    "T2AngleAxis": "every choice of the largest diagonal entry gives the same angle and axis",
+    "T2Quaternion": "every choice of the largest entry gives the same quaternion",
     "T2eul": "selects one of two sets of angles where the middle angle is 0",
     "T2rpy": "selects one of two sets of angles where the middle angle is 90 degrees",
-    "JacobianInverse": "selects the greatest pivot",
+    "JacobianInverse": "every choice of the pivot gives the same solution",
     "InterpolationUsingPrelookup": "its indices change at events of Prelookup",
     "VariableTransportDelay": "a transit time that is not above 0 ends the run",
 }
 """Blocks without events whose equations contain comparisons, and the reason why no jump results."""
 
 
-@each_kind
+@each_block_type
 def test_comparisons_in_outputs_change_only_at_events_or_breakpoints(kind: type[Block]) -> None:
     """The integrator would step across a jump without an event, and the error would not be reported."""
     if (
@@ -302,13 +303,15 @@ def compares_variables(group: Group, equations: BlockEquations, shapes: Shapes) 
     sizes = {state.name: math.prod(state.shape) for state in (*equations.states, *equations.discrete)}
     sizes |= {f"{name}{prime}": math.prod(shape) for name, shape in shapes.items() for prime in ("", "'")}
     names = (*group.states, *group.discrete, *group.inputs, *group.events)
-    ends = [0, *itertools.accumulate(sizes[name] for name in names)]
-    parts = dict(zip(names, vertsplit(group.z, ends))) if names else {}
-    return steps_with(group.expression, vertcat(group.t, *map(parts.get, (*group.states, *group.inputs))))
+    offsets = [0, *itertools.accumulate(sizes[name] for name in names)]
+    parts = dict(zip(names, vertsplit(group.z, offsets))) if names else {}
+    return has_discontinuity(
+        group.expression, vertcat(group.t, *map(parts.get, (*group.states, *group.inputs)))
+    )
 
 
 def test_views_of_every_block_show_existing_signals() -> None:
-    for block in map(make, KINDS):
+    for block in map(make, BLOCK_TYPES):
         ports = (*block.input_ports(), *block.output_ports(), *block.record_ports())
         for view in block.views():
             assert view.signals, block
@@ -316,13 +319,13 @@ def test_views_of_every_block_show_existing_signals() -> None:
             assert not view.labels or len(view.labels) == len(view.signals), block
 
 
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind.output_rates])
-def test_outputs_declared_as_derivatives_of_others_are_their_derivatives(
+@pytest.mark.parametrize("kind", [kind for kind in BLOCK_TYPES if kind.output_rates])
+def test_declared_derivatives_of_outputs_equal_the_computed_derivatives(
     kind: type[Block], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    claims, block, random = kind.output_rates, make(kind), np.random.default_rng(2)
+    declared, block, random = kind.output_rates, make(kind), np.random.default_rng(2)
     monkeypatch.setattr(kind, "output_rates", {})  # so that the derivative is computed
-    for port, rate in claims.items():
+    for port, rate in declared.items():
         builder = DiagramBuilder("d")
         shapes = next(fitting_shapes(block))
         sources = [
@@ -339,7 +342,7 @@ def test_outputs_declared_as_derivatives_of_others_are_their_derivatives(
 
 
 def test_default_values_have_the_shapes_of_their_symbols() -> None:
-    for block in map(make, KINDS):
+    for block in map(make, BLOCK_TYPES):
         for slot in tunable_slots(block):
             assert slot.shape == shape_of(block.parameter_value(slot.name)), block
 
@@ -350,16 +353,17 @@ def test_default_values_have_the_shapes_of_their_symbols() -> None:
 def test_signals_at_a_breakpoint_equal_those_just_after_it(kind: type[Block]) -> None:
     """The breakpoint and the condition in the outputs use the same rounded number for all parameter values.
 
-    A run continues from a breakpoint with the values at that time, and sensitivities use their jump.
+    A run continues from a breakpoint with the values at that time, and sensitivities use the jump
+    of the signals there.
     """
     system = compile_diagram(worked_example(kind)).compiled
-    random, near = np.random.default_rng(3), 2.0**-46
+    random, distance = np.random.default_rng(3), 2.0**-46
     x, z, w = (np.zeros((4, slots.size)) for slots in (system.states, system.discrete, system.algebraic))
     for _ in range(40):
         p = system.parameter_values * random.uniform(0.9, 1.1, system.parameter_values.shape)
         instants = system.breakpoints(p)
         for t in instants[np.isfinite(instants) & (instants > 0.0)]:
-            times = np.array([np.nextafter(t, 0.0), t * (1.0 - near), t, t * (1.0 + near)])
+            times = np.array([np.nextafter(t, 0.0), t * (1.0 - distance), t, t * (1.0 + distance)])
             before, earlier, at, after = system.evaluate_signals(times, x, z, w, p).T
             np.testing.assert_allclose(before, earlier, rtol=1e-9, atol=1e-9)
             np.testing.assert_allclose(at, after, rtol=1e-9, atol=1e-9)

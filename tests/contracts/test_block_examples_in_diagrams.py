@@ -30,7 +30,7 @@ SI_UNIT = re.compile(
 )
 
 
-def changed(rule: Parameter, value: object) -> np.ndarray:
+def changed_value(rule: Parameter, value: object) -> np.ndarray:
     """Return a slightly changed value within the bounds of a tunable parameter; infinity is not changed."""
     array = np.asarray(value, dtype=np.float64)
     finite = np.where(np.isfinite(array), array, 0.0)
@@ -61,7 +61,7 @@ def test_a_run_with_changed_parameters_equals_that_of_the_rebuilt_diagram(kind: 
     diagram = worked_example(kind)
     block = diagram.blocks[diagram.name]
     values = {
-        f"{diagram.name}.{rule.name}": changed(rule, block.parameter_value(rule.name))
+        f"{diagram.name}.{rule.name}": changed_value(rule, block.parameter_value(rule.name))
         for rule in kind.parameters()
         if rule.tunable
     }

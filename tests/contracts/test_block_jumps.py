@@ -1,7 +1,7 @@
-"""When its inputs jump, the output of a switching block has no values beyond the old and the new one.
+"""When the inputs of a switching block jump, its output stays between the old and the new value.
 
-At a jump, the mode iteration updates the modes in several passes. Events must not see the outputs between the
-passes.
+At a jump, the mode iteration updates the modes in several passes. Events must not use the outputs between
+the passes.
 """
 
 from __future__ import annotations
@@ -45,20 +45,20 @@ def switching() -> list[str]:
     return switching_names
 
 
-def jump(builder: ab.DiagramBuilder, name: str, by: str, before: float, after: float) -> BlockHandle:
+def jump(builder: ab.DiagramBuilder, name: str, jump_kind: str, before: float, after: float) -> BlockHandle:
     """Add a signal that jumps at 1 s, at a breakpoint, a tick or an event."""
-    if by == "breakpoint":
+    if jump_kind == "breakpoint":
         return builder.add(name, Step(time=1.0, initial=before, final=after))
-    if by == "tick":
-        early = builder.add(f"early {name}", Step(time=0.5, initial=before, final=after))
-        return builder.add(name, ZeroOrderHold(sample_time=1.0), early)
+    if jump_kind == "tick":
+        early_step = builder.add(f"early {name}", Step(time=0.5, initial=before, final=after))
+        return builder.add(name, ZeroOrderHold(sample_time=1.0), early_step)
     first = builder.add(f"{name} before", Constant(value=before))
     second = builder.add(f"{name} after", Constant(value=after))
     return builder.add(name, Switch(threshold=1.0), second, builder.add(f"time of {name}", Clock()), first)
 
 
 def diagram_of(
-    kinds: list[str], by: str, random: np.random.Generator
+    kinds: list[str], jump_kind: str, random: np.random.Generator
 ) -> tuple[ab.DiagramBuilder, dict[str, Block]]:
     """A diagram with all these blocks; their input signals jump at 1 s."""
     builder = ab.DiagramBuilder("jumps")
@@ -67,7 +67,7 @@ def diagram_of(
         steps = []
         for port in block.input_ports():
             values = random.choice((-2.0, -1.0, 0.0, 0.5, 1.0, 2.0, *random.uniform(-3.0, 3.0, 2)), 2)
-            steps.append(jump(builder, f"{port.name} of {name}", by, *map(float, values)))
+            steps.append(jump(builder, f"{port.name} of {name}", jump_kind, *map(float, values)))
         builder.add(name, block, *steps)
         builder.add(f"flow of {name}", Integrator(), steps[0])
     return builder, blocks
@@ -86,10 +86,10 @@ def ranges(diagram: Diagram, blocks: dict[str, Block]) -> dict[str, tuple[float,
     return result_ranges
 
 
-@pytest.mark.parametrize("by", ["breakpoint", "tick", "event"])
+@pytest.mark.parametrize("jump_kind", ["breakpoint", "tick", "event"])
 @pytest.mark.parametrize("seed", range(2))
-def test_no_event_sees_an_output_during_the_mode_iteration(seed: int, by: str) -> None:
-    builder, blocks = diagram_of(switching(), by, np.random.default_rng(seed))
+def test_no_event_uses_an_output_between_passes_of_the_mode_iteration(seed: int, jump_kind: str) -> None:
+    builder, blocks = diagram_of(switching(), jump_kind, np.random.default_rng(seed))
     actual = ranges(builder.build(), blocks)
     assert len(actual) > 30
     for path, (middle, half) in actual.items():

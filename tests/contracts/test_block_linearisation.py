@@ -19,7 +19,7 @@ from worked_examples import worked_example
 TIME = 1.7
 """Time of the linearisation, s. No worked example has a kink at this time."""
 
-FLOWING = {
+CONTINUOUS_BLOCKS = {
     name: kind
     for name, kind in BLOCKS.items()
     if not kind.sampled
@@ -30,50 +30,50 @@ FLOWING = {
 }
 
 
-def nudged(diagram: Diagram) -> Diagram:
+def with_perturbation(diagram: Diagram) -> Diagram:
     """The worked example with a Constant of 0 added to the signal at the first input of its block."""
     target = PortRef(diagram.name, diagram.blocks[diagram.name].input_ports()[0].name)
     source = diagram.drivers[target]
     wires = [wire for wire in diagram.connections if wire.target != target]
-    wires += [Connection(source, PortRef("nudged", "u1"))]
-    wires += [Connection(PortRef("nudge", "y"), PortRef("nudged", "u2"))]
-    wires += [Connection(PortRef("nudged", "y"), target)]
-    blocks = {**diagram.blocks, "nudge": Constant(value=0.0), "nudged": Sum()}
+    wires += [Connection(source, PortRef("perturbed", "u1"))]
+    wires += [Connection(PortRef("perturbation", "y"), PortRef("perturbed", "u2"))]
+    wires += [Connection(PortRef("perturbed", "y"), target)]
+    blocks = {**diagram.blocks, "perturbation": Constant(value=0.0), "perturbed": Sum()}
     return dataclasses.replace(diagram, blocks=blocks, connections=tuple(wires), layout={})
 
 
-def packed(layout: Signature, values: Mapping[str, np.ndarray]) -> np.ndarray:
+def packed_values(layout: Signature, values: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return named values as the flat vector of a layout."""
     return np.concatenate([np.zeros(0), *(np.ravel(values[slot.name]) for slot in layout)])
 
 
-def slope(f: Callable[[float], np.ndarray]) -> np.ndarray:
+def derivative_at_zero(f: Callable[[float], np.ndarray]) -> np.ndarray:
     """Return df/ds at s = 0 by fourth-order central differences: h = 1e-3 s has an error of order 1e-12."""
     h = 1e-3
     return (8 * (f(h) - f(-h)) - (f(2 * h) - f(-2 * h))) / (12 * h)
 
 
 @pytest.mark.filterwarnings("ignore::armblocks.errors.LimitWarning")
-@pytest.mark.parametrize("kind", FLOWING.values(), ids=FLOWING)
+@pytest.mark.parametrize("kind", CONTINUOUS_BLOCKS.values(), ids=CONTINUOUS_BLOCKS)
 def test_linearisation_agrees_with_finite_differences(kind: type[Block]) -> None:
     example = worked_example(kind)
     # The added Constant has no states and is 0: the final state of the example is valid for both diagrams.
     state = ab.simulate(example, stop_time=TIME).final_state
     assert state is not None
-    diagram = nudged(example)
+    diagram = with_perturbation(example)
     outputs = [f"{diagram.name}/{port.name}" for port in diagram.blocks[diagram.name].output_ports()]
-    linear = ab.linearize(diagram, inputs="nudge.value", outputs=outputs, at=state)
+    linear = ab.linearize(diagram, inputs="perturbation.value", outputs=outputs, at=state)
     if linear.dt:
         pytest.skip("the example is sampled")
     assert linear.point is not None
     system, point = compile_diagram(diagram).system, linear.point
     if system.algebraic.size:
         pytest.skip("the example has an implicit equation")
-    x, z = packed(system.states, point.states), packed(system.discrete, point.discrete)
-    entry = system.parameters.ranges["nudge.value"]
+    x, z = packed_values(system.states, point.states), packed_values(system.discrete, point.discrete)
+    entry = system.parameters.ranges["perturbation.value"]
 
-    def at(s: float) -> np.ndarray:
-        p = packed(system.parameters, point.parameters)
+    def perturbed_signals(s: float) -> np.ndarray:
+        p = packed_values(system.parameters, point.parameters)
         p[entry] += s
         (y,) = system.signals(TIME, x, z, (), p)
         (dx,) = system.derivative(TIME, x, z, (), p)
@@ -82,4 +82,4 @@ def test_linearisation_agrees_with_finite_differences(kind: type[Block]) -> None
         return np.concatenate([np.ravel(dx), *chosen])
 
     expected = np.concatenate([linear.B.ravel(), linear.D.ravel()])
-    np.testing.assert_allclose(expected, slope(at), rtol=1e-7, atol=1e-8)
+    np.testing.assert_allclose(expected, derivative_at_zero(perturbed_signals), rtol=1e-7, atol=1e-8)

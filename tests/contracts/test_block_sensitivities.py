@@ -37,7 +37,7 @@ SHORT = (
 LONG = os.environ.get("ARMBLOCKS_LONG", "")
 SEED = int(LONG) if LONG.isdigit() else 1
 CASES = [(kind, surroundings) for kind in sorted(BLOCKS) for surroundings in SURROUNDINGS] if LONG else SHORT
-REFUSED = (
+REASONS = (
     "is a table that is read by index",
     "acts only through comparisons or its integer part",
     "at the start moves with the parameter",
@@ -49,7 +49,7 @@ REFUSED = (
 Array = NDArray[np.float64]
 
 
-def perturbed(block: Block, random: np.random.Generator) -> Block:
+def with_perturbed_parameters(block: Block, random: np.random.Generator) -> Block:
     """Return the block with random changes of its tunable parameters where these are valid."""
     for rule in block.own_parameters():
         value = np.asarray(block.parameter_value(rule.name)) if rule.tunable else np.array("")
@@ -62,7 +62,7 @@ def perturbed(block: Block, random: np.random.Generator) -> Block:
     return block
 
 
-def enabled(name: str, block: Block) -> Block:
+def enabled_subsystem(name: str, block: Block) -> Block:
     """An enabled subsystem that contains the named block and has ports of the same names."""
     inside = DiagramBuilder("inside")
     inside.add(name, block)
@@ -81,9 +81,10 @@ def case(kind: str, surroundings: str, seed: int) -> tuple[Diagram, str, Sequenc
     shown = [other for other, block in example.blocks.items() if block.views() and other != name]
     for other, block in example.blocks.items():
         if other not in shown:
-            changed = perturbed(block, random)
+            changed = with_perturbed_parameters(block, random)
             builder.add(
-                other, enabled(name, changed) if (other, surroundings) == (name, "enabled") else changed
+                other,
+                enabled_subsystem(name, changed) if (other, surroundings) == (name, "enabled") else changed,
             )
     if surroundings == "enabled":
         control = SineWave(frequency=1.7, bias=0.31, phase=0.4)
@@ -105,7 +106,7 @@ def case(kind: str, surroundings: str, seed: int) -> tuple[Diagram, str, Sequenc
 
 
 def differences(
-    diagram: Diagram, parameter: str, value: Array, along: Array, step: float, outputs: Sequence[str]
+    diagram: Diagram, parameter: str, value: Array, direction: Array, step: float, outputs: Sequence[str]
 ) -> Iterator[list[tuple[Array, Array]]]:
     """Yield for each output the extrapolated differences along a direction, and their uncertainty.
 
@@ -114,22 +115,22 @@ def differences(
     """
 
     def run(change: float) -> list[Array]:
-        result = ab.simulate(diagram, parameters={parameter: value + change * along}, **SETTINGS)
+        result = ab.simulate(diagram, parameters={parameter: value + change * direction}, **SETTINGS)
         return [result[output] for output in outputs]
 
     steps = (step, 0.5 * step, 0.25 * step)
     above, below = [run(h) for h in steps], [run(-h) for h in steps]
-    yield extrapolated(
+    yield extrapolated_differences(
         [[(a - b) / (2.0 * h) for a, b in zip(*ends)] for h, *ends in zip(steps, above, below)], 4
     )
     unchanged = run(0.0)
     for side, ends in ((1.0, above), (-1.0, below)):
-        yield extrapolated(
+        yield extrapolated_differences(
             [[(a - b) / (side * h) for a, b in zip(end, unchanged)] for h, end in zip(steps, ends)], 2
         )
 
 
-def extrapolated(plain: Sequence[Sequence[Array]], ratio: int) -> list[tuple[Array, Array]]:
+def extrapolated_differences(plain: Sequence[Sequence[Array]], ratio: int) -> list[tuple[Array, Array]]:
     """Return the limit of differences whose errors decrease by ``ratio`` per step, and its uncertainty."""
     estimates: list[tuple[Array, Array]] = []
     for rows in zip(*plain):
@@ -143,14 +144,14 @@ def derivatives_agree(
 ) -> bool:
     """Return whether the derivatives agree with the differences, or no differences can be computed."""
     random = np.random.default_rng(len(parameter))
-    along = random.uniform(0.5, 1.0, value.shape) * np.maximum(np.abs(value), 0.1)
+    direction = random.uniform(0.5, 1.0, value.shape) * np.maximum(np.abs(value), 0.1)
     compared_outputs = False
     for step in (1e-3, 1e-5):
         try:
-            for compared in differences(diagram, parameter, value, along, step, outputs):
+            for compared in differences(diagram, parameter, value, direction, step, outputs):
                 compared_outputs, wrong = True, False
                 for output, (expected, uncertainty) in zip(outputs, compared):
-                    actual = result[output, parameter].reshape(*expected.shape, -1) @ along.ravel()
+                    actual = result[output, parameter].reshape(*expected.shape, -1) @ direction.ravel()
                     bound = 1e-4 * (0.05 + np.abs(expected).max()) + 10.0 * uncertainty
                     wrong |= bool((~(np.abs(actual - expected) <= bound)).any())
                 if not wrong:
@@ -189,6 +190,6 @@ def sensitivities(
     try:
         yield ab.sensitivity(diagram, names, outputs, **SETTINGS)
     except (InputError, SimulationError) as error:
-        assert any(reason in error.what for reason in REFUSED), error
+        assert any(reason in error.what for reason in REASONS), error
         for name in names if len(names) > 1 else ():
             yield from sensitivities(diagram, [name], outputs)

@@ -50,12 +50,12 @@ def two_drivers(builder: ab.DiagramBuilder) -> None:
     builder.connect(builder.add("b", bl.Constant()), x["u"])
 
 
-def dangling_line(builder: ab.DiagramBuilder) -> None:
+def dangling_connection(builder: ab.DiagramBuilder) -> None:
     x = builder.add("x", bl.Gain(gain=2.0))
     builder.connect(PortRef("nowhere", "y"), x["u"])
 
 
-def widths(builder: ab.DiagramBuilder) -> None:
+def different_widths(builder: ab.DiagramBuilder) -> None:
     two = builder.add("two", bl.Constant(value=[1.0, 2.0]))
     three = builder.add("three", bl.Constant(value=[1.0, 2.0, 3.0]))
     builder.add("sum", bl.Sum(signs="++"), two, three)
@@ -67,7 +67,7 @@ def loop_without_state(builder: ab.DiagramBuilder) -> None:
     builder.connect(second, first["u"])
 
 
-def named(*names: str) -> Callable[[ab.DiagramBuilder], None]:
+def blocks_named(*names: str) -> Callable[[ab.DiagramBuilder], None]:
     def build(builder: ab.DiagramBuilder) -> None:
         for name in names:
             builder.add(name, bl.Constant())
@@ -75,12 +75,12 @@ def named(*names: str) -> Callable[[ab.DiagramBuilder], None]:
     return build
 
 
-def code(builder: ab.DiagramBuilder) -> None:
+def code_in_formula(builder: ab.DiagramBuilder) -> None:
     builder.add("f", bl.Expression(formula="__import__('os').system('true')"), builder.add("c", bl.Clock()))
 
 
-def deep(builder: ab.DiagramBuilder) -> None:
-    inner = ab.DiagramBuilder("deepest")
+def deep_nesting(builder: ab.DiagramBuilder) -> None:
+    inner = ab.DiagramBuilder("max_depth")
     inner.add("c", bl.Constant())
     diagram = inner.build()
     for _ in range(101):
@@ -90,7 +90,7 @@ def deep(builder: ab.DiagramBuilder) -> None:
     builder.add("s", bl.Subsystem(diagram=diagram))
 
 
-def doubled_sixty_times(builder: ab.DiagramBuilder) -> None:
+def exponential_nesting(builder: ab.DiagramBuilder) -> None:
     """A diagram of 2^60 blocks, built from 60 nested subsystems that occur twice each."""
     inner = ab.DiagramBuilder("leaf")
     inner.add("c", bl.Constant())
@@ -103,46 +103,48 @@ def doubled_sixty_times(builder: ab.DiagramBuilder) -> None:
     builder.add("s", bl.Subsystem(diagram=diagram))
 
 
-DIAGRAMS: list[tuple[str, Callable[[ab.DiagramBuilder], None], str]] = [
+INVALID_DIAGRAMS: list[tuple[str, Callable[[ab.DiagramBuilder], None], str]] = [
     ("an unconnected input", open_input, "1 unconnected input: x/u"),
     ("two drivers", two_drivers, "input 'x/u' has two drivers, 'a/y' and 'b/y'"),
-    ("a connection from a missing block", dangling_line, "there is no block named 'nowhere'"),
-    ("widths that differ", widths, "'u1' has shape (2,) and 'u2' has shape (3,)"),
+    ("a connection from a missing block", dangling_connection, "there is no block named 'nowhere'"),
+    ("widths that differ", different_widths, "'u1' has shape (2,) and 'u2' has shape (3,)"),
     ("a loop without state", loop_without_state, "first/y -> second/y -> first/y"),
-    ("a name that differs by case", named("Motor", "motor"), "'motor': a block is named 'Motor'"),
+    ("a name that differs by case", blocks_named("Motor", "motor"), "'motor': a block is named 'Motor'"),
     (
         "a name that differs by accents",
-        named("Gr\u00f6\u00dfe", unicodedata.normalize("NFD", "Gr\u00f6\u00dfe")),
+        blocks_named("Gr\u00f6\u00dfe", unicodedata.normalize("NFD", "Gr\u00f6\u00dfe")),
         "differs only in case or Unicode encoding",
     ),
-    ("a name with a slash", named("a/b"), "the block name 'a/b' contains '/'"),
-    ("a name with a line break", named("a\nb"), r"the block name 'a\nb' contains '\n'"),
-    ("a name with a right-to-left mark", named("a\u202eb"), r"contains '\u202e'"),
-    ("a name of 10 000 characters", named("a" * 10_000), "has 10000 characters"),
-    ("an empty name", named(" "), "a block has an empty name"),
-    ("a formula that is code", code, "no function named '__import__'"),
-    ("101 nested subsystems", deep, "subsystems are nested more than 100 levels deep"),
-    ("2^60 blocks", doubled_sixty_times, f"Allowed: at most {MAX_BLOCKS}"),
+    ("a name with a slash", blocks_named("a/b"), "the block name 'a/b' contains '/'"),
+    ("a name with a line break", blocks_named("a\nb"), r"the block name 'a\nb' contains '\n'"),
+    ("a name with a right-to-left mark", blocks_named("a\u202eb"), r"contains '\u202e'"),
+    ("a name of 10 000 characters", blocks_named("a" * 10_000), "has 10000 characters"),
+    ("an empty name", blocks_named(" "), "a block has an empty name"),
+    ("a formula that is code", code_in_formula, "no function named '__import__'"),
+    ("101 nested subsystems", deep_nesting, "subsystems are nested more than 100 levels deep"),
+    ("2^60 blocks", exponential_nesting, f"Allowed: at most {MAX_BLOCKS}"),
 ]
 
 
-@pytest.mark.parametrize(("build", "words"), [case[1:] for case in DIAGRAMS], ids=[c[0] for c in DIAGRAMS])
+@pytest.mark.parametrize(
+    ("build", "words"), [case[1:] for case in INVALID_DIAGRAMS], ids=[c[0] for c in INVALID_DIAGRAMS]
+)
 def test_an_invalid_diagram_is_refused_with_one_message(
     build: Callable[[ab.DiagramBuilder], None], words: str
 ) -> None:
     builder = ab.DiagramBuilder("case")
-    with pytest.raises(ArmblocksError) as refused:
+    with pytest.raises(ArmblocksError) as caught:
         build(builder)
         ab.simulate(builder.build(), stop_time=1.0)
-    assert words in message(refused.value)
+    assert words in message(caught.value)
 
 
 def test_the_error_about_an_algebraic_loop_lists_its_signals() -> None:
     builder = ab.DiagramBuilder("case")
     loop_without_state(builder)
-    with pytest.raises(AlgebraicLoopError) as refused:
+    with pytest.raises(AlgebraicLoopError) as caught:
         ab.simulate(builder.build(), stop_time=1.0)
-    assert sorted(refused.value.loop) == ["first/y", "second/y"]
+    assert sorted(caught.value.loop) == ["first/y", "second/y"]
 
 
 @pytest.mark.parametrize("name", ['"quoted"', "<script>alert(1)", "it's", "\u0645\u062d\u0631\u0643", "a b"])
@@ -157,22 +159,22 @@ def test_unusual_block_names_are_allowed_and_kept_in_files(name: str, tmp_path: 
 def test_a_million_blocks_are_refused_while_they_are_built() -> None:
     builder = ab.DiagramBuilder("case")
     block = bl.Constant()
-    with pytest.raises(ArmblocksError) as refused:
+    with pytest.raises(ArmblocksError) as caught:
         for k in range(1_000_000):
             builder.add(f"c{k}", block)
-    text = message(refused.value)
+    text = message(caught.value)
     assert f"case': the diagram has {MAX_BLOCKS + 1} blocks" in text
     assert "use vectors" in text
 
 
-def test_a_file_of_very_many_blocks_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_with_too_many_blocks_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(structure, "MAX_BLOCKS", 1_000)  # the test above covers the actual limit
     blocks: dict[str, Any] = {f"c{k}": {"type": "Ground"} for k in range(1_001)}
     path = tmp_path / "case.json"
     path.write_text(json.dumps({"format": 1, "name": "case", "blocks": blocks}), encoding="utf-8")
-    with pytest.raises(ArmblocksError) as refused:
+    with pytest.raises(ArmblocksError) as caught:
         ab.load_diagram(path)
-    assert "at most 1000" in message(refused.value)
+    assert "at most 1000" in message(caught.value)
 
 
 def test_a_library_block_that_contains_itself_is_refused(
@@ -186,9 +188,9 @@ def test_a_library_block_that_contains_itself_is_refused(
     (tmp_path / "case.json").write_text(
         json.dumps({"format": 1, "name": "case", "blocks": linked}), encoding="utf-8"
     )
-    with pytest.raises(ArmblocksError) as refused:
+    with pytest.raises(ArmblocksError) as caught:
         ab.load_diagram("case.json")
-    assert "library blocks that do not contain themselves" in message(refused.value, tmp_path)
+    assert "library blocks that do not contain themselves" in message(caught.value, tmp_path)
 
 
 # -- robots --------------------------------------------------------------------------------------------------
@@ -208,22 +210,22 @@ def arm(*, joint: Any = None, length: float = 1.0, motor: Motor | None = None, *
     return Robot(name="arm", links=(link,), **fields)
 
 
-def limited(low: float, high: float, kind: Any = Revolute) -> Any:
+def joint_with_limits(low: float, high: float, kind: Any = Revolute) -> Any:
     return kind(limits=JointLimits(position=(low, high)))
 
 
-REFUSED: list[tuple[dict[str, Any], str]] = [
+INVALID_ROBOTS: list[tuple[dict[str, Any], str]] = [
     ({"motor": Motor(gear_ratio=0.0)}, "the gear ratio is 0, so the motor cannot move the joint"),
-    ({"joint": limited(1.0, -1.0)}, "the position limits are reversed: from 1 to -1 rad"),
+    ({"joint": joint_with_limits(1.0, -1.0)}, "the position limits are reversed: from 1 to -1 rad"),
     ({"gravity": (0.0, 0.0, math.nan)}, "gravity is nan"),
 ]
 
 
-@pytest.mark.parametrize(("fields", "words"), REFUSED, ids=["gear 0", "qlim reversed", "gravity nan"])
+@pytest.mark.parametrize(("fields", "words"), INVALID_ROBOTS, ids=["gear 0", "qlim reversed", "gravity nan"])
 def test_an_invalid_robot_is_refused_with_one_message(fields: dict[str, Any], words: str) -> None:
-    with pytest.raises(RobotError) as refused:
+    with pytest.raises(RobotError) as caught:
         arm(**fields)
-    assert words in message(refused.value)
+    assert words in message(caught.value)
 
 
 def test_a_motor_without_a_gear_has_the_ratio_1() -> None:
@@ -236,18 +238,21 @@ def test_negative_viscous_friction_raises_a_warning() -> None:
         arm(motor=Motor(viscous_friction=-0.1))
 
 
-IMPLAUSIBLE: list[tuple[dict[str, Any], str]] = [
-    ({"joint": limited(-180.0, 180.0)}, "link 'bar': the joint turns from -180 to 180 rad"),
-    ({"length": 450.0}, "it reaches 450 m. Are its lengths in millimetres?"),
-    ({"joint": limited(0.0, 800.0, Prismatic)}, "Are its lengths in millimetres?"),
+IMPLAUSIBLE_ROBOTS: list[tuple[dict[str, Any], str]] = [
+    ({"joint": joint_with_limits(-180.0, 180.0)}, "link 'bar': the joint turns from -180 to 180 rad"),
+    ({"length": 450.0}, "the reach is 450 m. Are its lengths in millimetres?"),
+    ({"joint": joint_with_limits(0.0, 800.0, Prismatic)}, "Are its lengths in millimetres?"),
     ({"inertia": (0.0, 1e5, 1e5)}, "that of 1 kg at a distance of 316.228 m, while the robot reaches 1 m"),
-    ({"gravity": (0.0, 0.0, 9.81)}, "so that bodies fall upwards. Is its sign that of the toolbox?"),
+    (
+        {"gravity": (0.0, 0.0, 9.81)},
+        "so that bodies fall upwards. Does it have the sign of the Robotics Toolbox?",
+    ),
 ]
 
 
 @pytest.mark.parametrize(
     ("fields", "words"),
-    IMPLAUSIBLE,
+    IMPLAUSIBLE_ROBOTS,
     ids=["degrees", "millimetres", "millimetres of travel", "kg mm2", "gravity up"],
 )
 def test_a_probable_error_of_unit_or_sign_raises_a_warning(
@@ -259,11 +264,11 @@ def test_a_probable_error_of_unit_or_sign_raises_a_warning(
     (tmp_path / "arm.json").write_bytes(write_robot(arm(**fields)))
     with pytest.warns(ArmblocksWarning) as caught:
         load_robot(str(tmp_path / "arm.json"))
-    assert text in [str(one.message) for one in caught]
+    assert text in [str(warning.message) for warning in caught]
 
 
 def test_plausible_robots_raise_no_warnings() -> None:
-    assert plausibility_findings(arm(joint=limited(-2 * math.pi, 2 * math.pi))) == ()
+    assert plausibility_findings(arm(joint=joint_with_limits(-2 * math.pi, 2 * math.pi))) == ()
     assert plausibility_findings(arm(length=5.0, gravity=(0.0, 0.0, -1.62))) == ()
     assert plausibility_findings(arm(gravity=np.zeros(3))) == ()
     with warnings.catch_warnings():

@@ -31,7 +31,7 @@ def message(error: ArmblocksError) -> str:
     return str(error)
 
 
-REFUSED: list[tuple[dict[str, Any], str]] = [
+INVALID_SETTINGS: list[tuple[dict[str, Any], str]] = [
     *(({"stop_time": value}, "ramp: stop_time is") for value in (-1, math.inf, -math.inf, math.nan)),
     *(({"stop_time": value}, "ramp: stop_time is") for value in (True, "3", None, [1.0], 3 + 0j)),
     *(({"step": value}, "ramp: step is") for value in (0, -1, math.nan, True, "0.1", 2.0, 1e-20)),
@@ -55,13 +55,15 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
 
 
 @pytest.mark.parametrize(
-    ("settings", "words"), REFUSED, ids=[" ".join(f"{k}={v}" for k, v in s.items()) for s, _ in REFUSED]
+    ("settings", "words"),
+    INVALID_SETTINGS,
+    ids=[" ".join(f"{k}={v}" for k, v in s.items()) for s, _ in INVALID_SETTINGS],
 )
 def test_an_invalid_setting_is_refused_with_one_message(settings: dict[str, Any], words: str) -> None:
     arguments: dict[str, Any] = {"stop_time": 1.0, **settings}
-    with pytest.raises(ArmblocksError) as refused:
+    with pytest.raises(ArmblocksError) as caught:
         ab.simulate(ramp(), **arguments)
-    assert words in message(refused.value)
+    assert words in message(caught.value)
 
 
 def test_a_run_with_stop_time_0_records_one_sample() -> None:
@@ -81,18 +83,18 @@ def test_runs_of_any_duration_and_number_type(stop: float) -> None:
 def test_a_stop_time_before_the_initial_state_is_refused() -> None:
     state = ab.simulate(ramp(), stop_time=1.0).final_state
     for stop in (0.5, 1.0):
-        with pytest.raises(ArmblocksError) as refused:
+        with pytest.raises(ArmblocksError) as caught:
             ab.simulate(ramp(), stop_time=stop, initial_state=state)
-        assert "the run continues from 1 s" in message(refused.value)
+        assert "the run continues from 1 s" in message(caught.value)
 
 
 def test_an_initial_state_of_another_diagram_is_refused() -> None:
     builder = ab.DiagramBuilder("three")
     builder.add("x", bl.Integrator(), builder.add("one", bl.Constant(value=[1.0, 2.0, 3.0])))
     state = ab.simulate(builder.build(), stop_time=0.5).final_state
-    with pytest.raises(ArmblocksError) as refused:
+    with pytest.raises(ArmblocksError) as caught:
         ab.simulate(ramp(), stop_time=1.0, initial_state=state)
-    assert "ramp: the state of 'three' at 0.5 s belongs to another system" in message(refused.value)
+    assert "ramp: the state of 'three' at 0.5 s belongs to another system" in message(caught.value)
 
 
 SAMPLE_TIMES: list[tuple[Any, str]] = [
@@ -116,11 +118,11 @@ SAMPLE_TIMES: list[tuple[Any, str]] = [
 
 @pytest.mark.parametrize(("sample_time", "words"), SAMPLE_TIMES)
 def test_an_invalid_sample_time_is_refused_with_one_message(sample_time: Any, words: str) -> None:
-    with pytest.raises(ArmblocksError) as refused:
+    with pytest.raises(ArmblocksError) as caught:
         builder = ab.DiagramBuilder("sampled")
         builder.add("hold", bl.ZeroOrderHold(sample_time=sample_time), builder.add("t", bl.Clock()))
         ab.simulate(builder.build(), stop_time=1.0)
-    assert words in message(refused.value)
+    assert words in message(caught.value)
 
 
 def test_a_sample_time_longer_than_the_run_ticks_once() -> None:

@@ -1,7 +1,5 @@
 """Buses through blocks that accept them: equal to a diagram with one block per signal."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
@@ -39,21 +37,20 @@ from armblocks.errors import DiagramError, UnknownNameError
 
 NAMES = ("speed", "inner.angle", "inner.pair")
 OPTIONS = SimulationOptions(stop_time=3.0, sample_time=0.05)
-Way = Callable[[DiagramBuilder, list[BlockHandle]], BlockHandle]
 
 
-def signals(builder: DiagramBuilder, mark: str, factor: float) -> list[BlockHandle]:
+def signals(builder: DiagramBuilder, prefix: str, factor: float) -> list[BlockHandle]:
     """Add two scalar signals and a vector signal."""
     return [
-        builder.add(f"{mark} speed", SineWave(amplitude=factor, frequency=2.0)),
-        builder.add(f"{mark} angle", Ramp(slope=factor)),
-        builder.add(f"{mark} pair", SineWave(amplitude=(factor, 2.0 * factor), phase=0.3)),
+        builder.add(f"{prefix} speed", SineWave(amplitude=factor, frequency=2.0)),
+        builder.add(f"{prefix} angle", Ramp(slope=factor)),
+        builder.add(f"{prefix} pair", SineWave(amplitude=(factor, 2.0 * factor), phase=0.3)),
     ]
 
 
-def bus_of(builder: DiagramBuilder, mark: str, parts: list[BlockHandle]) -> BlockHandle:
-    inner = builder.add(f"{mark} inner", BusCreator(names="angle, pair"), *parts[1:])
-    return builder.add(f"{mark} bus", BusCreator(names="speed, inner"), parts[0], inner)
+def bus_of(builder: DiagramBuilder, prefix: str, parts: list[BlockHandle]) -> BlockHandle:
+    inner = builder.add(f"{prefix} inner", BusCreator(names="angle, pair"), *parts[1:])
+    return builder.add(f"{prefix} bus", BusCreator(names="speed, inner"), parts[0], inner)
 
 
 def pass_through(kind: str) -> Diagram:
@@ -80,11 +77,11 @@ BLOCKS: dict[str, tuple[Block, tuple[str, ...]]] = {
 def with_bus(block: Block, inputs: tuple[str, ...]) -> Diagram:
     builder = DiagramBuilder("bus", settings=OPTIONS)
     wires = controls(builder)
-    for mark, factor in (("a", 1.0), ("b", -3.0)):
-        if mark in inputs:
-            wires[mark] = bus_of(builder, mark, signals(builder, mark, factor))
-    through = builder.add("block", block, *(wires[name] for name in inputs))
-    selected = builder.add("taken", BusSelector(elements=", ".join(NAMES)), through)
+    for prefix, factor in (("a", 1.0), ("b", -3.0)):
+        if prefix in inputs:
+            wires[prefix] = bus_of(builder, prefix, signals(builder, prefix, factor))
+    tested_block = builder.add("block", block, *(wires[name] for name in inputs))
+    selected = builder.add("selected", BusSelector(elements=", ".join(NAMES)), tested_block)
     builder.add("scope", Scope(inputs=3), *(selected[name.rpartition(".")[2]] for name in NAMES))
     return builder.build()
 
@@ -93,7 +90,9 @@ def signal_by_signal(block: Block, inputs: tuple[str, ...]) -> Diagram:
     builder = DiagramBuilder("single", settings=OPTIONS)
     wires = controls(builder)
     parts = {
-        mark: signals(builder, mark, factor) for mark, factor in (("a", 1.0), ("b", -3.0)) if mark in inputs
+        prefix: signals(builder, prefix, factor)
+        for prefix, factor in (("a", 1.0), ("b", -3.0))
+        if prefix in inputs
     }
     outputs = [
         builder.add(
@@ -112,29 +111,31 @@ def controls(builder: DiagramBuilder) -> dict[str, BlockHandle]:
 
 @pytest.mark.parametrize("name", BLOCKS)
 def test_a_block_with_a_bus_equals_one_block_per_signal(name: str) -> None:
-    together, apart = with_bus(*BLOCKS[name]), signal_by_signal(*BLOCKS[name])
-    one, each = ab.simulate(together), ab.simulate(apart)
+    combined, separate = with_bus(*BLOCKS[name]), signal_by_signal(*BLOCKS[name])
+    combined_result, separate_result = ab.simulate(combined), ab.simulate(separate)
     for port in ("u1", "u2", "u3"):
-        np.testing.assert_array_equal(one[f"scope/{port}"], each[f"scope/{port}"])
+        np.testing.assert_array_equal(combined_result[f"scope/{port}"], separate_result[f"scope/{port}"])
     # The signals have the names of the block and its ports.
-    output = together.blocks["block"].output_ports()[0].name
+    output = combined.blocks["block"].output_ports()[0].name
     for element, port in zip(NAMES, ("u1", "u2", "u3")):
-        np.testing.assert_array_equal(one[f"block/{output}.{element}"], one[f"scope/{port}"])
-    assert float(np.ptp(one["scope/u1"])) > 0.5, "the signal changes"
+        np.testing.assert_array_equal(
+            combined_result[f"block/{output}.{element}"], combined_result[f"scope/{port}"]
+        )
+    assert float(np.ptp(combined_result["scope/u1"])) > 0.5, "the signal changes"
 
 
 def test_merge_gives_the_bus_of_the_action_subsystem_that_executes() -> None:
     builder = DiagramBuilder("merge", settings=OPTIONS)
     chosen = builder.add("if", If(), builder.add("sign", SineWave(frequency=3.0)))
     ends: list[BlockHandle] = []
-    for mark, factor, port in (("a", 1.0, "if1"), ("b", -3.0, "else")):
-        parts = signals(builder, mark, factor)
-        part = ActionSubsystem(diagram=pass_through(mark))
-        ends.append(builder.add(f"{mark} action", part, bus_of(builder, mark, parts), chosen[port]))
-        ends += [builder.add(f"{mark} action {k}", part, parts[k], chosen[port]) for k in range(3)]
-    together = builder.add("together", Merge(), ends[0], ends[4])
-    apart = [builder.add(f"apart {k}", Merge(), ends[k], ends[k + 4]) for k in (1, 2, 3)]
-    builder.add("shown", Scope(inputs=4), together, *apart)
+    for prefix, factor, port in (("a", 1.0, "if1"), ("b", -3.0, "else")):
+        parts = signals(builder, prefix, factor)
+        part = ActionSubsystem(diagram=pass_through(prefix))
+        ends.append(builder.add(f"{prefix} action", part, bus_of(builder, prefix, parts), chosen[port]))
+        ends += [builder.add(f"{prefix} action {k}", part, parts[k], chosen[port]) for k in range(3)]
+    combined = builder.add("together", Merge(), ends[0], ends[4])
+    separate = [builder.add(f"apart {k}", Merge(), ends[k], ends[k + 4]) for k in (1, 2, 3)]
+    builder.add("shown", Scope(inputs=4), combined, *separate)
     result = ab.simulate(builder.build())
     for element, k in zip(NAMES, (1, 2, 3)):
         np.testing.assert_array_equal(result[f"together/y.{element}"], result[f"apart {k}/y"])
@@ -144,10 +145,10 @@ def test_a_bus_in_a_loop_through_a_delay() -> None:
     """Track and hold of each signal: y(k) = x during the pulse, then y(k-1)."""
     builder = DiagramBuilder("loop", settings=OPTIONS)
     bus = bus_of(builder, "a", signals(builder, "a", 1.0))
-    fresh = builder.add("fresh", PulseGenerator(period=1.0, width=50.0))
+    sampling = builder.add("fresh", PulseGenerator(period=1.0, width=50.0))
     held = builder.add("held", Switch(threshold=0.5))
     builder.connect(bus, held["u1"])
-    builder.connect(fresh, held["u2"])
+    builder.connect(sampling, held["u2"])
     builder.connect(builder.add("before", UnitDelay(sample_time=0.1), held), held["u3"])
     builder.add("sent", Goto(tag="kept"), held)
     builder.add("kept", ToWorkspace(), builder.add("received", From(tag="kept")))
@@ -181,9 +182,9 @@ def test_a_bus_may_be_connected_to_a_terminator() -> None:
 
 def two_buses(second: str, width: int = 1) -> DiagramBuilder:
     builder = DiagramBuilder("conflict")
-    one, two = builder.add("one", Constant()), builder.add("two", Constant(value=(1.0,) * width))
-    first = builder.add("first", BusCreator(names="p, q"), one, one)
-    other = builder.add("other", BusCreator(names=second), one, two)
+    combined_result, two = builder.add("one", Constant()), builder.add("two", Constant(value=(1.0,) * width))
+    first = builder.add("first", BusCreator(names="p, q"), combined_result, combined_result)
+    other = builder.add("other", BusCreator(names=second), combined_result, two)
     builder.add("choose", ManualSwitch(), first, other)
     return builder
 
@@ -194,8 +195,13 @@ def test_different_buses_at_the_inputs_are_refused_with_both_ports() -> None:
         two_buses("p, r").build()
     assert "choose" in str(caught.value.where)
     builder = DiagramBuilder("mixed")
-    one = builder.add("one", Constant())
-    builder.add("choose", ManualSwitch(), builder.add("bus", BusCreator(names="p, q"), one, one), one)
+    combined_result = builder.add("one", Constant())
+    builder.add(
+        "choose",
+        ManualSwitch(),
+        builder.add("bus", BusCreator(names="p, q"), combined_result, combined_result),
+        combined_result,
+    )
     with pytest.raises(DiagramError, match=f"{text}the single signal 'one/y'"):
         builder.build()
     assert two_buses("p, q", width=3).build()  # a scalar is broadcast to a vector, as without buses
@@ -220,16 +226,18 @@ def test_bus_elements_of_different_shape_are_refused_with_both_sources() -> None
 
 def test_a_bus_at_a_block_that_computes_is_refused() -> None:
     builder = DiagramBuilder("gain")
-    one = builder.add("one", Constant())
-    builder.add("gain", Gain(), builder.add("bus", BusCreator(names="p, q"), one, one))
+    combined_result = builder.add("one", Constant())
+    builder.add(
+        "gain", Gain(), builder.add("bus", BusCreator(names="p, q"), combined_result, combined_result)
+    )
     with pytest.raises(DiagramError, match="receives a bus with the elements p, q"):
         builder.build()
 
 
 def test_an_unknown_element_of_the_bus_after_a_block_is_refused() -> None:
     builder = DiagramBuilder("unknown")
-    one = builder.add("one", Constant())
-    bus = builder.add("bus", BusCreator(names="p, q"), one, one)
+    combined_result = builder.add("one", Constant())
+    bus = builder.add("bus", BusCreator(names="p, q"), combined_result, combined_result)
     builder.add("pick", BusSelector(elements="r"), builder.add("delay", UnitDelay(sample_time=1.0), bus))
     with pytest.raises(UnknownNameError, match="there is no bus element named 'r'"):
         builder.build()

@@ -1,4 +1,4 @@
-"""Commented blocks: out equals zeros in place of the block, through equals wires."""
+"""Blocks commented out equal zeros; blocks commented through equal connections from input to output."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ from armblocks.errors import ArmblocksError, DiagramError, UnknownNameError
 SEEDS = range(12)
 
 
-def zeroed(diagram: Diagram, name: str) -> Diagram:
+def with_zeros(diagram: Diagram, name: str) -> Diagram:
     """The diagram with a block deleted and a Constant 0 of the same shape at every output."""
     shapes = infer_shapes(diagram).outputs
     carried = flatten_hierarchy(diagram).carried
@@ -72,8 +72,8 @@ def zeroed(diagram: Diagram, name: str) -> Diagram:
     return dataclasses.replace(diagram, blocks=blocks, connections=tuple(wires), layout={})
 
 
-def wired(diagram: Diagram, name: str) -> Diagram:
-    """The diagram with a block replaced by wires from its inputs to its outputs."""
+def with_connections(diagram: Diagram, name: str) -> Diagram:
+    """The diagram with a block replaced by connections from its inputs to its outputs."""
     block = diagram.blocks[name]
     into = {out.name: port.name for port, out in zip(block.input_ports(), block.output_ports())}
 
@@ -108,8 +108,8 @@ def content(diagram: Diagram, name: str) -> tuple[object, ...]:
     return blocks, wires, dict(flat.gates), shapes, views
 
 
-def either(make: Callable[[], object]) -> object:
-    """The result, or the kind of the error."""
+def outcome(make: Callable[[], object]) -> object:
+    """The result, or the type of the error."""
     try:
         return make()
     except ArmblocksError as error:
@@ -117,7 +117,7 @@ def either(make: Callable[[], object]) -> object:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_commenting_out_equals_zeros_and_commenting_through_equals_wires(seed: int) -> None:
+def test_commenting_out_equals_zeros_and_commenting_through_equals_connections(seed: int) -> None:
     """Every block of a random diagram; a diagram that is refused is refused in both forms."""
     diagram = random_recipe(seed).diagram()
     shapes = infer_shapes(diagram)
@@ -126,7 +126,8 @@ def test_commenting_out_equals_zeros_and_commenting_through_equals_wires(seed: i
         if isinstance(block, Inport | Outport):
             continue
         out = dataclasses.replace(diagram, commented={name: "out"})
-        one, other = either(lambda: content(out, name)), either(lambda: content(zeroed(diagram, name), name))  # noqa: B023
+        one = outcome(lambda: content(out, name))  # noqa: B023
+        other = outcome(lambda: content(with_zeros(diagram, name), name))  # noqa: B023
         merged = any(
             wire.source.block == name and isinstance(diagram.blocks[wire.target.block], Merge)
             for wire in diagram.connections
@@ -140,9 +141,9 @@ def test_commenting_out_equals_zeros_and_commenting_through_equals_wires(seed: i
             continue
         fits = all(shapes.inputs[name][a.name] == shapes.outputs[name][b.name] for a, b in ends)
         through = dataclasses.replace(diagram, commented={name: "through"})
-        one = either(lambda: content(through, name))  # noqa: B023
+        one = outcome(lambda: content(through, name))  # noqa: B023
         if fits:
-            assert one == either(lambda: content(wired(diagram, name), name)), name  # noqa: B023
+            assert one == outcome(lambda: content(with_connections(diagram, name), name)), name  # noqa: B023
         else:
             assert one is DiagramError or all(
                 np.prod(shapes.inputs[name][a.name]) == np.prod(shapes.outputs[name][b.name]) == 1
@@ -162,7 +163,7 @@ def test_runs_of_both_forms_agree(seed: int) -> None:
         warnings.simplefilter("ignore")
         for name, block in list(diagram.blocks.items())[:3]:
             one = run(dataclasses.replace(diagram, commented={name: "out"}))
-            other = run(zeroed(diagram, name))
+            other = run(with_zeros(diagram, name))
             for path in set(one.names) & set(other.names):
                 np.testing.assert_allclose(one[path], other[path], rtol=1e-6, atol=1e-9)
             for port in block.output_ports():
@@ -202,7 +203,7 @@ def model(*, open_input: bool = False) -> Diagram:
         ({"scope": "out"}, ["scope/u1"], []),
     ],
 )
-def test_a_block_that_is_commented_out_takes_no_part(
+def test_a_block_that_is_commented_out_is_removed_from_the_flat_diagram(
     comments: dict[str, Any], removed: list[str], zeros: list[str]
 ) -> None:
     result = run(with_comments(model(), comments))
@@ -228,7 +229,7 @@ def test_views_logged_signals_and_tunable_parameters_of_commented_blocks_are_hid
 
 
 @pytest.mark.parametrize("name", ["gain", "integrator", "filter", "enabled"])
-def test_a_block_that_is_commented_through_is_a_wire(name: str) -> None:
+def test_a_block_that_is_commented_through_is_a_connection(name: str) -> None:
     result = run(with_comments(model(), {name: "through"}))
     block = model().blocks[name]
     assert np.array_equal(result[f"{name}/y"], result[f"{name}/{block.input_ports()[0].name}"])
@@ -323,7 +324,7 @@ def test_a_stop_block_that_is_commented_out_does_not_stop_the_run() -> None:
         ({"gain": "away"}, "the comment is 'away'"),
     ],
 )
-def test_what_cannot_be_commented_is_refused(comments: dict[str, Any], message: str) -> None:
+def test_invalid_comments_are_refused(comments: dict[str, Any], message: str) -> None:
     diagram = model()
     blocks = {**diagram.blocks, "mux": Mux(inputs=2)}
     ends = [Connection(PortRef("gain", "y"), PortRef("mux", port)) for port in ("u1", "u2")]
@@ -347,7 +348,7 @@ def test_the_key_of_the_cache_the_difference_and_copies_contain_comments() -> No
     assert dataclasses.replace(out, blocks={}, connections=()).commented == {}
 
 
-def test_comments_survive_files_and_the_exporter() -> None:
+def test_files_and_exported_programs_keep_comments() -> None:
     out = with_comments(model(), {"gain": "out", "filter": "through", "filter/k": "through"})
     namespace: dict[str, Any] = {}
     program = ab.to_python(out)

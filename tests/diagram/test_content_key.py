@@ -50,7 +50,7 @@ def key_of(*blocks: Block) -> str:
     return key
 
 
-def others(rule: Parameter, value: Any) -> Iterator[object]:
+def other_values(rule: Parameter, value: Any) -> Iterator[object]:
     """Yield other values for a parameter; not every value is valid for every block."""
     match rule.kind:
         case ParameterKind.NUMBER | ParameterKind.ARRAY:
@@ -76,7 +76,7 @@ def others(rule: Parameter, value: Any) -> Iterator[object]:
             rows[-1, -1] += 1e-9
             yield rows
         case ParameterKind.FUNCTION:
-            yield by_default
+            yield gain_by_default
         case ParameterKind.DIAGRAM:
             yield line(Gain(gain=7.0))
 
@@ -89,7 +89,7 @@ def test_the_key_contains_every_parameter_of_every_block(name: str) -> None:
         keys: dict[Block, str | None] = {block: content_key(diagram)}
         for rule in block.parameters():
             before = len(keys)
-            for value in others(rule, block.parameter_value(rule.name)):
+            for value in other_values(rule, block.parameter_value(rule.name)):
                 try:
                     checked = rule.check(value, "here")
                 except ArmblocksError:
@@ -119,7 +119,7 @@ def test_keys_are_equal_if_and_only_if_all_numbers_are_equal_bit_for_bit(
 
 
 def test_the_key_contains_connections_names_and_inner_diagrams() -> None:
-    def keyed(swap: bool, name: str, inner: float) -> str | None:
+    def key_with(swap: bool, name: str, inner: float) -> str | None:
         builder = ab.DiagramBuilder(name)
         one, other = builder.add("one", Constant(value=1.0)), builder.add("other", Constant(value=2.0))
         builder.add("sum", Sum(signs="+-"), *((other, one) if swap else (one, other)))
@@ -128,7 +128,12 @@ def test_the_key_contains_connections_names_and_inner_diagrams() -> None:
         builder.add("part", Subsystem(diagram=inside.build()))
         return content_key(builder.build())
 
-    keys = [keyed(False, "d", 1.0), keyed(True, "d", 1.0), keyed(False, "e", 1.0), keyed(False, "d", 2.0)]
+    keys = [
+        key_with(False, "d", 1.0),
+        key_with(True, "d", 1.0),
+        key_with(False, "e", 1.0),
+        key_with(False, "d", 2.0),
+    ]
     assert None not in keys and len(set(keys)) == 4
 
 
@@ -154,15 +159,15 @@ def test_the_key_ignores_layout_settings_and_the_source_of_a_robot() -> None:
 def test_the_key_contains_the_content_of_a_table() -> None:
     rows = np.array([[0.0, 1.0], [1.0, 3.0], [2.0, -1.0]])
 
-    def keyed(rows: np.ndarray[Any, Any]) -> str | None:
+    def key_with(rows: np.ndarray[Any, Any]) -> str | None:
         builder = ab.DiagramBuilder("table")
         builder.add("end", Scope(), builder.add("table", FromFile(data=rows)))
         return content_key(builder.build())
 
     changed = rows.copy()
     changed[1, 1] = np.nextafter(3.0, 4.0)
-    assert keyed(rows) == keyed(rows.copy()) is not None
-    assert keyed(rows) != keyed(changed)
+    assert key_with(rows) == key_with(rows.copy()) is not None
+    assert key_with(rows) != key_with(changed)
 
 
 STIFFNESS = 3.0
@@ -172,46 +177,46 @@ def spring(u: Any) -> Any:
     return -STIFFNESS * u
 
 
-def through_another(u: Any) -> Any:
+def spring_by_call(u: Any) -> Any:
     return spring(u) + 1.0
 
 
-def driver(factor: float) -> Callable[[Any], Any]:
+def closure_with_factor(factor: float) -> Callable[[Any], Any]:
     return lambda u: factor * u
 
 
-def by_default(u: Any, factor: float = 2.0) -> Any:
+def gain_by_default(u: Any, factor: float = 2.0) -> Any:
     return factor * u
 
 
-def by_modules(u: Any) -> Any:
+def function_of_modules(u: Any) -> Any:
     return casadi.fmax(np.sin(u), math.pi) + sum(value for value in (1.0, 2.0))
 
 
 def test_the_key_contains_the_code_of_a_function_and_of_all_names_it_uses(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def keyed(function: Callable[..., Any]) -> str:
+    def key_with(function: Callable[..., Any]) -> str:
         return key_of(PythonFunction(function=function))
 
     functions: list[Callable[..., Any]] = [
         spring,
-        through_another,
-        by_default,
-        by_modules,
-        driver(2.0),
-        driver(3.0),
+        spring_by_call,
+        gain_by_default,
+        function_of_modules,
+        closure_with_factor(2.0),
+        closure_with_factor(3.0),
     ]
-    keys = [keyed(function) for function in functions]
+    keys = [key_with(function) for function in functions]
     assert len(set(keys)) == len(keys)
-    assert keys == [keyed(function) for function in functions]
-    assert keyed(driver(2.0)) == keys[4]
+    assert keys == [key_with(function) for function in functions]
+    assert key_with(closure_with_factor(2.0)) == keys[4]
     monkeypatch.setattr(sys.modules[__name__], "STIFFNESS", 3.5)
-    assert keyed(spring) != keys[0] and keyed(through_another) != keys[1]
+    assert key_with(spring) != keys[0] and key_with(spring_by_call) != keys[1]
     monkeypatch.undo()
-    assert keyed(spring) == keys[0]
-    monkeypatch.setattr(by_default, "__defaults__", (2.5,))
-    assert keyed(by_default) != keys[2]
+    assert key_with(spring) == keys[0]
+    monkeypatch.setattr(gain_by_default, "__defaults__", (2.5,))
+    assert key_with(gain_by_default) != keys[2]
 
 
 class Law:
@@ -234,11 +239,11 @@ def with_a_file(u: Any) -> Any:
     return np.loadtxt([b"3.0"]).item() * u
 
 
-def with_chance(u: Any) -> Any:
+def with_random_numbers(u: Any) -> Any:
     return u * np.random.default_rng(1).normal()
 
 
-@pytest.mark.parametrize("function", [with_an_object, with_an_import, with_a_file, with_chance])
+@pytest.mark.parametrize("function", [with_an_object, with_an_import, with_a_file, with_random_numbers])
 def test_a_function_with_an_unknown_dependency_has_no_key(function: Callable[[Any], Any]) -> None:
     assert content_key(line(PythonFunction(function=function))) is None
 

@@ -51,16 +51,16 @@ def loop(names: Mapping[str, str] | None = None, *, inner: str = "law", **blocks
     return builder.build()
 
 
-def only(actual: DiagramDifference, *kinds: str) -> None:
+def check_kinds(actual: DiagramDifference, *kinds: str) -> None:
     """Check that the difference has entries of exactly these kinds."""
     nonempty = {entry.name for entry in dataclasses.fields(actual) if getattr(actual, entry.name)}
     assert nonempty == set(kinds)
 
 
-def swapped(actual: DiagramDifference) -> DiagramDifference:
+def reversed_difference(actual: DiagramDifference) -> DiagramDifference:
     """Return the reverse difference; changed connections must not contain renamed blocks."""
 
-    def turned(changes: tuple[object, ...]) -> tuple[object, ...]:
+    def reversed_changes(changes: tuple[object, ...]) -> tuple[object, ...]:
         return tuple(
             dataclasses.replace(change, before=change.after, after=change.before)  # type: ignore[attr-defined]
             for change in changes
@@ -69,16 +69,16 @@ def swapped(actual: DiagramDifference) -> DiagramDifference:
     return DiagramDifference(
         added=actual.removed,
         removed=actual.added,
-        renamed=turned(actual.renamed),  # pyright: ignore[reportArgumentType]
-        types=turned(actual.types),  # pyright: ignore[reportArgumentType]
-        parameters=turned(actual.parameters),  # pyright: ignore[reportArgumentType]
+        renamed=reversed_changes(actual.renamed),  # pyright: ignore[reportArgumentType]
+        types=reversed_changes(actual.types),  # pyright: ignore[reportArgumentType]
+        parameters=reversed_changes(actual.parameters),  # pyright: ignore[reportArgumentType]
         wires_added=actual.wires_removed,
         wires_removed=actual.wires_added,
         logged_added=actual.logged_removed,
         logged_removed=actual.logged_added,
-        notes=turned(actual.notes),  # pyright: ignore[reportArgumentType]
-        settings=turned(actual.settings),  # pyright: ignore[reportArgumentType]
-        descriptions=turned(actual.descriptions),  # pyright: ignore[reportArgumentType]
+        notes=reversed_changes(actual.notes),  # pyright: ignore[reportArgumentType]
+        settings=reversed_changes(actual.settings),  # pyright: ignore[reportArgumentType]
+        descriptions=reversed_changes(actual.descriptions),  # pyright: ignore[reportArgumentType]
     )
 
 
@@ -111,7 +111,7 @@ def test_every_changed_parameter_is_reported_with_both_values() -> None:
     difference = diagram_difference(
         before, with_parameters(before, {"reference.time": 0.75, "controller/law.gain": 4})
     )
-    only(difference, "parameters")
+    check_kinds(difference, "parameters")
     assert [(c.path, c.name, c.before, c.after) for c in difference.parameters] == [
         ("controller/law", "gain", 3.0, 4.0),
         ("reference", "time", 0.5, 0.75),
@@ -120,7 +120,7 @@ def test_every_changed_parameter_is_reported_with_both_values() -> None:
 
 def test_a_changed_block_type_is_reported_with_the_parameters_of_both() -> None:
     difference = diagram_difference(loop(), loop(reference=Constant(value=2.0)))
-    only(difference, "types", "parameters")
+    check_kinds(difference, "types", "parameters")
     assert [(c.path, c.before, c.after) for c in difference.types] == [("reference", "Step", "Constant")]
     assert ("value", None, 2.0) in [(c.name, c.before, c.after) for c in difference.parameters]
     assert ("time", 0.5, None) in [(c.name, c.before, c.after) for c in difference.parameters]
@@ -129,20 +129,20 @@ def test_a_changed_block_type_is_reported_with_the_parameters_of_both() -> None:
 @pytest.mark.parametrize("old_name", ["reference", "error", "controller", "plant", "scope"])
 def test_a_renamed_block_is_recognised(old_name: str) -> None:
     difference = diagram_difference(loop(), loop({old_name: "another"}))
-    only(difference, "renamed")
+    check_kinds(difference, "renamed")
     assert [(entry.before, entry.after) for entry in difference.renamed] == [(old_name, "another")]
 
 
 def test_connected_blocks_that_are_all_renamed_are_recognised() -> None:
     names = {"reference": "a", "error": "b", "controller": "c", "plant": "d", "scope": "e"}
     difference = diagram_difference(loop(), loop(names))
-    only(difference, "renamed")
+    check_kinds(difference, "renamed")
     assert {entry.before: entry.after for entry in difference.renamed} == names
 
 
 def test_a_renamed_block_in_a_subsystem_is_reported_with_its_paths() -> None:
     difference = diagram_difference(loop(), loop(inner="gain"))
-    only(difference, "renamed")
+    check_kinds(difference, "renamed")
     assert [(e.before, e.after) for e in difference.renamed] == [("controller/law", "controller/gain")]
 
 
@@ -157,7 +157,7 @@ def chains(*names: str) -> Diagram:
 
 def test_equal_blocks_are_distinguished_by_their_connections() -> None:
     difference = diagram_difference(chains("a", "b", "c"), chains("z", "y", "x"))
-    only(difference, "renamed")
+    check_kinds(difference, "renamed")
     assert {entry.before: entry.after for entry in difference.renamed} == {
         "a": "z", "a_gain": "z_gain", "b": "y", "b_gain": "y_gain", "c": "x", "c_gain": "x_gain",
     }  # fmt: skip
@@ -171,13 +171,13 @@ def test_indistinguishable_blocks_are_each_paired_at_most_once() -> None:
         return builder.build()
 
     difference = diagram_difference(sources("a", "b", "c"), sources("x", "y"))
-    only(difference, "renamed", "removed")
+    check_kinds(difference, "renamed", "removed")
     assert len({entry.after for entry in difference.renamed}) == 2
 
 
 def test_a_block_with_other_name_and_other_parameter_is_a_new_block() -> None:
     difference = diagram_difference(loop(), loop({"reference": "target"}, reference=Step(time=9.0)))
-    only(difference, "added", "removed", "wires_added", "wires_removed")
+    check_kinds(difference, "added", "removed", "wires_added", "wires_removed")
     assert [entry.path for entry in difference.removed] == ["reference"]
     assert [(entry.path, entry.block) for entry in difference.added] == [("target", Step(time=9.0))]
     assert [str(entry.wire) for entry in difference.wires_added] == ["target/y -> error/u1"]
@@ -199,7 +199,7 @@ def test_a_changed_connection_is_reported_with_its_subsystem() -> None:
         return builder.build()
 
     difference = diagram_difference(outer(False), outer(True))
-    only(difference, "wires_added", "wires_removed")
+    check_kinds(difference, "wires_added", "wires_removed")
     (new,), (old,) = difference.wires_added, difference.wires_removed
     assert new.path == old.path == "sub"
     assert new.wire.source == PortRef("gain", new.wire.source.port)
@@ -215,7 +215,7 @@ def test_settings_and_description_are_reported() -> None:
         settings=dataclasses.replace(before.settings, stop_time=3.0, solver="rk4"),
     )
     difference = diagram_difference(before, after)
-    only(difference, "settings", "descriptions")
+    check_kinds(difference, "settings", "descriptions")
     assert [(c.name, c.before, c.after) for c in difference.settings] == [
         ("stop_time", 10.0, 3.0),
         ("solver", "auto", "rk4"),
@@ -229,19 +229,21 @@ def test_logged_outputs_are_reported_with_the_new_block_names() -> None:
         loop({"plant": "tank"}), logged=(PortRef("tank", "y"), PortRef("controller", "u"))
     )
     difference = diagram_difference(before, after)
-    only(difference, "renamed", "logged_added", "logged_removed")
+    check_kinds(difference, "renamed", "logged_added", "logged_removed")
     assert [(entry.path, str(entry.port)) for entry in difference.logged_added] == [("", "controller/u")]
     assert [(entry.path, str(entry.port)) for entry in difference.logged_removed] == [("", "reference/y")]
 
 
 def test_changed_texts_of_notes_are_reported_and_moved_notes_are_not() -> None:
-    def noted(**notes: tuple[float, str]) -> Diagram:
+    def diagram_with_notes(**notes: tuple[float, str]) -> Diagram:
         difference = {f"/{name}": Note(x=x, y=0.0, text=text) for name, (x, text) in notes.items()}
         return dataclasses.replace(loop(), notes=difference)
 
-    before = noted(a=(0.0, "stays"), b=(0.0, "old"), c=(0.0, "gone"))
-    difference = diagram_difference(before, noted(a=(9.0, "stays"), b=(0.0, "new"), d=(0.0, "more")))
-    only(difference, "notes")
+    before = diagram_with_notes(a=(0.0, "stays"), b=(0.0, "old"), c=(0.0, "gone"))
+    difference = diagram_difference(
+        before, diagram_with_notes(a=(9.0, "stays"), b=(0.0, "new"), d=(0.0, "more"))
+    )
+    check_kinds(difference, "notes")
     assert [(c.name, c.before, c.after) for c in difference.notes] == [
         ("/b", "old", "new"),
         ("/c", "gone", None),
@@ -264,7 +266,7 @@ def test_changed_texts_of_notes_are_reported_and_moved_notes_are_not() -> None:
 def test_the_difference_in_the_other_direction_is_the_reverse(after: Diagram) -> None:
     before = loop()
     forward, backward = diagram_difference(before, after), diagram_difference(after, before)
-    assert swapped(forward).added == backward.added
+    assert reversed_difference(forward).added == backward.added
     for kind in (
         "removed",
         "types",
@@ -275,6 +277,6 @@ def test_the_difference_in_the_other_direction_is_the_reverse(after: Diagram) ->
         "logged_added",
         "notes",
     ):
-        assert getattr(swapped(forward), kind) == getattr(backward, kind)
-    assert set(swapped(forward).parameters) == set(backward.parameters)
+        assert getattr(reversed_difference(forward), kind) == getattr(backward, kind)
+    assert set(reversed_difference(forward).parameters) == set(backward.parameters)
     assert forward.count == backward.count

@@ -24,7 +24,7 @@ BLOCKS = (
 each_block = pytest.mark.parametrize("block", BLOCKS, ids=lambda block: type(block).__name__)
 
 
-def gated(block: Block, *gate: str) -> tuple[Features, Features]:
+def features_alone_and_gated(block: Block, *gate: str) -> tuple[Features, Features]:
     """Return the features of a block with one scalar input, alone and in a conditional subsystem."""
     alone = features_of(block, {"u": ()})
     return alone, conditional(alone, gate, clocked=block.sampled, ticking=block.sampled)
@@ -37,16 +37,16 @@ def arguments(block: Block, features: Features, hidden: Mapping[str, float]) -> 
     before = (mode.before for mode in features.modes if mode.hysteresis)
     inputs = (*features.inputs, *(f"{name}'" for name in features.differentiated_inputs))
 
-    def drawn(names: Iterator[str]) -> dict[str, SX]:
+    def random_values(names: Iterator[str]) -> dict[str, SX]:
         return {
             name: SX(hidden.get(name, 0.0) if name.startswith("?") else random.uniform(0.1, 0.9))
             for name in names
         }
 
-    states = drawn(iter((*(entry.name for entry in held), *before)))
+    states = random_values(iter((*(entry.name for entry in held), *before)))
     parameters = {rule.name: SX(block.parameter_value(rule.name)) for rule in block.inputs_of_the_run()}
     guards = {guard.name: SX(0.0) for guard in features.guards}
-    return Arguments(SX(0.37), states, drawn(iter(inputs)), {**parameters, "T": SX(0.1)}, guards)
+    return Arguments(SX(0.37), states, random_values(iter(inputs)), {**parameters, "T": SX(0.1)}, guards)
 
 
 def number(value: SX) -> float:
@@ -56,7 +56,7 @@ def number(value: SX) -> float:
 @each_block
 def test_equations_of_a_disabled_block_are_zero_unchanged_or_evaluated(block: Block) -> None:
     """A mode with hysteresis returns to its previous value."""
-    alone, inside = gated(block, ON)
+    alone, inside = features_alone_and_gated(block, ON)
     at = arguments(block, inside, {ON: 0.0})
     previous = {mode.name: mode.before for mode in alone.modes if mode.hysteresis}
     assert set(inside.equations) == set(SlotKind)
@@ -77,7 +77,7 @@ def test_equations_of_a_disabled_block_are_zero_unchanged_or_evaluated(block: Bl
 
 @each_block
 def test_equations_of_an_enabled_block_are_those_of_the_block_alone(block: Block) -> None:
-    alone, inside = gated(block, ON, RESTART)
+    alone, inside = features_alone_and_gated(block, ON, RESTART)
     at = arguments(block, inside, {ON: 1.0, "?works": 1.0})
     for kind, equation in inside.equations.items():
         values = {name: number(value) for name, value in equation(at).items() if not name.startswith("?")}
@@ -89,10 +89,10 @@ def test_equations_of_an_enabled_block_are_those_of_the_block_alone(block: Block
 
 @each_block
 def test_a_restart_sets_all_states_to_their_initial_values(block: Block) -> None:
-    alone, inside = gated(block, ON, RESTART)
+    alone, inside = features_alone_and_gated(block, ON, RESTART)
     at = arguments(block, inside, {ON: 1.0, RESTART: 1.0, "?works": 1.0})
     after = inside.equations[SlotKind.RESET](at)
-    starts = alone.starts(at.p)
+    starts = alone.initial_states(at.p)
     assert starts.keys() >= {state.name for state in (*alone.states, *alone.discrete)}
     assert {name: number(after[name]) for name in starts} == {
         name: number(start) for name, start in starts.items()

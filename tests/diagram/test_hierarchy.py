@@ -125,8 +125,8 @@ def test_ports_of_subsystems_are_aliases_of_their_signals() -> None:
 def test_flattening_returns_a_flat_diagram_unchanged_and_is_cached() -> None:
     diagram = flat_loop()
     assert flat_diagram(diagram) is diagram
-    nested = loop_in_levels()
-    assert flatten_hierarchy(nested) is flatten_hierarchy(nested)
+    hierarchy = loop_in_levels()
+    assert flatten_hierarchy(hierarchy) is flatten_hierarchy(hierarchy)
 
 
 def test_parameters_of_inner_blocks_are_changed_by_path_without_compilation() -> None:
@@ -233,7 +233,7 @@ def test_a_cycle_of_connections_without_a_block_is_refused() -> None:
         builder.build()
 
 
-def nested(depth: int) -> Diagram:
+def nested_diagram(depth: int) -> Diagram:
     builder = DiagramBuilder("inner")
     builder.output("y", builder.add("gain", Gain(gain=2.0), builder.input("u")))
     diagram = builder.build()
@@ -246,10 +246,10 @@ def nested(depth: int) -> Diagram:
 
 def test_a_hundred_levels_are_accepted_and_more_are_refused() -> None:
     builder = DiagramBuilder("top")
-    builder.add("sub", Subsystem(diagram=nested(100)), builder.add("c", Constant(value=3.0)))
+    builder.add("sub", Subsystem(diagram=nested_diagram(100)), builder.add("c", Constant(value=3.0)))
     assert ab.simulate(builder.build(), stop_time=1.0)["sub"][-1] == 6.0
     builder = DiagramBuilder("top")
-    builder.add("sub", Subsystem(diagram=nested(100)), builder.add("c", Constant(value=3.0)))
+    builder.add("sub", Subsystem(diagram=nested_diagram(100)), builder.add("c", Constant(value=3.0)))
     deeper = DiagramBuilder("top")
     with pytest.raises(DiagramError, match="subsystems are nested more than 100 levels deep"):
         deeper.add("more", Subsystem(diagram=builder.build()))

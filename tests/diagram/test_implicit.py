@@ -44,7 +44,7 @@ def test_a_scalar_linear_loop_is_solved() -> None:
     assert float(signals_at(system)["sum/y"]) == 0.5
 
 
-def test_a_linear_loop_of_vectors_that_depends_on_time() -> None:
+def test_a_linear_loop_of_vectors_that_depends_on_time_is_solved() -> None:
     """y = t c - M y, so y = (1 + M)^-1 t c."""
     M, c = np.array([[0.5, 2.0, 0.0], [-1.0, 0.3, 0.7], [0.2, 0.0, 4.0]]), np.array([1.0, -2.0, 3.0])
     builder = DiagramBuilder("d")
@@ -60,7 +60,7 @@ def test_a_linear_loop_of_vectors_that_depends_on_time() -> None:
     assert signals_at(system, 2.0)["rate/y"] == pytest.approx(expected, rel=1e-14)
 
 
-def test_two_coupled_loops_with_a_zero_diagonal() -> None:
+def test_two_coupled_loops_with_a_zero_diagonal_are_solved() -> None:
     """a = 1 + a + b and b = 2 + a: the diagonal of the equations is zero."""
     builder = DiagramBuilder("d")
     one, two = builder.add("one", Constant()), builder.add("two", Constant(value=2.0))
@@ -89,7 +89,7 @@ def test_a_nonlinear_loop_becomes_an_equation_with_its_exact_jacobian() -> None:
     assert float(signals_at(system, w=w)["u/y"]) == pytest.approx(0.7390851332151607, abs=1e-15)
 
 
-def test_a_linear_loop_after_a_nonlinear_one() -> None:
+def test_a_linear_loop_after_a_nonlinear_one_is_solved() -> None:
     """v = w + v / 2 with w = cos w: v = 2 w."""
     builder = DiagramBuilder("d")
     w = builder.add("w", Trigonometry(function="cos"))

@@ -177,7 +177,7 @@ def invalid_uses() -> list[tuple[object, type[Exception], str]]:
 
         return act
 
-    def declared(*names: str, **rules: object) -> object:
+    def declaration(*names: str, **rules: object) -> object:
         def act() -> None:
             builder = DiagramBuilder("d")
             for name in names:
@@ -207,9 +207,9 @@ def invalid_uses() -> list[tuple[object, type[Exception], str]]:
             UnknownNameError,
             "there is no parameter named 'valeu'.*did you mean 'value'",
         ),
-        (declared("sin"), InputError, "'sin' cannot be the name of a mask parameter"),
-        (declared("k", "k"), InputError, "diagram 'd': the mask parameter 'k' is declared twice"),
-        (declared("k", default=-1.0, minimum=0.0), InputError, "mask parameter 'k': the value is -1.0"),
+        (declaration("sin"), InputError, "'sin' cannot be the name of a mask parameter"),
+        (declaration("k", "k"), InputError, "diagram 'd': the mask parameter 'k' is declared twice"),
+        (declaration("k", default=-1.0, minimum=0.0), InputError, "mask parameter 'k': the value is -1.0"),
         (
             lambda: Subsystem(diagram=Diagram(name="d", blocks={}, mask=(mask_parameter("diagram", 1.0),))),
             InputError,

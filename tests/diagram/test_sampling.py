@@ -103,7 +103,9 @@ def test_a_sample_time_cannot_be_inherited_from_a_continuous_signal(
 def test_a_missing_sample_time_is_refused() -> None:
     builder = DiagramBuilder("d")
     builder.add("delay", UnitDelay(), builder.add("one", Constant()))
-    with pytest.raises(DiagramError, match=r"none of them is sampled.*set the sample_time of the block"):
+    with pytest.raises(
+        DiagramError, match=r"no connected block is sampled.*set the sample_time of the block"
+    ):
         builder.build()
 
 

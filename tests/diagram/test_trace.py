@@ -59,7 +59,7 @@ def falling() -> Diagram:
     return builder.build()
 
 
-def test_paths_and_aliases() -> None:
+def test_states_signals_parameters_and_aliases_have_their_paths() -> None:
     system = trace_diagram(falling())
     assert system.name == "falling"
     assert system.states.names == ("height/x", "speed/x")
@@ -106,7 +106,7 @@ def test_breakpoints_depend_on_their_parameters() -> None:
     assert signals_at(system, 2.0)["step/y"].tolist() == [1.0, 2.0]
 
 
-def permuted(
+def system_in_order(
     build: Callable[[DiagramBuilder, tuple[int, ...]], None], order: tuple[int, ...]
 ) -> HybridSystem:
     builder = DiagramBuilder("d")
@@ -132,10 +132,10 @@ def test_the_order_of_adding_blocks_does_not_change_the_signals() -> None:
             block, port = target.split(".")
             builder.connect(handles[source], handles[block][port])
 
-    reference = permuted(build, (0, 1, 2, 3, 4))
+    reference = system_in_order(build, (0, 1, 2, 3, 4))
     x = [0.1, 0.2, 0.3]
     for order in list(permutations(range(5)))[::17]:
-        system = permuted(build, order)
+        system = system_in_order(build, order)
         assert system.signals_layout == reference.signals_layout
         assert system.parameter_values.tolist() == reference.parameter_values.tolist()
         for function in ("signals", "derivative"):

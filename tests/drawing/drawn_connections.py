@@ -12,10 +12,10 @@ from armblocks.drawing.diagram_layout import boxes
 from armblocks.drawing.wire_routing import route
 from armblocks.drawing.wires import Net, Obstacle, RoutedNet
 
-Routed = tuple[dict[PortRef, list[PortRef]], list[Net], list[RoutedNet], list[Obstacle]]
+Routing = tuple[dict[PortRef, list[PortRef]], list[Net], list[RoutedNet], list[Obstacle]]
 
 
-def routed(diagram: Diagram) -> Routed:
+def routing(diagram: Diagram) -> Routing:
     """Targets by source, nets, their lines, and the obstacles."""
     placed = boxes(diagram)
     nets, wires = wire_nets(diagram.connections, drawn_bends(diagram), placed)
@@ -25,7 +25,7 @@ def routed(diagram: Diagram) -> Routed:
 
 def drawn_lines(diagram: Diagram) -> dict[tuple[str, str, str], tuple[Point, ...]]:
     """The line of each connection from its source, or from where it branches: by blocks and input."""
-    wires, _, nets, _ = routed(diagram)
+    wires, _, nets, _ = routing(diagram)
     return {
         (source.block, target.block, target.port): path
         for (source, targets), net in zip(wires.items(), nets)
@@ -35,7 +35,7 @@ def drawn_lines(diagram: Diagram) -> dict[tuple[str, str, str], tuple[Point, ...
 
 def connections_in_the_drawing(diagram: Diagram) -> tuple[Mapping[str, str], Mapping[str, str]]:
     """The driver of each input that a reader infers, and that of the diagram."""
-    wires, _, nets, _ = routed(diagram)
+    wires, _, nets, _ = routing(diagram)
     placed = boxes(diagram)
     ports = {
         f"{name}/{spot.name}": Port(name, spot.x, spot.y, (sign * spot.dx, sign * spot.dy), sign == 1)

@@ -1,4 +1,4 @@
-"""Automatic places: laws over random diagrams, and the shape of a control loop."""
+"""Automatic layout: properties for random diagrams, and the layout of a control loop."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ from armblocks.blocks import (
     TransferFunction,
 )
 from armblocks.diagram import Block, Connection, Diagram, DiagramBuilder, Placement, PortRef
-from armblocks.drawing.block_boxes import NAME_ROOM
+from armblocks.drawing.block_boxes import NAME_HEIGHT
 from armblocks.drawing.diagram_layout import arranged_layout, boxes
 
 
-def enabled() -> Block:
+def enabled_block() -> Block:
     inner = DiagramBuilder("inner")
     inner.add("y", Outport(), inner.add("gain", Gain(), inner.add("u", Inport())))
     return EnabledSubsystem(diagram=inner.build())
 
 
 KINDS: tuple[Callable[[], Block], ...] = (
-    Step, Constant, Gain, Gain, Integrator, TransferFunction, PID, Switch, enabled,
+    Step, Constant, Gain, Gain, Integrator, TransferFunction, PID, Switch, enabled_block,
     lambda: Sum(signs="+-"), lambda: Sum(signs="++"), lambda: Sum(signs="+-+"), lambda: Sum(signs="+-+-"),
     lambda: Product(operators="**"), lambda: Mux(inputs=3), lambda: Demux(parts=3),
     lambda: Scope(inputs=1), lambda: Scope(inputs=3), lambda: Display(inputs=1),
@@ -65,40 +65,40 @@ def random_diagram(draw: random.Random, count: int, *, loops: bool = True) -> Di
     return builder.draft()
 
 
-def arranged(diagram: Diagram) -> Diagram:
+def with_arranged_layout(diagram: Diagram) -> Diagram:
     return replace(diagram, layout=arranged_layout(diagram), bends={})
 
 
-def expect_apart(diagram: Diagram) -> None:
-    """No block meets another, or its name."""
+def check_no_overlap(diagram: Diagram) -> None:
+    """Check that no block overlaps another block or its name."""
     for a, b in itertools.combinations(boxes(diagram).values(), 2):
         beside = a.x + a.width <= b.x or b.x + b.width <= a.x
-        below = a.y + a.height + NAME_ROOM <= b.y or b.y + b.height + NAME_ROOM <= a.y
+        below = a.y + a.height + NAME_HEIGHT <= b.y or b.y + b.height + NAME_HEIGHT <= a.y
         assert beside or below, (a.name, b.name)
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_laws_of_arranged_diagrams(seed: int) -> None:
-    """Blocks are apart, lines show the connections, and the places depend on blocks and connections alone."""
+def test_arranged_blocks_do_not_overlap_and_lines_show_the_connections(seed: int) -> None:
+    """The lines show the connections, and the positions depend only on blocks and connections."""
     draw = random.Random(seed)
     diagram = random_diagram(draw, draw.choice([3, 8, 14, 25]))
-    result = arranged(diagram)
-    expect_apart(result)
+    result = with_arranged_layout(diagram)
+    check_no_overlap(result)
     assert set(result.layout) == set(diagram.blocks)
     inferred, expected = connections_in_the_drawing(result)
     assert inferred == expected
-    assert arranged(result) == result
+    assert with_arranged_layout(result) == result
     elsewhere = {name: Placement(x=draw.randint(0, 500), y=7.0, flipped=True) for name in diagram.blocks}
-    assert arranged(replace(diagram, layout=elsewhere)) == result
+    assert with_arranged_layout(replace(diagram, layout=elsewhere)) == result
     shuffled = list(diagram.blocks.items())
     draw.shuffle(shuffled)
     again = replace(diagram, blocks=dict(shuffled), connections=diagram.connections[::-1])
-    assert arranged(again) == result
+    assert with_arranged_layout(again) == result
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_without_loops_every_line_runs_to_the_right(seed: int) -> None:
-    diagram = arranged(random_diagram(random.Random(seed), 20, loops=False))
+    diagram = with_arranged_layout(random_diagram(random.Random(seed), 20, loops=False))
     placed = boxes(diagram)
     assert not any(box.flipped for box in placed.values())
     for wire in diagram.connections:
@@ -106,8 +106,8 @@ def test_without_loops_every_line_runs_to_the_right(seed: int) -> None:
         assert source.x + source.width < target.x, wire
 
 
-def test_many_blocks_are_apart() -> None:
-    expect_apart(arranged(random_diagram(random.Random(1), 150)))
+def test_many_blocks_do_not_overlap() -> None:
+    check_no_overlap(with_arranged_layout(random_diagram(random.Random(1), 150)))
 
 
 def control_loop(draw: random.Random) -> tuple[Diagram, list[str]]:
@@ -127,11 +127,11 @@ def control_loop(draw: random.Random) -> tuple[Diagram, list[str]]:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_control_loop_is_drawn_as_a_person_draws_it(seed: int) -> None:
+def test_a_control_loop_has_a_straight_forward_path_and_mirrored_feedback(seed: int) -> None:
     """The forward path is one straight row; the sensor is below and mirrored, the disturbance above."""
     diagram, names = control_loop(random.Random(seed))
     *row, disturbance, sensor = names
-    diagram = arranged(diagram)
+    diagram = with_arranged_layout(diagram)
     placed, lines = boxes(diagram), drawn_lines(diagram)
     for source, target in itertools.pairwise(row):
         (path,) = [line for ends, line in lines.items() if ends[0] == source and ends[1] == target]
@@ -146,11 +146,11 @@ def test_the_state_feedback_of_a_mass_is_mirrored_above_and_below() -> None:
     builder = DiagramBuilder("mass")
     net = builder.add("net", Sum(signs="+--"), builder.add("force", Step()))
     speed = builder.add("speed", Integrator(), net)
-    place = builder.add("place", Integrator(), speed)
+    position = builder.add("place", Integrator(), speed)
     builder.connect(builder.add("damping", Gain(), speed), net["u2"])
-    builder.connect(builder.add("spring", Gain(), place), net["u3"])
-    builder.add("x", Scope(inputs=1), place)
-    placed = boxes(arranged(builder.build()))
+    builder.connect(builder.add("spring", Gain(), position), net["u3"])
+    builder.add("x", Scope(inputs=1), position)
+    placed = boxes(with_arranged_layout(builder.build()))
     assert {name for name, box in placed.items() if box.flipped} == {"damping", "spring"}
     assert (placed["damping"].y - placed["net"].y) * (placed["spring"].y - placed["net"].y) < 0
 
@@ -162,26 +162,26 @@ def test_a_model_beside_its_plant_is_not_mirrored() -> None:
     plant, model = (builder.add(name, TransferFunction(), control) for name in ("plant", "model"))
     builder.add("y", Scope(inputs=1), plant)
     builder.connect(builder.add("difference", Sum(signs="+-"), plant, model), error["u2"])
-    assert not any(box.flipped for box in boxes(arranged(builder.build())).values())
+    assert not any(box.flipped for box in boxes(with_arranged_layout(builder.build())).values())
 
 
-def test_arranged_blocks_keep_their_sizes_and_stand_upright() -> None:
+def test_arranged_blocks_keep_their_sizes_and_are_not_rotated() -> None:
     builder = DiagramBuilder("sizes")
     builder.add("gain", Gain(), builder.add("wide", Constant()))
     builder.place("wide", 0, 0, width=150, height=80)
     builder.place("gain", 200, 0, rotation=90)
-    layout = arranged(builder.draft()).layout
+    layout = with_arranged_layout(builder.draft()).layout
     assert (layout["wide"].width, layout["wide"].height) == (150, 80)
     assert layout["gain"].rotation == 0 and layout["gain"].width is None
 
 
-def test_blocks_without_connections_and_incomplete_ones_have_places() -> None:
+def test_blocks_with_missing_or_invalid_connections_are_placed() -> None:
     builder = DiagramBuilder("draft")
     for k in range(30):
         builder.add(f"b{k}", Gain())
     loop = builder.add("loop", Gain())
     builder.connect(loop, loop)
-    diagram = arranged(builder.draft())
-    expect_apart(diagram)
+    diagram = with_arranged_layout(builder.draft())
+    check_no_overlap(diagram)
     dangling = Connection(PortRef("b1", "gone"), PortRef("b2", "u"))
-    expect_apart(arranged(replace(diagram, connections=(dangling,))))
+    check_no_overlap(with_arranged_layout(replace(diagram, connections=(dangling,))))

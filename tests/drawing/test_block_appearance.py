@@ -8,7 +8,7 @@ import pytest
 
 from armblocks.blocks import BLOCKS, EnabledSubsystem, Gain, Scope, SineWave, Sum
 from armblocks.diagram import BLOCK_COLOURS, NAME_SIDES, Block, Diagram, DiagramBuilder, Placement
-from armblocks.drawing.block_boxes import standing_box
+from armblocks.drawing.block_boxes import box_at_placement
 from armblocks.drawing.diagram_drawing import diagram_svg, obstacle
 from armblocks.drawing.diagram_layout import arranged_layout
 from armblocks.errors import ArmblocksError, DiagramError
@@ -28,7 +28,7 @@ def model() -> Diagram:
     return builder.build()
 
 
-def enabled() -> Diagram:
+def enabled_diagram() -> Diagram:
     inner = DiagramBuilder("inner")
     inner.output("y", inner.input("u"))
     return inner.build()
@@ -61,10 +61,12 @@ def test_other_values_are_refused(wrong: dict[str, str], message: str) -> None:
 
 
 @pytest.mark.parametrize("rotation", [0, 90, 180, 270])
-@pytest.mark.parametrize("block", [Gain(), SineWave(), Scope(), Sum(), EnabledSubsystem(diagram=enabled())])
+@pytest.mark.parametrize(
+    "block", [Gain(), SineWave(), Scope(), Sum(), EnabledSubsystem(diagram=enabled_diagram())]
+)
 def test_a_name_is_drawn_outside_the_block_at_a_side_without_ports(block: Block, rotation: int) -> None:
     for side in NAME_SIDES:
-        box = standing_box("name", block, Placement(x=3.0, y=4.0, rotation=rotation, name_side=side))
+        box = box_at_placement("name", block, Placement(x=3.0, y=4.0, rotation=rotation, name_side=side))
         x, y, width, height = obstacle(box).label
         right, bottom = box.x + box.width, box.y + box.height
         inside = x < right - 1 and y < bottom - 1 and x + width > box.x + 1 and y + height > box.y + 1

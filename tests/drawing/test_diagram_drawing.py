@@ -36,7 +36,7 @@ from armblocks.blocks import (
     Trigonometry,
 )
 from armblocks.diagram import Block, Diagram, DiagramBuilder, Note, Placement, formula
-from armblocks.drawing.block_boxes import sized_box, standing_box
+from armblocks.drawing.block_boxes import box_at_origin, box_at_placement
 from armblocks.drawing.block_faces import face_size
 from armblocks.drawing.diagram_drawing import (
     block_marks,
@@ -154,7 +154,7 @@ def test_the_picture_of_a_single_block_contains_all_its_marks(kind: type[Block])
 def test_all_text_of_a_face_is_readable(kind: type[Block]) -> None:
     """No text is cut, too small, outside the block, or overlaps another text."""
     block = example_block(kind)
-    box = sized_box("", block)
+    box = box_at_origin("", block)
     faces = [(block, box), (block, dataclasses.replace(box, flipped=True))]
     for _, drawn in faces[:1] if isinstance(block, Display) else faces:
         texts = text_marks(Picture(width=0, height=0, title="", marks=block_marks(drawn)))
@@ -227,24 +227,24 @@ def test_commented_blocks_are_grey_with_their_sign(kind: str) -> None:
     box = boxes(diagram)[name]
     tones = {Tone.HAIRLINE, Tone.SUNKEN, Tone.MUTED, None}
 
-    def painted(marks: Iterable[Mark]) -> Iterator[Tone | None]:
+    def mark_tones(marks: Iterable[Mark]) -> Iterator[Tone | None]:
         for mark in marks:
             if isinstance(mark, Group):
-                yield from painted(mark.marks)
+                yield from mark_tones(mark.marks)
             elif isinstance(mark, Text):
                 yield mark.tone
             elif not isinstance(mark, Raster):
                 yield from (mark.stroke, mark.fill)
 
     out = block_marks(box, comment="out")
-    assert set(painted(out)) <= tones
+    assert set(mark_tones(out)) <= tones
     assert isinstance(out[-1], Text)
     assert out[-1].text == "%"
     if kind in ("Fkine", "Scope"):
         return
     through = block_marks(box, comment="through")
     lines = through[len(out) - 1 :]
-    assert set(painted(through[: len(out) - 1])) <= tones
+    assert set(mark_tones(through[: len(out) - 1])) <= tones
     assert [(*line.points[0], *line.points[-1]) for line in lines if isinstance(line, Polyline)] == [
         (box.inputs[0].x, box.inputs[0].y, box.outputs[0].x, box.outputs[0].y)
     ]
@@ -277,8 +277,8 @@ def test_an_empty_diagram_has_a_drawing() -> None:
 def test_ports_of_every_rotated_block_are_on_its_edges(rotation: int, flipped: bool) -> None:
     for kind in BLOCKS.values():
         block = example_block(kind)
-        upright = standing_box("b", block, Placement(x=30, y=40, flipped=flipped))
-        box = standing_box("b", block, Placement(x=30, y=40, flipped=flipped, rotation=rotation))
+        upright = box_at_placement("b", block, Placement(x=30, y=40, flipped=flipped))
+        box = box_at_placement("b", block, Placement(x=30, y=40, flipped=flipped, rotation=rotation))
         assert block_marks(box)
         for was, spot, way in (
             *((was, spot, -1) for was, spot in zip(upright.inputs, box.inputs)),

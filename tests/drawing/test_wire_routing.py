@@ -10,7 +10,7 @@ import pytest
 from wire_reader import AmbiguousError, Block, Drawing, Port, read
 
 from armblocks.drawing.wire_routing import Routing, route
-from armblocks.drawing.wires import Net, Obstacle, RoutedNet, WireEnd, bent
+from armblocks.drawing.wires import Net, Obstacle, RoutedNet, WireEnd, drawn_path
 
 Path = tuple[tuple[float, float], ...]
 SIDES = {"left": (-1, 0), "right": (1, 0), "top": (0, -1), "bottom": (0, 1)}
@@ -168,15 +168,15 @@ SOURCE, NEAR, FAR = WireEnd(0, 0, 1, 0), WireEnd(200, 0, 1, 0), WireEnd(200, 100
 
 def test_a_user_drawn_route_is_used_and_other_targets_branch_from_it() -> None:
     bends = (60.0, 50.0, 120.0)
-    path = bent(SOURCE, bends, FAR)
+    path = drawn_path(SOURCE, bends, FAR)
     assert path == ((0, 0), (60, 0), (60, 50), (120, 50), (120, 100), (200, 100))
     (routed_net,) = route([], [Net(SOURCE, (NEAR, FAR), ((), bends))])
     assert routed_net.paths[1] == path
     assert routed_net.paths[0] == ((60, 0), (200, 0))
     assert routed_net.dots == ((60, 0),)
     # After a rotation of the block the route does not end at its port: the wire is routed automatically.
-    assert bent(SOURCE, bends, WireEnd(200, 100, 0, 1)) is None
-    assert bent(SOURCE, (), FAR) is None
+    assert drawn_path(SOURCE, bends, WireEnd(200, 100, 0, 1)) is None
+    assert drawn_path(SOURCE, (), FAR) is None
 
 
 @pytest.mark.parametrize(("source", "bend"), [(0.0, 60.0), (0.0, -40.0), (-60.0, 150.0)])
@@ -186,9 +186,9 @@ def test_an_illegal_user_drawn_route_is_replaced(source: float, bend: float) -> 
     start, end = WireEnd(0, source, 1, 0), WireEnd(200, 160 if source else 100, 1, 0)
     shorter = Net(WireEnd(120, 20, 1, 0), (WireEnd(200, 60, 1, 0),), ((150.0,),))
     unchanged, routed_net = route([block], [shorter, Net(start, (end,), ((bend,),))])
-    assert unchanged.paths == (bent(shorter.source, (150.0,), shorter.targets[0]),)
+    assert unchanged.paths == (drawn_path(shorter.source, (150.0,), shorter.targets[0]),)
     (path,) = routed_net.paths
-    assert path != bent(start, (bend,), end)
+    assert path != drawn_path(start, (bend,), end)
     assert path[0] == (start.x, start.y) and path[-1] == (end.x, end.y)
 
 

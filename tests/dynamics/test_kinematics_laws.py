@@ -46,10 +46,10 @@ def test_poses_are_products_of_the_described_transforms(robot: Robot):
 
 def test_jacobian_is_the_derivative_of_kinematics(robot: Robot):
     traced = TRACES["fkine"](robot)
-    slope = Function("dT", [traced.arguments[0]], [jacobian(traced.results[0], traced.arguments[0])])
+    pose_jacobian = Function("dT", [traced.arguments[0]], [jacobian(traced.results[0], traced.arguments[0])])
     for q, _, _ in random_states(robot):
         T = evaluate(robot, "fkine", q)
-        dT = np.asarray(slope(q)).reshape(4, 4, robot.n)
+        dT = np.asarray(pose_jacobian(q)).reshape(4, 4, robot.n)
         J = np.empty((6, robot.n))
         J[:3] = dT[:3, 3]
         for j in range(robot.n):
@@ -73,7 +73,7 @@ def test_manipulability_is_the_product_of_singular_values(robot: Robot):
 
 
 @pytest.mark.parametrize("count", [7, 8, 9, 11])
-def test_manipulability_of_redundant_arms(count: int):
+def test_manipulability_of_any_number_of_joints_is_the_product_of_singular_values(count: int):
     links = [Link(name=f"l{i}", before=random_transform(np.random.default_rng(i))) for i in range(count)]
     arm = Robot(name="redundant", links=serial_chain(links))
     q = np.linspace(-1, 1, count)

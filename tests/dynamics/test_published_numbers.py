@@ -14,7 +14,7 @@ ONES, ZEROS = np.ones(6), np.zeros(6)
 TEN_DIGITS = {"rtol": 0, "atol": 0.51e-10}
 
 
-def test_forward_kinematics(puma560: Robot):
+def test_forward_kinematics_agrees_with_the_toolbox(puma560: Robot):
     T = evaluate(puma560, "fkine", QN)
     assert_allclose(T[:3, :3], [[0, 0, 1], [0, 1, 0], [-1, 0, 0]], rtol=0, atol=1e-15)
     assert_allclose(T[:3, 3], (0.5963031486, -0.15005, 0.6574757323), **TEN_DIGITS)
@@ -30,12 +30,12 @@ def test_forward_kinematics(puma560: Robot):
         (QR, (0, -0.77523525, 0.24892875, 0, 0, 0)),
     ],
 )
-def test_gravity_load(puma560: Robot, q: np.ndarray, expected: tuple[float, ...]):
+def test_gravity_load_agrees_with_the_toolbox(puma560: Robot, q: np.ndarray, expected: tuple[float, ...]):
     assert_allclose(evaluate(puma560, "gravload", q), expected, **TEN_DIGITS)
     assert_allclose(evaluate(puma560, "rne", q, ZEROS, ZEROS), expected, **TEN_DIGITS)
 
 
-def test_inverse_dynamics(puma560: Robot):
+def test_inverse_dynamics_agrees_with_the_toolbox(puma560: Robot):
     accelerated = (3.3531108581, 36.002511244, 7.4259640774, 0.1900430346, 0.2034409311, 0.1941327899)
     both = (32.4952427549, 60.8669884751, 17.7435949128, 1.4545190261, 1.2991104105, 0.7137808875)
     moving = (29.1421318969, 56.5043576095, 16.3527688584, 1.2644759915, 1.1239222794, 0.5196480975)
@@ -46,18 +46,18 @@ def test_inverse_dynamics(puma560: Robot):
     assert_allclose(evaluate(puma560.nofriction(), "rne", QN, ONES, ONES), smooth, **TEN_DIGITS)
 
 
-def test_friction(puma560: Robot):
+def test_friction_agrees_with_the_toolbox(puma560: Robot):
     expected = (30.533206268, 23.0815586418, 11.0696575904, 1.2632529097, 1.0932900009, 0.5194998133)
     assert_allclose(evaluate(puma560, "friction", ONES), expected, **TEN_DIGITS)
 
 
-def test_force_and_moment_at_the_last_link(puma560: Robot):
+def test_torques_of_a_tip_wrench_agree_with_the_toolbox(puma560: Robot):
     tau = evaluate(puma560.nofriction(), "rne_loaded", QN, ZEROS, ZEROS, (1, 2, 3, 1, 2, 3), np.zeros(10))
     # The source has six significant digits.
     assert_allclose(tau, (0.642756, 29.0866, 4.70321, 2.82843, -1.97175, 3), rtol=5e-6)
 
 
-def test_inertia(puma560: Robot):
+def test_the_inertia_matrix_agrees_with_the_toolbox(puma560: Robot):
     upper = (
         (3.6593754122, -0.404361246, 0.1006136478, -0.0025169558, 0, 0),
         (4.4137419336, 0.350890665, 0, 0.0023595131, 0),
@@ -73,7 +73,7 @@ def test_inertia(puma560: Robot):
         assert_allclose(M[i:, i], row, rtol=0, atol=1e-10)
 
 
-def test_jacobian_and_manipulability(puma560: Robot):
+def test_jacobian_and_manipulability_agree_with_the_toolbox(puma560: Robot):
     half = np.sqrt(0.5)
     expected = (
         (0.15005, 0.0143542677, 0.3196829758, 0, 0, 0),
@@ -87,7 +87,7 @@ def test_jacobian_and_manipulability(puma560: Robot):
     assert evaluate(puma560, "manipulability", QN) == pytest.approx(0.0786171653, abs=0.51e-10)
 
 
-def test_forward_dynamics(puma560: Robot):
+def test_forward_dynamics_agrees_with_the_toolbox(puma560: Robot):
     qd, tau = (0.1, 0.2, 0.8, 0.2, 0.5, 1), (1, 3.2, 1.8, 0.1, 0.7, 4.6)
     expected = (-7.4102, -9.8432, -10.9694, -4.4314, -0.9881, 21.0228)
     assert_allclose(evaluate(puma560, "accel", QN, qd, tau), expected, rtol=0, atol=0.51e-4)
@@ -96,7 +96,7 @@ def test_forward_dynamics(puma560: Robot):
     assert_allclose(accel, falling, rtol=0, atol=1e-10)
 
 
-def test_the_arm_of_the_paper_along_its_trajectory(kr180: Robot):
+def test_the_arm_of_the_paper_has_the_published_positions_and_torques(kr180: Robot):
     qf = np.array([3.14, 0, 1.57, 0])
     positions = {
         0: (1.95, -1.25, -1.85),
@@ -123,7 +123,9 @@ G, B, TC = -50.0, 2e-3, (0.3, -0.2)
         (FrictionModel.RELEASE_6, G * G * (B * 2 + 0.3), G * G * (-B * 2 - 0.2)),
     ],
 )
-def test_friction_of_every_toolbox_release(model: FrictionModel, forward: float, backward: float):
+def test_each_friction_model_agrees_with_its_toolbox_release(
+    model: FrictionModel, forward: float, backward: float
+):
     arm = Robot(
         name="arm",
         links=(

@@ -22,7 +22,7 @@ MARK = 1234.5
 
 
 @pytest.fixture
-def marked(monkeypatch: pytest.MonkeyPatch) -> None:
+def marked_functions(monkeypatch: pytest.MonkeyPatch) -> None:
     """Replace the functions of this package by ones that return a marker value."""
     for name in rounded_functions.FUNCTIONS:
         monkeypatch.setitem(rounded_functions.FUNCTIONS, name, lambda *arguments: MARK)
@@ -34,22 +34,22 @@ def constants_of(add_blocks: Callable[[ab.DiagramBuilder], object]) -> tuple[flo
     return tape_from(trace_diagram(builder.build()).signals).constants
 
 
-@pytest.mark.usefixtures("marked")
+@pytest.mark.usefixtures("marked_functions")
 @pytest.mark.parametrize(
     "text", ["u*cos(1.995)", "u*2.1^0.3", "u*atan2(0.3, 2)", "[u*log10(7); sin(0.3)]", "u*erf(pi)", "u+ln(2)"]
 )
-def test_constants_in_formulas(text: str) -> None:
+def test_constants_in_formulas_are_not_evaluated_by_the_c_library(text: str) -> None:
     assert MARK in constants_of(lambda d: d.add("y", Expression(formula=text), d.add("u", Clock())))
 
 
-@pytest.mark.usefixtures("marked")
-def test_constants_in_masks() -> None:
+@pytest.mark.usefixtures("marked_functions")
+def test_constants_in_masks_are_not_evaluated_by_the_c_library() -> None:
     assert formula_number("cos(1.995)", "") == MARK
     assert formula_number("[sin(0.3) 2; 3 4^0.5]", "") == [[MARK, 2.0], [3.0, MARK]]
 
 
-@pytest.mark.usefixtures("marked")
-def test_constants_that_pass_through_blocks() -> None:
+@pytest.mark.usefixtures("marked_functions")
+def test_constants_that_pass_through_blocks_are_not_evaluated_by_the_c_library() -> None:
     """The output of an Expression without inputs is a constant input of the next block."""
 
     def chain(d: ab.DiagramBuilder) -> object:
@@ -60,8 +60,8 @@ def test_constants_that_pass_through_blocks() -> None:
     assert MARK in constants_of(chain)
 
 
-@pytest.mark.usefixtures("marked")
-def test_constants_that_solve_equations() -> None:
+@pytest.mark.usefixtures("marked_functions")
+def test_constant_solutions_of_equations_are_not_evaluated_by_the_c_library() -> None:
     z, u = SX.sym("z", 2), SX.sym("u")
     solution = substituted(
         casadi.vertcat(casadi.cos(z[0]) * u, casadi.exp(z[1])), z, casadi.vertcat(1.995, u)
@@ -90,7 +90,7 @@ def test_powers_of_constants_keep_value_and_derivative() -> None:
         function = casadi.Function("f", [u], [value, casadi.jacobian(value, u)])
         for x in (-2.0, 0.0, 3.0):
             if base > 0.0 or (base < 0.0 or x >= 0.0):
-                actual, slope = (float(part) for part in function(x))
+                actual, slope = map(float, function(x))
                 assert actual == pytest.approx(base**x, rel=1e-15)
                 if base > 0.0:
                     assert slope == pytest.approx(math.log(base) * base**x, rel=1e-14, abs=1e-15)
@@ -99,10 +99,10 @@ def test_powers_of_constants_keep_value_and_derivative() -> None:
 def test_functions_of_symbols_are_not_changed() -> None:
     u = SX.sym("u", 3)
     plain = TracedFunction.trace("f", signature(("u", (3,))), signature(("y", (3,))), casadi.sin)
-    ours = TracedFunction.trace(
+    with_package_function = TracedFunction.trace(
         "f", signature(("u", (3,))), signature(("y", (3,))), lambda a: elementary("sin", a)
     )
-    assert tape_from(plain) == tape_from(ours)
+    assert tape_from(plain) == tape_from(with_package_function)
     assert substituted(casadi.sin(u), u, 2.0 * u).shape == (3, 1)
 
 

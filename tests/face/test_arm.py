@@ -142,7 +142,7 @@ def test_an_impossible_payload_is_refused() -> None:
         ab.Payload(mass=np.nan)
 
 
-def test_representations_of_an_arm_in_text_and_notebooks(puma: ab.Arm) -> None:
+def test_text_and_notebook_representations_show_joints_and_parameters(puma: ab.Arm) -> None:
     assert "6 joints RRRRRR" in repr(puma)
     assert "| link1 |         q|    0.6718|" in str(puma)
     html = puma._repr_html_()
@@ -150,7 +150,7 @@ def test_representations_of_an_arm_in_text_and_notebooks(puma: ab.Arm) -> None:
     assert "<svg" in html
 
 
-def test_notebook_representations_of_robots_trajectories_and_diagrams(puma: ab.Arm) -> None:
+def test_robots_trajectories_and_diagrams_have_notebook_representations(puma: ab.Arm) -> None:
     assert puma.robot._repr_html_() == puma._repr_html_()
     diagram = ab.load_diagram("van_der_pol_pid")
     assert diagram._repr_svg_() == drawing_bytes(diagram, "svg").decode()

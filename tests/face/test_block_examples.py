@@ -51,7 +51,7 @@ def test_the_python_code_of_a_shipped_example_gives_the_same_diagram(name: str) 
 
 def test_a_robot_without_name_or_file_cannot_be_written_as_python() -> None:
     with pytest.raises(
-        FormatError, match=r"neither a shipped one nor that of a file.*write the diagram as JSON"
+        FormatError, match=r"neither shipped nor loaded from a file.*write the diagram as JSON"
     ):
         diagram_to_python(ab.load_diagram("falling_pendulum"))
 

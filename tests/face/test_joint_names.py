@@ -73,13 +73,13 @@ def test_messages_to_the_studio_and_its_widgets_have_the_joint_names(
 ) -> None:
     class Pipe:
         def send_bytes(self, data: bytes) -> None:
-            self.heard = json.loads(data[1:])
+            self.message = json.loads(data[1:])
 
     pipe = Pipe()
     run = _Run(pipe, {"run": "r", "document": "d", "speed": None, "tuned": {}})
     run._notify_start(ab.begin(diagram))
     _, shown, _ = _record(diagram_views(diagram), result)
-    for channels in (pipe.heard["channels"], shown["channels"]):
+    for channels in (pipe.message["channels"], shown["channels"]):
         entries = {channel["name"]: tuple(channel["entries"]) for channel in channels}
         assert entries["rne/tau"] == entries["half/y"] == JOINTS
         assert entries["pair/y"] == ()

@@ -48,7 +48,7 @@ def test_the_frequency_response_with_an_opened_signal_is_that_of_the_open_loop()
     np.testing.assert_allclose(actual, -np.exp(-DELAY * S) / S, rtol=1e-13)
 
 
-def test_delays_in_series_and_their_derivative() -> None:
+def test_the_response_of_delays_in_series_and_of_their_derivative_is_exact() -> None:
     """A delay in series with a delay that has a parallel direct path; a Derivative multiplies by s."""
     builder = ab.DiagramBuilder("row")
     u = builder.add("u", Constant())
@@ -94,13 +94,13 @@ def test_the_approximation_has_gain_1_and_the_slowest_poles_of_the_delay() -> No
         np.testing.assert_allclose(gains, 1.0, rtol=1e-9)
 
 
-def test_dead_time_in_a_sampled_system() -> None:
+def test_dead_time_in_a_sampled_system_agrees_with_its_transfer_function() -> None:
     """A hold of 0.1 s, a dead time of two periods and a lag: (1 - a) / (z - a) / z^2 at low frequencies."""
     builder = ab.DiagramBuilder("sampled")
     hold = builder.add("hold", ZeroOrderHold(sample_time=0.1), builder.add("u", Constant()))
     late = builder.add("late", TransportDelay(delay=0.2), builder.add("lag", FirstOrderLag(), hold))
-    builder.add("seen", ZeroOrderHold(sample_time=0.1), late)
-    system = ab.linearize(builder.build(), "u", "seen", delay_order=8)
+    builder.add("sampled", ZeroOrderHold(sample_time=0.1), late)
+    system = ab.linearize(builder.build(), "u", "sampled", delay_order=8)
     assert system.dt == 0.1
     z = np.exp(0.1j * FREQUENCIES[:4])
     a = np.exp(-0.1)
@@ -112,14 +112,14 @@ def test_dead_time_in_a_sampled_system() -> None:
     with pytest.raises(
         InputError, match=r"is in one diagram with the clock of 0.1 s.*frequency_response of the result"
     ):
-        response(builder.build(), "u", "seen")
+        response(builder.build(), "u", "sampled")
 
 
 def test_a_variable_delay_is_linearised_with_its_present_value() -> None:
     builder = ab.DiagramBuilder("variable")
-    u, how_long = builder.add("u", Constant()), builder.add("T", Constant(value=0.7))
+    u, delay = builder.add("u", Constant()), builder.add("T", Constant(value=0.7))
     builder.add(
-        "late", VariableTimeDelay(shortest=0.1, longest=2.0), builder.add("lag", FirstOrderLag(), u), how_long
+        "late", VariableTimeDelay(shortest=0.1, longest=2.0), builder.add("lag", FirstOrderLag(), u), delay
     )
     actual = ab.frequency_response(builder.build(), "u", "late", FREQUENCIES, at=5.0)[:, 0, 0]
     np.testing.assert_allclose(actual, np.exp(-0.7 * S) / (S + 1.0), rtol=1e-12)
@@ -134,7 +134,7 @@ def test_a_diagram_without_dead_time_has_the_response_of_its_linear_system() -> 
 
 @pytest.mark.parametrize("order", [0, 11, 2.0, True])
 def test_an_order_that_is_not_an_integer_from_1_to_10_is_refused(order: int) -> None:
-    with pytest.raises(InputError, match=r"the delay_order is .*an integer from 1 to 10.*3 is a good start"):
+    with pytest.raises(InputError, match=r"the delay_order is .*an integer from 1 to 10.*begin with"):
         ab.linearize(loop(), "c", "x", delay_order=order)
 
 

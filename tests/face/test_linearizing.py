@@ -95,14 +95,14 @@ def test_several_times_give_one_linear_system_each() -> None:
 
 
 def test_the_gain_of_a_limiter_at_its_limit_is_zero() -> None:
-    def through(value: float) -> float:
+    def gain_at(value: float) -> float:
         builder = ab.DiagramBuilder("limiter")
         source = builder.add("u", Constant(value=value))
         builder.add("limit", Saturation(lower=-1.0, upper=1.0), source)
         return float(ab.linearize(builder.build(), "u", "limit").D[0, 0])
 
-    assert through(0.5) == 1.0
-    assert through(2.0) == 0.0
+    assert gain_at(0.5) == 1.0
+    assert gain_at(2.0) == 0.0
 
 
 def sampled_servo(period: float) -> ab.Diagram:
@@ -123,7 +123,7 @@ def test_the_linear_system_of_a_sampled_loop_is_the_map_over_one_period() -> Non
     system = ab.linearize(sampled_servo(period), "reference", "x")
     decay = np.exp(-period)
     assert system.dt == period
-    assert system.states == ("x/x",)  # the held output is computed anew at every tick
+    assert system.states == ("x/x",)  # the held output is computed again at every tick
     assert system.A[0, 0] == pytest.approx(decay - 2.0 * (1.0 - decay), rel=1e-14)
     assert system.B[0, 0] == pytest.approx(2.0 * (1.0 - decay), rel=1e-14)
     assert np.array_equal(system.C, [[1.0]])

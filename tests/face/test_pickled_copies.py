@@ -36,7 +36,7 @@ def half(u: float) -> float:
 
 
 def diagram_with(function: Callable[..., object]) -> ab.Diagram:
-    builder = ab.DiagramBuilder("own function")
+    builder = ab.DiagramBuilder("user function")
     sine = builder.add("sine", SineWave())
     builder.add("scope", Scope(), builder.add("half", PythonFunction(function=function), sine))
     return builder.build()
@@ -53,7 +53,7 @@ def small_builder() -> ab.DiagramBuilder:
 
 @cache
 def examples() -> Mapping[str, Any]:
-    """Return at least one value of every public type, by a name that starts with that of the type."""
+    """Return one value of every public type, and of some other types, by the name of the type."""
     arm, diagram = ab.load_robot("twolink"), small_builder().build()
     robot, compiled = arm.robot, ab.CompiledDiagram(diagram)
     result = ab.simulate(compiled, stop_time=1.0)
@@ -136,11 +136,11 @@ def test_shipped_robots_and_examples_are_pickled() -> None:
         diagram = formats.load_diagram(name, BLOCKS, draft=True)
         copied = pickle.loads(pickle.dumps(diagram))
         assert copied == diagram and content(copied) == content(diagram)
-        # the copy loads the code of the original from the cache
+        # With an equal key, the copy loads the code of the original from the cache.
         assert content_key(copied) == content_key(diagram)
 
 
-def raised(kind: type[errors.ArmblocksError]) -> errors.ArmblocksError:
+def constructed_error(kind: type[errors.ArmblocksError]) -> errors.ArmblocksError:
     """Construct an error of this type with texts, or lists, for its required arguments."""
     lists = {"known": ["gain"], "loop": ["a/y", "b/y"]}
     required = [name for name, p in inspect.signature(kind).parameters.items() if p.default is p.empty]
@@ -151,11 +151,13 @@ def raised(kind: type[errors.ArmblocksError]) -> errors.ArmblocksError:
 
 
 @pytest.mark.parametrize("method", COPY_FUNCTIONS)
-def test_copies_of_errors_keep_all_their_parts(method: str) -> None:
+def test_copies_of_errors_have_the_same_text_and_attributes(method: str) -> None:
     kinds = [kind for kind in vars(errors).values() if isinstance(kind, type)]
     for kind in kinds:
         if issubclass(kind, errors.ArmblocksError):
-            assert content(COPY_FUNCTIONS[method](raised(kind))) == content(raised(kind))
+            assert content(COPY_FUNCTIONS[method](constructed_error(kind))) == content(
+                constructed_error(kind)
+            )
 
 
 def test_a_python_function_is_pickled_by_its_name(tmp_path: Path) -> None:
@@ -199,23 +201,23 @@ def test_a_run_in_progress_cannot_be_pickled() -> None:
     assert isinstance(pickle.loads(pickle.dumps(run.samples())), Samples)
 
 
-def in_another_process(sent: Mapping[str, Any], answer: Any) -> None:
-    """Compute with the received values; send the bytes of the results back, or the error."""
+def compute_and_send(received: Mapping[str, Any], connection: Any) -> None:
+    """Compute with the received values in a child process; send the bytes of the results, then an error."""
     try:
         q = np.linspace(-1, 1, 6)
         bits = {
-            "fkine": sent["fkine"](q).tobytes(),
-            "rne": sent["rne"](q, q, q, payload=2.0).tobytes(),
-            "arm": sent["arm"].inertia(q=q).tobytes(),
-            "compiled": sent["compiled"].simulate().signals.tobytes(),
-            "function": ab.simulate(sent["function"], stop_time=1.0).signals.tobytes(),
+            "fkine": received["fkine"](q).tobytes(),
+            "rne": received["rne"](q, q, q, payload=2.0).tobytes(),
+            "arm": received["arm"].inertia(q=q).tobytes(),
+            "compiled": received["compiled"].simulate().signals.tobytes(),
+            "function": ab.simulate(received["function"], stop_time=1.0).signals.tobytes(),
         }
-        answer.send((bits, None))
-        ab.simulate(sent["compiled"], solver="rk54")
+        connection.send((bits, None))
+        ab.simulate(received["compiled"], solver="rk54")
     except errors.ArmblocksError as error:
-        answer.send((None, error))
+        connection.send((None, error))
     except BaseException:
-        answer.send((traceback.format_exc(), None))
+        connection.send((traceback.format_exc(), None))
         raise
 
 
@@ -226,7 +228,7 @@ def test_values_sent_to_another_process_give_the_same_results() -> None:
     sent = {"arm": arm, "fkine": arm.fkine, "rne": arm.rne, "compiled": compiled, "function": function}
     context = multiprocessing.get_context("spawn")
     parent, child = context.Pipe()
-    process = context.Process(target=in_another_process, args=(sent, child))
+    process = context.Process(target=compute_and_send, args=(sent, child))
     process.start()
     child.close()
     bits, _ = parent.recv()

@@ -77,7 +77,7 @@ def differences(
     return second, np.abs(second - first)
 
 
-def sampled() -> ab.Diagram:
+def sampled_diagram() -> ab.Diagram:
     builder = ab.DiagramBuilder("sampled")
     reference = builder.add("reference", Constant(value=1.0))
     error = builder.add("error", Sum(signs="+-"), reference)
@@ -89,7 +89,7 @@ def sampled() -> ab.Diagram:
     return builder.build()
 
 
-def implicit() -> ab.Diagram:
+def implicit_diagram() -> ab.Diagram:
     builder = ab.DiagramBuilder("implicit")
     state = builder.add("x", Integrator(initial=0.7))
     total = builder.add("sum", Sum(signs="+-"), state)
@@ -100,7 +100,7 @@ def implicit() -> ab.Diagram:
     return builder.build()
 
 
-def limited() -> ab.Diagram:
+def limiter_diagram() -> ab.Diagram:
     """The integral of a sine after a gain and a limiter."""
     builder = ab.DiagramBuilder("limited")
     wave = builder.add("wave", SineWave(frequency=3.0, amplitude=2.0))
@@ -109,7 +109,7 @@ def limited() -> ab.Diagram:
     return builder.build()
 
 
-def delayed() -> ab.Diagram:
+def delay_diagram() -> ab.Diagram:
     """A delay in a loop, two delays before a Derivative, and a variable delay."""
     builder = ab.DiagramBuilder("delayed")
     square = builder.add("square", SignalGenerator(waveform="square", frequency=0.9, amplitude=1.2))
@@ -124,15 +124,16 @@ def delayed() -> ab.Diagram:
         "twice", TransportDelay(delay=0.31), builder.add("once", TransportDelay(delay=0.27), wave)
     )
     builder.connect(
-        builder.add("power", Expression(formula="u^2"), builder.add("slope", Derivative(), twice)), rate["u3"]
+        builder.add("power", Expression(formula="u^2"), builder.add("derivative", Derivative(), twice)),
+        rate["u3"],
     )
     late = builder.add("late", VariableTimeDelay(shortest=0.1, longest=2.0, initial=0.7), square)
-    builder.connect(builder.add("how late", SineWave(amplitude=0.2, bias=0.5)), late["d"])
+    builder.connect(builder.add("delay", SineWave(amplitude=0.2, bias=0.5)), late["d"])
     builder.connect(late, rate["u4"])
     return builder.build()
 
 
-def switched() -> ab.Diagram:
+def conditional_subsystems() -> ab.Diagram:
     """Enabled, triggered and resettable subsystems in one loop with their control signals."""
     builder = ab.DiagramBuilder("switched")
     wave = builder.add("wave", SineWave(frequency=2.0, bias=0.3))
@@ -140,9 +141,9 @@ def switched() -> ab.Diagram:
     total = builder.add("total", Sum(signs="+++"))
     builder.add("x", Integrator(), total)
     kinds = (
-        EnabledSubsystem(diagram=inside(), states_when_enabling="reset"),
-        TriggeredSubsystem(diagram=inside(states=False), edge="either"),
-        ResettableSubsystem(diagram=inside()),
+        EnabledSubsystem(diagram=gain_and_integrator(), states_when_enabling="reset"),
+        TriggeredSubsystem(diagram=gain_and_integrator(states=False), edge="either"),
+        ResettableSubsystem(diagram=gain_and_integrator()),
     )
     for number, (kind, port) in enumerate(zip(kinds, ("enable", "trigger", "reset")), start=1):
         block = builder.add(port, kind)
@@ -152,7 +153,7 @@ def switched() -> ab.Diagram:
     return builder.build()
 
 
-def inside(*, states: bool = True) -> ab.Diagram:
+def gain_and_integrator(*, states: bool = True) -> ab.Diagram:
     """A gain followed by an integrator."""
     builder = ab.DiagramBuilder("inside")
     last = builder.add("gain", Gain(gain=1.5), builder.add("In1", Inport()))
@@ -161,7 +162,7 @@ def inside(*, states: bool = True) -> ab.Diagram:
     return builder.build()
 
 
-def pushed() -> ab.Diagram:
+def backlash_outside_its_band() -> ab.Diagram:
     """Backlash that is enabled and reset outside its dead band, before a block with an event at that time."""
     builder = ab.DiagramBuilder("pushed")
     wave = builder.add("wave", SineWave(frequency=3.0, amplitude=2.0, phase=0.3))
@@ -211,22 +212,26 @@ def limited_loop() -> ab.Diagram:
 @pytest.mark.parametrize(
     ("make", "step", "parameters"),
     [
-        (sampled, 1e-3, ["gain.gain"]),
-        (implicit, 1e-3, ["cube.values"]),
-        (limited, 1e-3, ["gain.gain", "limit.upper", "wave.frequency"]),
+        (sampled_diagram, 1e-3, ["gain.gain"]),
+        (implicit_diagram, 1e-3, ["cube.values"]),
+        (limiter_diagram, 1e-3, ["gain.gain", "limit.upper", "wave.frequency"]),
         (limited_loop, 1e-3, ["gain.gain", "cube.values", "limit.upper", "wave.frequency"]),
-        (delayed, 4e-3, ["square.frequency", "loop.delay", "gain.gain", "x.initial"]),
+        (delay_diagram, 4e-3, ["square.frequency", "loop.delay", "gain.gain", "x.initial"]),
         (
-            delayed,
+            delay_diagram,
             4e-3,
-            ["once.delay", "twice.delay", "wave.frequency", "how late.amplitude", "late.initial"],
+            ["once.delay", "twice.delay", "wave.frequency", "delay.amplitude", "late.initial"],
         ),
         (
-            switched,
+            conditional_subsystems,
             1e-3,
             ["wave.bias", "wave.frequency", "ramp.slope", "enable/gain.gain", "trigger/gain.gain"],
         ),
-        (pushed, 1e-3, ["wave.amplitude", "control.bias", "enable/play.width", "reset/play.width"]),
+        (
+            backlash_outside_its_band,
+            1e-3,
+            ["wave.amplitude", "control.bias", "enable/play.width", "reset/play.width"],
+        ),
         (
             pulses,
             1e-4,
@@ -348,16 +353,16 @@ def test_a_parameter_of_a_jump_time_with_an_implicit_equation_is_refused() -> No
 
 
 def test_events_at_the_start_that_depend_on_the_parameter_are_refused() -> None:
-    def behind(block: Block) -> ab.Diagram:
+    def integrated(block: Block) -> ab.Diagram:
         builder = ab.DiagramBuilder("start")
         builder.add("x", Integrator(), builder.add("y", block, builder.add("wave", SineWave())))
         return builder.build()
 
     for block, parameter in ((Sign(), "wave.phase"), (PWM(), "y.offset"), (FirstOrderHold(), "y.offset")):
         with pytest.raises(InputError, match=f"event of 'y' at the start moves with .* '{parameter}'"):
-            ab.sensitivity(behind(block), parameter, "x")
+            ab.sensitivity(integrated(block), parameter, "x")
     # The absolute value has a kink at the start but no jump: dx/dphase = |sin(t)|.
-    result = ab.sensitivity(behind(Abs()), "wave.phase", "x", **TIGHT)
+    result = ab.sensitivity(integrated(Abs()), "wave.phase", "x", **TIGHT)
     assert np.allclose(result["x", "wave.phase"], np.sin(result.time), atol=1e-9)
 
 

@@ -47,7 +47,7 @@ def test_a_trajectory_unpacks_as_in_the_toolbox() -> None:
 
 
 def test_angles_that_are_probably_in_degrees_raise_a_warning() -> None:
-    with pytest.warns(ArmblocksWarning, match=r"jtraj, qf: an angle of 90 rad is more than two whole turns"):
+    with pytest.warns(ArmblocksWarning, match=r"jtraj, qf: an angle of 90 rad is more than two full turns"):
         ab.jtraj([0, 0], [90, 0], 5)
     builder = ab.DiagramBuilder("degrees")
     motion = builder.add("motion", JTraj(q0=[0, 0], qf=[-90, 0]))

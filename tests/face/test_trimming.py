@@ -102,7 +102,7 @@ def test_the_steady_state_of_a_sampled_controller_with_integral_action() -> None
     assert float(trimmed.point.signals["control/y"]) == pytest.approx(6.0, rel=1e-12)
 
 
-def limited(torque: float) -> ab.Diagram:
+def limited_plant(torque: float) -> ab.Diagram:
     """A diagram of x' = sat(torque) - x."""
     builder = ab.DiagramBuilder("limited")
     source = builder.add("torque", Constant(value=torque))
@@ -114,7 +114,7 @@ def limited(torque: float) -> ab.Diagram:
 
 
 def test_modes_are_consistent_with_the_operating_point() -> None:
-    trimmed = ab.trim(limited(0.0), free=["torque"], guess={"torque.value": 5.0}, outputs={"x": 0.4})
+    trimmed = ab.trim(limited_plant(0.0), free=["torque"], guess={"torque.value": 5.0}, outputs={"x": 0.4})
     assert float(trimmed.free["torque.value"]) == pytest.approx(0.4, rel=1e-12)
 
 

@@ -17,7 +17,7 @@ def robot(**values: object) -> ab.Robot:
     return ab.Robot(name="x", links=LINKS, **values)
 
 
-def added(*args: object, **named: object) -> object:
+def add_block(*args: object, **named: object) -> object:
     return ab.DiagramBuilder("d").add("g", *args, **named)
 
 
@@ -48,9 +48,9 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     "payload": (lambda: ab.Payload(mass="much"), r"not made of 1 \+ 3 \+ 6 finite numbers"),
     "trajectory": (lambda: ab.jtraj(["a"], [1], 3), r"jtraj: q0 = \['a'\]"),
     "robot of a block": (lambda: Fkine(robot=3), r"Fkine.robot: the value is 3. Allowed: a Robot, or an Arm"),
-    "a block": (lambda: added(3), r"a value of type int is added instead of a block"),
+    "a block": (lambda: add_block(3), r"a value of type int is added instead of a block"),
     "a matrix without a name": (lambda: ab.Transform(np.eye(4)), r"write Transform.from_matrix\(T\) for a"),
-    "a source": (lambda: added(Gain(), 3), r"an output is a int.*add a Constant block"),
+    "a source": (lambda: add_block(Gain(), 3), r"an output is a int.*add a Constant block"),
 }
 
 

@@ -324,7 +324,7 @@ def test_an_error_in_a_robot_file_names_both_files(tmp_path: Path) -> None:
 DOCUMENT = json.loads(write(small()))
 
 
-def altered(*path: str | int, value: object) -> bytes:
+def with_change(*path: str | int, value: object) -> bytes:
     document = json.loads(json.dumps(DOCUMENT))
     node = document
     for step in path[:-1]:
@@ -337,64 +337,76 @@ GAIN = ("blocks", "gain")
 FAULTS: list[tuple[bytes, type[ArmblocksError], str]] = [
     (b"{}", FormatError, "the key 'format' is missing"),
     (b"[]", FormatError, "the value is an array of 0. Allowed: an object"),
-    (altered("format", value=7), FormatError, "the format version is 7.*update armblocks"),
+    (with_change("format", value=7), FormatError, "the format version is 7.*update armblocks"),
     (
-        altered(*GAIN, "type", value="Gian"),
+        with_change(*GAIN, "type", value="Gian"),
         UnknownNameError,
         "no block type named 'Gian'.*did you mean 'Gain'",
     ),
-    (altered(*GAIN, "type", value=3), FormatError, "the value is the number 3"),
-    (altered(*GAIN, value={}), FormatError, "the key 'type' is missing"),
-    (altered(*GAIN, "parameters", value={"gian": 1}), UnknownNameError, "parameter of Gain named 'gian'"),
-    (altered(*GAIN, "parameters", "gain", value="high"), FormatError, "parameters.gain: the value is 'high'"),
-    (altered(*GAIN, "parameters", "gain", value=[[1], [1, 2]]), FormatError, "the value is"),
-    (altered(*GAIN, "parameters", "gain", value="inf"), FormatError, "the value is inf"),
-    (altered(*GAIN, "parameters", "gain", value={"a": 1}), FormatError, "the value is"),
-    (altered("blocks", "scope", "parameters", "inputs", value=1.5), FormatError, "the value is 1.5"),
-    (altered(*GAIN, value={"type": "Fkine"}), FormatError, "a Fkine needs the parameter 'robot'"),
+    (with_change(*GAIN, "type", value=3), FormatError, "the value is the number 3"),
+    (with_change(*GAIN, value={}), FormatError, "the key 'type' is missing"),
+    (with_change(*GAIN, "parameters", value={"gian": 1}), UnknownNameError, "parameter of Gain named 'gian'"),
     (
-        altered(*GAIN, value={"type": "Fkine", "parameters": {"robot": "kr18"}}),
+        with_change(*GAIN, "parameters", "gain", value="high"),
+        FormatError,
+        "parameters.gain: the value is 'high'",
+    ),
+    (with_change(*GAIN, "parameters", "gain", value=[[1], [1, 2]]), FormatError, "the value is"),
+    (with_change(*GAIN, "parameters", "gain", value="inf"), FormatError, "the value is inf"),
+    (with_change(*GAIN, "parameters", "gain", value={"a": 1}), FormatError, "the value is"),
+    (with_change("blocks", "scope", "parameters", "inputs", value=1.5), FormatError, "the value is 1.5"),
+    (with_change(*GAIN, value={"type": "Fkine"}), FormatError, "a Fkine needs the parameter 'robot'"),
+    (
+        with_change(*GAIN, value={"type": "Fkine", "parameters": {"robot": "kr18"}}),
         UnknownNameError,
         "no shipped robot named 'kr18'.*did you mean 'kr180'",
     ),
     (
-        altered(*GAIN, value={"type": "Fkine", "parameters": {"robot": 3}}),
+        with_change(*GAIN, value={"type": "Fkine", "parameters": {"robot": 3}}),
         FormatError,
         "the value is the number 3",
     ),
-    (altered("robots", value={"a": {"robot": "x"}}), UnknownNameError, "no shipped robot named 'x'"),
-    (altered("robots", value={"a": {"name": "x"}}), FormatError, r"robots\.a: the key 'format' is missing"),
+    (with_change("robots", value={"a": {"robot": "x"}}), UnknownNameError, "no shipped robot named 'x'"),
     (
-        altered("robots", value={"a": {"robot": "kr180", "friction": "some"}}),
+        with_change("robots", value={"a": {"name": "x"}}),
+        FormatError,
+        r"robots\.a: the key 'format' is missing",
+    ),
+    (
+        with_change("robots", value={"a": {"robot": "kr180", "friction": "some"}}),
         FormatError,
         "'some' is not known",
     ),
     (
-        altered("robots", value={"a": {"robot": "kr180", "color": 1}}),
+        with_change("robots", value={"a": {"robot": "kr180", "color": 1}}),
         FormatError,
         "the key 'color' is not known",
     ),
     (
-        altered(*GAIN, value={"type": "JTraj", "parameters": {"q0": [0], "qf": [0, 1]}}),
+        with_change(*GAIN, value={"type": "JTraj", "parameters": {"q0": [0], "qf": [0, 1]}}),
         FormatError,
         "q0 has 1 joints and qf has 2",
     ),
-    (altered("blocks", "a/b", value={"type": "Clock"}), DiagramError, "the block name 'a/b' contains '/'"),
-    (altered("blocks", "GAIN", value={"type": "Clock"}), DiagramError, "differs only in case"),
-    (altered("connections", value=["clock -> gain"]), FormatError, "'clock -> gain' is not a connection"),
-    (altered("connections", value=["clock/y -> gane/u"]), UnknownNameError, "no block named 'gane'"),
-    (altered("connections", value=["clock/y -> gain/v"]), UnknownNameError, "no input port named 'v'"),
     (
-        altered("connections", value=[*DOCUMENT["connections"], "clock/y -> gain/u"]),
+        with_change("blocks", "a/b", value={"type": "Clock"}),
+        DiagramError,
+        "the block name 'a/b' contains '/'",
+    ),
+    (with_change("blocks", "GAIN", value={"type": "Clock"}), DiagramError, "differs only in case"),
+    (with_change("connections", value=["clock -> gain"]), FormatError, "'clock -> gain' is not a connection"),
+    (with_change("connections", value=["clock/y -> gane/u"]), UnknownNameError, "no block named 'gane'"),
+    (with_change("connections", value=["clock/y -> gain/v"]), UnknownNameError, "no input port named 'v'"),
+    (
+        with_change("connections", value=[*DOCUMENT["connections"], "clock/y -> gain/u"]),
         DiagramError,
         "input 'gain/u' has two drivers",
     ),
-    (altered("connections", value=DOCUMENT["connections"][1:]), DiagramError, "unconnected input"),
-    (altered("layout", "gain", value={"x": 1}), FormatError, "block 'gain' is placed without x or y"),
-    (altered("layout", "gain", value={"x": 1, "y": "a"}), FormatError, "the value is the text 'a'"),
-    (altered("settings", "stop_time", value=None), FormatError, "the value is null"),
-    (altered("settings", "solver", value=3), FormatError, "the value is the number 3"),
-    (altered("name", value=3), FormatError, "the value is the number 3"),
+    (with_change("connections", value=DOCUMENT["connections"][1:]), DiagramError, "unconnected input"),
+    (with_change("layout", "gain", value={"x": 1}), FormatError, "block 'gain' is placed without x or y"),
+    (with_change("layout", "gain", value={"x": 1, "y": "a"}), FormatError, "the value is the text 'a'"),
+    (with_change("settings", "stop_time", value=None), FormatError, "the value is null"),
+    (with_change("settings", "solver", value=3), FormatError, "the value is the number 3"),
+    (with_change("name", value=3), FormatError, "the value is the number 3"),
 ]
 
 

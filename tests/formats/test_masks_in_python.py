@@ -61,7 +61,7 @@ def test_show_prints_the_tree(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ab.save_diagram(whole(tmp_path), tmp_path / "whole.json")
     show(str(tmp_path / "whole.json"))
     text = capsys.readouterr().out.replace("\u00a0", " ")
-    assert text.startswith("whole  7 blocks (21 with those inside), 7 wires")
+    assert text.startswith("whole  7 blocks (21 including inner blocks), 7 wires")
     assert "K = 4" in text
     assert "enabled  enabled subsystem  from parts.json#Inner  4 blocks, 3 wires" in text
     assert "a = 2 1/s (from K/2), way" in text

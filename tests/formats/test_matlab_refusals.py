@@ -15,7 +15,7 @@ ONE_ROBOT = ONE_LINK + "r = robot(L); "
 NEW_LINK = "L(1) = Link([0 0 1 0]); "
 NEW_ROBOT = NEW_LINK + "r = SerialLink(L); "
 
-REFUSED = [
+INVALID_SCRIPTS = [
     # the language
     ("for i = 1:3", "'for' is not supported"),
     ("if x", "'if' is not supported"),
@@ -92,12 +92,11 @@ REFUSED = [
     ("x = diag(ones(1, 1000))", "a matrix would have 1000x1000"),
     ("x = ones(1000, 1)*ones(1, 1000)", "a matrix would have 1000x1000"),
     ("x = 1:1e9", "a range: an array would have 1e\\+09 elements"),
-    ("x = 1:0:2", "a range: the steps do not lead to the last number"),
     ("x = 1:Inf", "a range: the steps do not lead to the last number"),
     ("x = 0:1e-320:1", "a range: the steps do not lead to the last number"),
     ("x = 1:'a'", "an end of a range is text"),
-    ("x = transl(1, 2)", "transl: 2 arguments with 2 elements are no translation; allowed are x, y, z"),
-    ("x = transl([1 2])", "transl: 1 arguments with 2 elements are no translation"),
+    ("x = transl(1, 2)", "transl: 2 arguments with 2 elements are not a translation; allowed are x, y, z"),
+    ("x = transl([1 2])", "transl: 1 arguments with 2 elements are not a translation"),
     ("x = trotx(1, 'rad')", "the option of trotx is not known"),
     ("x = trotx([1 2])", "the angle of trotx is not one number"),
     ("x = atan2([1 2], [1 2 3])", "the arguments of atan2 are a 1x2 matrix and a 1x3 matrix"),
@@ -204,13 +203,15 @@ REFUSED = [
     (NEW_LINK + "r = SerialLink(L, 'name')", "'name' of SerialLink has no value"),
     (NEW_LINK + "r = SerialLink(L, 'colour', 1)", "a robot has no field 'colour'"),
     (NEW_LINK + "r = SerialLink(L, 3, 1)", "argument 2 of SerialLink is a number"),
-    ("r = SerialLink(zeros(2000, 4))", "a robot of 2000 links"),
+    ("r = SerialLink(zeros(2000, 4))", "the robot has 2000 links"),
     ("L = Link([0 0 1 0]); L = [" + "L " * 1001 + "]", "1001 links in one array"),
     ("c = {" + "1 " * 1001 + "}", "1001 elements in one cell array"),
 ]
 
 
-@pytest.mark.parametrize(("text", "message"), REFUSED, ids=[str(i) for i in range(len(REFUSED))])
+@pytest.mark.parametrize(
+    ("text", "message"), INVALID_SCRIPTS, ids=[str(i) for i in range(len(INVALID_SCRIPTS))]
+)
 def test_unsupported_code_is_refused_with_file_line_and_text(text: str, message: str) -> None:
     with pytest.raises(FormatError, match=message) as caught:
         read_script(("% first line\n" + text).encode(), "arm.m")

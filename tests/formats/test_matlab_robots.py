@@ -62,7 +62,7 @@ def test_the_papers_script_equals_the_shipped_kr180() -> None:
 
 def test_the_papers_script_loads_as_it_is_printed() -> None:
     with pytest.warns(
-        ArmblocksWarning, match=r"printed\.m: lines 15, 17, 20, 23, 26 are broken as on a printed"
+        ArmblocksWarning, match=r"printed\.m: lines 15, 17, 20, 23, 26 are split as on a printed"
     ):
         (script,) = read_script(PRINTED.read_bytes(), "printed.m").robots.values()
     assert with_table_1(script) == load_robot("kr180")
@@ -76,7 +76,7 @@ def test_the_papers_script_loads_with_its_blank_lines(tmp_path: Path) -> None:
     assert with_table_1(script) == load_robot("kr180")
     kinds = [warning.category for warning in caught]
     assert kinds.count(InertiaWarning) == 2, "links 1 and 3 have inertias that no body can have"
-    assert "link 'link1': it has inertia but no mass" in str([w.message for w in caught])
+    assert "link 'link1': the link has inertia but no mass" in str([w.message for w in caught])
 
 
 def test_the_papers_script_has_all_numbers_of_its_tables() -> None:
@@ -143,7 +143,7 @@ def test_the_convention_is_recognised_by_its_first_three_letters() -> None:
 DYN = "0.1 0.2 0 0.4 0 5 1 2 3 0.1 0.2 0.3 0.01 0.02 0.03"
 
 
-def test_legacy_dyn_row_of_release_8() -> None:
+def test_the_legacy_dyn_row_of_release_8_starts_with_alpha() -> None:
     (link,) = robot(f"d = [{DYN} 2e-4 -60 1e-3 0.4 -0.5]; r = robot(d);").links
     assert link == standard_dh(
         "link1",
@@ -184,7 +184,7 @@ def test_values_are_copied_in_release_8() -> None:
     assert script.robots["s"].name == "other"
 
 
-def test_constructors_copy_in_release_8() -> None:
+def test_constructors_copy_their_arguments_in_release_8() -> None:
     text = (
         "a = link([0 1 0 0]); a.m = 1; b = link(a); b.m = 2; L = {a b};"
         "r = robot(L); s = robot(r, 'S'); s.name"
@@ -344,7 +344,9 @@ def test_one_of_several_robots_is_selected_by_name(tmp_path: Path) -> None:
     path.write_text(TWO_ROBOTS)
     assert load_robot(path, name="right").links[0].dh == standard_dh("link1", a=2).dh
     assert load_robot(path, name="L").links[0].dh == standard_dh("link1", a=1).dh
-    with pytest.raises(FormatError, match=r"the file defines 2 robots. Allowed: left, right. Fix: say which"):
+    with pytest.raises(
+        FormatError, match=r"the file defines 2 robots. Allowed: left, right. Fix: select one"
+    ):
         load_robot(path)
     with pytest.raises(UnknownNameError, match=r"there is no robot named 'lefft'.*did you mean 'left'"):
         load_robot(path, name="lefft")

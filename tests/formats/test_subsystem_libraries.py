@@ -48,17 +48,17 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def written(path: Path, library: Mapping[str, object]) -> None:
+def write_library(path: Path, library: Mapping[str, object]) -> None:
     path.write_text(json.dumps({"format": 1, "library": library}))
 
 
-def linked(reference: str) -> dict[str, object]:
+def linked_diagram(reference: str) -> dict[str, object]:
     """A diagram with one linked block."""
     return {"blocks": {"part": {"type": "Subsystem", "library": reference}}}
 
 
 def load(folder: Path, reference: str) -> Diagram:
-    data = json.dumps({"format": 1, **linked(reference)}).encode()
+    data = json.dumps({"format": 1, **linked_diagram(reference)}).encode()
     return diagram_from_bytes(data, "model.json", BLOCKS, load_robot, folder=folder)
 
 
@@ -127,22 +127,24 @@ def test_the_shipped_servo_is_used_six_times() -> None:
 
 
 def cases(folder: Path) -> list[tuple[str, type[ArmblocksError], str]]:
-    written(folder / "empty.json", {})
-    written(folder / "circle.json", {"A": linked("ring.json#B")})
-    written(folder / "ring.json", {"B": linked("circle.json#A"), "Self": linked("ring.json#Self")})
-    chain = {f"n{k}": linked(f"deep.json#n{k + 1}") for k in range(MAX_LIBRARY_DEPTH + 5)}
-    written(folder / "deep.json", {**chain, f"n{MAX_LIBRARY_DEPTH + 5}": {"blocks": {}}})
+    write_library(folder / "empty.json", {})
+    write_library(folder / "circle.json", {"A": linked_diagram("ring.json#B")})
+    write_library(
+        folder / "ring.json", {"B": linked_diagram("circle.json#A"), "Self": linked_diagram("ring.json#Self")}
+    )
+    chain = {f"n{k}": linked_diagram(f"deep.json#n{k + 1}") for k in range(MAX_LIBRARY_DEPTH + 5)}
+    write_library(folder / "deep.json", {**chain, f"n{MAX_LIBRARY_DEPTH + 5}": {"blocks": {}}})
     pair = {
         f"n{k}": {"blocks": {name: {"type": "Subsystem", "library": f"wide.json#n{k + 1}"} for name in "ab"}}
         for k in range(30)
     }
-    written(folder / "wide.json", {**pair, "n30": {"blocks": {}}})
-    written(
+    write_library(folder / "wide.json", {**pair, "n30": {"blocks": {}}})
+    write_library(
         folder / "code.json",
         {"A": {"blocks": {"c": {"type": "Constant", "formulas": {"value": "__import__('os').getcwd()"}}}}},
     )
-    written(folder / "value.json", {"A": {"mask": [{"name": "k", "kind": "number"}]}})
-    written(folder / "kind.json", {"A": {"mask": [{"name": "k", "kind": "numbre", "default": 1}]}})
+    write_library(folder / "value.json", {"A": {"mask": [{"name": "k", "kind": "number"}]}})
+    write_library(folder / "kind.json", {"A": {"mask": [{"name": "k", "kind": "numbre", "default": 1}]}})
     return [
         ("none.json#A", FormatError, r"model.json.*none.json: there is no such file"),
         ("../outside.json#A", FormatError, "there is no such file"),

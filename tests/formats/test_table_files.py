@@ -1,4 +1,4 @@
-"""Tables from files: no file gives other numbers than it contains, or another meaning, without an error."""
+"""Tables from files: a file is read with exactly its numbers and their meaning, or it is refused."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def test_errors_of_csv_files_name_the_line_or_the_row(tmp_path: Path, text: str,
         ab.load_table(path)
 
 
-def test_repeated_names_lose_no_column() -> None:
+def test_columns_with_repeated_names_are_kept() -> None:
     file = columns("time,x,x,x (2)\n0,1,2,3\n1,4,5,6\n")
     assert table_of(file, "a").names == ("x", "x (3)", "x (2)")
     assert any("same name" in note for note in file.notes)
@@ -165,7 +165,7 @@ def test_the_column_of_times_is_found_by_name_and_unit() -> None:
         ("block/port", ""),
     ],
 )
-def test_units_in_headers(header: str, unit: str) -> None:
+def test_units_are_read_from_headers(header: str, unit: str) -> None:
     assert header_unit(header) == unit
 
 
@@ -194,7 +194,7 @@ def mat(**variables: object) -> bytes:
     return buffer.getvalue()
 
 
-def test_types_of_parquet_columns() -> None:
+def test_parquet_columns_of_each_type_are_converted_or_refused() -> None:
     moments = np.array(["2024-01-01T00:00:00.000000001", "2024-01-01T00:00:02"], dtype="datetime64[ns]")
     file = columns(
         parquet(
@@ -220,7 +220,7 @@ def test_types_of_parquet_columns() -> None:
         table_of(file, "a", columns=("flags",))
 
 
-def test_an_index_of_pandas_is_not_taken_for_a_time() -> None:
+def test_an_index_of_pandas_is_not_read_as_a_time() -> None:
     data = parquet(index=[5.0, 6.0], t=[0.0, 1.0], __index_level_0__=[3, 9])
     file = columns(data, ".parquet")
     assert [column.name for column in file.columns] == ["index", "t", "index (2)"]
@@ -229,14 +229,14 @@ def test_an_index_of_pandas_is_not_taken_for_a_time() -> None:
 
 @pytest.mark.parametrize("row", [False, True])
 @pytest.mark.parametrize("across", [False, True])
-def test_vectors_and_matrices_of_mat_files_in_both_orientations(row: bool, across: bool) -> None:
+def test_vectors_and_matrices_of_mat_files_are_read_in_both_orientations(row: bool, across: bool) -> None:
     t = np.array([0.0, 0.5, 2.0, 2.5])
     y = np.arange(8.0).reshape(4, 2)
     data = mat(t=t[None, :] if row else t[:, None], y=y.T if across else y, other=np.arange(3.0))
     assert numbers(data, ".mat") == np.column_stack([t, y]).tolist()
 
 
-def test_a_matrix_with_times_in_its_first_row() -> None:
+def test_a_matrix_with_times_in_its_first_row_or_column_is_read() -> None:
     t, y = np.array([0.0, 0.5, 2.0, 2.5]), np.array([-3.0, 1.0, 2.0, 0.0])
     expected = np.column_stack([t, y]).tolist()
     assert numbers(mat(ans=np.array([t, y])), ".mat") == expected

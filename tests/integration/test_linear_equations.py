@@ -58,11 +58,11 @@ class Solver:
         E[:states] = 1.0 / GAMMA
         self.matrix = np.diag(E) - H * J
 
-    def solve(self, how: str, right: np.ndarray) -> tuple[bool, np.ndarray]:
+    def solve(self, method: str, right: np.ndarray) -> tuple[bool, np.ndarray]:
         """Return whether the solution passes the accuracy check, and the solution."""
         layout = self.layout
         self.scratch[layout.right : layout.right + layout.size] = right
-        accurate = self.functions[how](self.scratch.ctypes.data, H)
+        accurate = self.functions[method](self.scratch.ctypes.data, H)
         return bool(accurate), self.scratch[layout.solution : layout.solution + layout.size].copy()
 
 
@@ -75,8 +75,8 @@ def random_sparse(seed: int, n: int, filled: float) -> np.ndarray:
 def test_both_eliminations_agree_with_numpy(n: int, filled: float) -> None:
     solver = Solver(random_sparse(n, n, filled) + np.eye(n), n)
     right = np.random.default_rng(0).normal(size=n)
-    for how in ("sparse", "dense"):
-        accurate, x = solver.solve(how, right)
+    for method in ("sparse", "dense"):
+        accurate, x = solver.solve(method, right)
         assert accurate
         np.testing.assert_allclose(x, np.linalg.solve(solver.matrix, right), rtol=1e-10, atol=1e-12)
 

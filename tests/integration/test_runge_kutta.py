@@ -176,6 +176,6 @@ def test_a_state_that_overflows_is_a_failure() -> None:
 )
 def test_a_tableau_with_a_wrong_coefficient_is_refused(changes: dict[str, object], message: str) -> None:
     fields = {name: getattr(PAIR, name) for name in PAIR.__dataclass_fields__} | changes
-    with pytest.raises(InputError, match=message) as raised:
+    with pytest.raises(InputError, match=message) as caught:
         ButcherTableau(**fields)
-    assert "integrator rk23" in str(raised.value)
+    assert "integrator rk23" in str(caught.value)

@@ -81,7 +81,7 @@ def test_code_of_a_long_tape_without_lanes_gives_the_same_bits(
     x[5] = 1e300
     in_lanes = compile_system(pendulum()).evaluate_signals(t, x, empty, empty, p)
     monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
-    monkeypatch.setattr(pieces, "LONGEST", 0)
+    monkeypatch.setattr(pieces, "MAX_WEIGHT", 0)
     assert compile_system(pendulum()).evaluate_signals(t, x, empty, empty, p).tobytes() == in_lanes.tobytes()
 
 

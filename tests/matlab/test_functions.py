@@ -19,7 +19,7 @@ from armblocks.matlab.evaluation import Evaluator
 from armblocks.matlab.formula import Formula
 from armblocks.matlab.functions import RESERVED, TABLE
 from armblocks.matlab.number_functions import FUNCTIONS_OF_NUMBERS
-from armblocks.matlab.numbers import Numbers, Plain
+from armblocks.matlab.numbers import NumberOrText, Numbers
 from armblocks.matlab.operators import INFIX, Level
 from armblocks.matlab.parser import parse_formula
 from armblocks.matlab.source import formula_source
@@ -92,6 +92,8 @@ def test_numbers_constants_and_symbols_have_the_same_values(name: str) -> None:
         ("any([0 0 1]) + all([1 0])", 1.0),
         ("max([3 1 2]) - min([3 1 2])", 2.0),
         ("max(nan, 2)", 2.0),
+        ("norm(max([1 5; 3 4], [], 2)' - [5 4]) + norm(min([1 5; 3 4], [], 1) - [1 4])", 0.0),
+        ("numel(5:0:1) + numel(1:0:5)", 0.0),
         ("prod([2 3 4])", 24.0),
         ("mean([1 2 6])", 3.0),
         ("sum(mean([1 2; 3 4]))", 5.0),
@@ -257,7 +259,7 @@ def test_a_name_hides_a_function_that_is_not_reserved() -> None:
 def test_plain_numbers_are_evaluated_without_objects() -> None:
     def value(text: str) -> object:
         source = formula_source(text, "here")
-        variables: dict[str, Plain] = {"a": scalar(3.0)}
+        variables: dict[str, NumberOrText] = {"a": scalar(3.0)}
         return Evaluator(source, Numbers(Budget()), variables).value(parse_formula(source))
 
     assert np.ravel(value("a + [1 2](2)")).tolist() == [5.0]  # pyright: ignore

@@ -1,5 +1,4 @@
-"""The grammar is that of MATLAB: precedences, signs, blanks in matrices, for numbers, symbols and written
-trees."""
+"""Operator precedence, signs and blanks in matrices are those of MATLAB, for numbers and symbols."""
 
 from __future__ import annotations
 
@@ -35,14 +34,14 @@ def by_script(text: str) -> np.ndarray:
 
 
 def by_symbols(text: str) -> float:
-    """The value of a formula whose numbers are symbols, so that nothing is a constant."""
+    """The value of a formula whose numbers are symbols, so that no operand is a constant."""
     numbers: list[float] = []
 
-    def named(actual: re.Match[str]) -> str:
+    def symbol_name(actual: re.Match[str]) -> str:
         numbers.append(float(actual[0]))
         return f"x{len(numbers)}x"
 
-    formula = Formula(re.sub(r"(?<![\w.])(\d+\.?\d*|\.\d+)(e\d+)?", named, text), "here")
+    formula = Formula(re.sub(r"(?<![\w.])(\d+\.?\d*|\.\d+)(e\d+)?", symbol_name, text), "here")
     symbols = {f"x{k}x": SX.sym(f"x{k}") for k in range(1, len(numbers) + 1)}
     value = casadi.Function("f", list(symbols.values()), [formula.trace(symbols)])
     return float(value(*numbers))
@@ -139,13 +138,13 @@ def test_powers_of_vectors_are_elementwise() -> None:
     assert by_formula("[1 -2 3]'.^2").tolist() == [1.0, 4.0, 9.0]
 
 
-def written(draw: random.Random, depth: int) -> str:
+def random_expression(draw: random.Random, depth: int) -> str:
     """A random expression of numbers, all operators, brackets, transposes and functions."""
     if depth == 0 or draw.random() < 0.15:
         number = draw.choice(["1", "2", "3", "0", "0.5", "1.5", ".25", "2e0"])
         return number + draw.choice(["", "", "", "'", ".'"])
     kind = draw.random()
-    left, right = written(draw, depth - 1), written(draw, depth - 1)
+    left, right = random_expression(draw, depth - 1), random_expression(draw, depth - 1)
     blank = draw.choice(["", " "])
     if kind < 0.3:
         sign = draw.choice(["", "", "-", "+", "--", "- +", "~"])
@@ -214,7 +213,7 @@ class TwoStacks:
 
 
 def by_two_stacks(text: str) -> float:
-    """The value of a text of :func:`written`; raises ``ValueError`` for a comparison of a comparison."""
+    """The value of a text of :func:`random_expression`; raises ``ValueError`` for chained comparisons."""
     stacks, before = TwoStacks(), "("
     for match in _TOKEN.finditer(text):
         token = match[0]
@@ -276,7 +275,7 @@ def test_random_expressions_have_the_values_of_an_independent_evaluator() -> Non
     draw = random.Random(20)
     compared = refused = 0
     for _ in range(300):
-        text = written(draw, 4)
+        text = random_expression(draw, 4)
         with np.errstate(all="ignore"):
             try:
                 expected = by_two_stacks(text)

@@ -6,7 +6,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from armblocks.robot import Revolute, Robot, inertia_findings
-from robots_for_tests import SOLID_ROBOTS, evaluate, random_states
+from robots_for_tests import CONSISTENT_ROBOTS, evaluate, random_states
 
 
 def quaternion(R: np.ndarray) -> np.ndarray:
@@ -42,7 +42,7 @@ def mujoco_model(robot: Robot) -> mujoco.MjModel:
     return spec.compile()
 
 
-@pytest.mark.parametrize("robot", SOLID_ROBOTS.values(), ids=SOLID_ROBOTS.keys())
+@pytest.mark.parametrize("robot", CONSISTENT_ROBOTS.values(), ids=CONSISTENT_ROBOTS.keys())
 def test_agrees_with_mujoco(robot: Robot):
     assert not inertia_findings(robot)
     model = mujoco_model(robot)

@@ -30,12 +30,12 @@ def one_of_each() -> Picture:
         Disc(100, 20, 6, fill=Tone.TRACE_0),
         Raster(60, 40, 16, 16, pixels),
         Group((Text(5, 70, SPECIAL_TEXT, mono=True),), title=SPECIAL_TEXT),
-        Text(110, 70, "up", turn=90, anchor="end", bold=True, italic=True),
+        Text(110, 70, "up", rotation=90, anchor="end", bold=True, italic=True),
     )
     return picture
 
 
-def decoded(data: bytes) -> np.ndarray:
+def png_pixels(data: bytes) -> np.ndarray:
     """Decode a PNG written by this package, according to the specification."""
     width, height, depth, kind = struct.unpack(">IIBB", data[16:26])
     assert depth == 8
@@ -86,7 +86,7 @@ def test_the_same_picture_gives_the_same_bytes() -> None:
 
 
 def test_png_marks_are_at_their_positions() -> None:
-    pixels = decoded(picture_png(one_of_each(), scale=2.0))
+    pixels = png_pixels(picture_png(one_of_each(), scale=2.0))
     assert pixels.shape == (160, 240, 3)
     assert tuple(pixels[158, 2]) == (255, 255, 255)
     assert tuple(pixels[40, 200]) == (0x00, 0x72, 0xB2)  # the disc
@@ -98,17 +98,17 @@ def test_png_marks_are_at_their_positions() -> None:
 
 def test_png_files_contain_their_pixels() -> None:
     pixels = np.random.default_rng(1).integers(0, 256, (7, 5, 4)).astype(np.uint8)
-    assert (decoded(png_bytes(pixels)) == pixels).all()
+    assert (png_pixels(png_bytes(pixels)) == pixels).all()
     assert resampled(pixels, 14, 10).shape == (14, 10, 4)
     assert resampled(pixels, 7, 5) is pixels
 
 
 def test_moving_a_picture_moves_every_mark() -> None:
     marks = one_of_each().marks
-    there_and_back = [moved(moved(mark, 7, -3), -7, 3) for mark in marks]
+    restored_marks = [moved(moved(mark, 7, -3), -7, 3) for mark in marks]
     before, after = Picture(width=1, height=1, title="a"), Picture(width=1, height=1, title="a")
     before.extend(marks)
-    after.extend(there_and_back)
+    after.extend(restored_marks)
     assert svg_file(before) == svg_file(after)
 
 

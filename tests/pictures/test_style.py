@@ -8,7 +8,7 @@ import pytest
 from armblocks.pictures.style import PALETTE, TRACES, Theme, Tone, contrast, rgb, trace_dash, trace_tone
 
 TEXT = (Tone.INK, Tone.MUTED, Tone.ACCENT, Tone.ERROR, Tone.WARNING)
-GROUNDS = {
+BACKGROUNDS = {
     Tone.INK: (Tone.PAGE, Tone.SURFACE, Tone.SUNKEN),
     Tone.MUTED: (Tone.PAGE, Tone.SURFACE, Tone.SUNKEN),
     Tone.ACCENT: (Tone.PAGE, Tone.SURFACE),
@@ -17,7 +17,7 @@ GROUNDS = {
 }
 
 
-def test_contrast_of_known_pairs() -> None:
+def test_known_pairs_of_colours_have_their_contrast() -> None:
     assert contrast("#000000", "#ffffff") == pytest.approx(21.0)
     assert contrast("#777777", "#777777") == pytest.approx(1.0)
 
@@ -25,8 +25,8 @@ def test_contrast_of_known_pairs() -> None:
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("tone", TEXT)
 def test_text_has_a_contrast_of_at_least_4_5(theme: Theme, tone: Tone) -> None:
-    for ground in GROUNDS[tone]:
-        assert contrast(PALETTE[tone].of(theme), PALETTE[ground].of(theme)) >= 4.5, ground
+    for background in BACKGROUNDS[tone]:
+        assert contrast(PALETTE[tone].of(theme), PALETTE[background].of(theme)) >= 4.5, background
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])

@@ -107,7 +107,7 @@ def test_rows_of_tables_have_a_cell_for_each_column() -> None:
 
 
 def test_pictures_of_the_studio_are_shown_in_both_themes() -> None:
-    """Each picture has a light and a dark file, and a page that shows both; Sphinx shows one by the theme."""
+    """Each picture has a light and a dark file; a page refers to both, and its theme selects one."""
     shown = " ".join(page.read_text(encoding="utf-8") for page in PAGES)
     pictures = ROOT / "docs" / "pictures"
     for path in pictures.glob("*.webp"):

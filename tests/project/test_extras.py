@@ -1,4 +1,4 @@
-"""The core works without the libraries of the extras; features that need one name its extra in an error."""
+"""The core works without the optional libraries; the error of a feature that needs one names its extra."""
 
 import json
 import subprocess
@@ -51,6 +51,7 @@ result = ab.simulate(model, stop_time=0.1)
 for name in ("signals.csv", "signals.npz"):
     result.save(name)
     ab.load_table(name)
+Path("arm.xacro").write_bytes(b"<robot/>")
 for name in ("a.mat", "a.parquet"):
     Path(name).write_bytes(b"")
 linear = ab.linearize(model)
@@ -69,6 +70,7 @@ for name, call in {
     "pdf": lambda: ab.draw_diagram(model, "x.pdf"),
     "poles": linear.poles,
     "widget": lambda: ab.robot_widget(ab.load_robot("puma560")),
+    "xacro": lambda: ab.load_robot("arm.xacro"),
 }.items():
     try:
         said[name] = repr(call())
@@ -115,6 +117,7 @@ def test_the_core_runs_without_the_extras_and_names_missing_libraries(tmp_path: 
         "pdf": ("matplotlib", "figures", "PDF drawings"),
         "poles": ("scipy", "analysis", "poles of a linear system"),
         "widget": ("anywidget", "notebook", "widgets in notebooks"),
+        "xacro": ("xacro", "xacro", "xacro files"),
     }
     assert message.keys() == expected.keys()
     for name, (library, extra, use) in expected.items():
@@ -129,9 +132,9 @@ def test_messages_and_pyproject_agree_on_the_libraries_of_the_extras() -> None:
     extras = project["optional-dependencies"]
     named = {name: {entry.partition(">")[0] for entry in extras[name]} for name in LIBRARIES}
     for name, libraries in LIBRARIES.items():
-        brought = named[name] - {"armblocks[figures]"}
-        brought |= {other for library in brought for other in INDIRECT.get(library, set())}
-        assert brought == set(libraries), name
+        installed = named[name] - {"armblocks[figures]"}
+        installed |= {other for library in installed for other in INDIRECT.get(library, set())}
+        assert installed == set(libraries), name
     assert extras["all"] == [f"armblocks[{','.join(sorted(LIBRARIES))}]"]
     assert "armblocks[all,docs]" in extras["test"]
 

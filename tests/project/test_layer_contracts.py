@@ -36,7 +36,7 @@ VIOLATIONS = {
 """One violation of each contract: package, inserted line, and the imported module."""
 
 
-def judge(folder: Path) -> tuple[dict[str, bool], dict[str, str]]:
+def check_contracts(folder: Path) -> tuple[dict[str, bool], dict[str, str]]:
     """Run import-linter in ``folder``; return which contracts are kept, and the output for broken ones."""
     script = (
         "import sys; sys.path.insert(0, 'src'); "
@@ -65,7 +65,7 @@ def copy(tmp_path: Path) -> Path:
 
 
 def test_every_contract_is_kept(copy: Path) -> None:
-    verdicts, _ = judge(copy)
+    verdicts, _ = check_contracts(copy)
     assert sorted(verdicts) == sorted(VIOLATIONS)
     assert all(verdicts.values()), verdicts
 
@@ -77,7 +77,7 @@ def test_every_contract_detects_its_violation(copy: Path) -> None:
             "a", encoding="utf-8"
         ) as stream:
             stream.write(f"\n{line}\n")
-    verdicts, message = judge(copy)
+    verdicts, message = check_contracts(copy)
     assert not any(verdicts.values()), verdicts
     for contract, (package, _, imported) in VIOLATIONS.items():
         assert f"armblocks.{package} -> {imported} (l." in message[contract], contract

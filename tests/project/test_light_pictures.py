@@ -23,7 +23,7 @@ CURVES = {
 @pytest.mark.parametrize("name", CURVES)
 def test_omitted_points_are_within_the_tolerance_of_the_drawn_line(name: str) -> None:
     points = CURVES[name]
-    indices = np.flatnonzero(LIGHT["kept_points"](points))
+    indices = np.flatnonzero(LIGHT["selected_points"](points))
     assert indices[0] == 0
     assert indices[-1] == len(points) - 1
     for first, last in pairwise(indices):
@@ -35,7 +35,7 @@ def test_omitted_points_are_within_the_tolerance_of_the_drawn_line(name: str) ->
 
 
 def test_smooth_curves_lose_most_of_their_points() -> None:
-    counts = {name: int(LIGHT["kept_points"](points).sum()) for name, points in CURVES.items()}
+    counts = {name: int(LIGHT["selected_points"](points).sum()) for name, points in CURVES.items()}
     assert counts["straight"] == counts["rest"] == 2
     assert counts["jump"] == 4
     assert counts["sine"] < 150

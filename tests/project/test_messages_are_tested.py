@@ -1,8 +1,7 @@
 """Every error and warning of the package is checked by a test.
 
-The check is static and approximate: for each construction of an armblocks error or warning it takes the
-literal words of the message (what, allowed, fix) and searches three consecutive words of them in the files
-under ``tests``.
+The check is static and approximate. It takes the literal words of the message (what, allowed, fix) from each
+construction of an armblocks error or warning. Three consecutive words must occur in a file under ``tests``.
 """
 
 import ast
@@ -47,14 +46,14 @@ def is_message(node: ast.AST) -> bool:
     """Whether the node constructs an error or a warning."""
     if not isinstance(node, ast.Call) or not node.args:
         return False
-    kind = called(node)
+    kind = called_name(node)
     return kind in TREE or (
         kind == "warn"
         and any(isinstance(argument, ast.Name) and argument.id in TREE for argument in node.args[1:])
     )
 
 
-def called(node: ast.Call) -> str:
+def called_name(node: ast.Call) -> str:
     """The last part of the name of the called function."""
     return node.func.id if isinstance(node.func, ast.Name) else getattr(node.func, "attr", "")
 
@@ -72,14 +71,14 @@ def messages() -> Iterator[tuple[str, list[str]]]:
             inside = list(ast.walk(scope))
             calls = [node for node in inside if isinstance(node, ast.Call) and is_message(node)]
             if not visited.issuperset(calls):
-                names = assigned(inside)
+                names = assignments(inside)
                 for node in calls:
                     if node not in visited:
                         visited.add(node)
                         yield f"{path.relative_to(SOURCE).as_posix()}:{node.lineno}", pieces_of(node, names)
 
 
-def assigned(nodes: Sequence[ast.AST]) -> dict[str, ast.expr]:
+def assignments(nodes: Sequence[ast.AST]) -> dict[str, ast.expr]:
     """The expressions assigned to each name."""
     return {
         target.id: node.value
@@ -93,7 +92,7 @@ def assigned(nodes: Sequence[ast.AST]) -> dict[str, ast.expr]:
 def pieces_of(node: ast.Call, names: dict[str, ast.expr]) -> list[str]:
     """The literal pieces of the constructed message."""
     pieces = list(literal_pieces(node.args[0], names))
-    if called(node) == "UnknownNameError":
+    if called_name(node) == "UnknownNameError":
         pieces = [f"there is no {' '.join(pieces)} named"]
     for keyword in node.keywords:
         if keyword.arg in ("allowed", "fix"):
@@ -107,16 +106,16 @@ def runs(pieces: list[str]) -> Iterator[tuple[str, ...]]:
     Pieces of one word count only if there is no longer piece.
     """
     split = [words(piece) for piece in pieces]
-    least = min(2, max((len(piece) for piece in split), default=0))
+    min_words = min(2, max((len(piece) for piece in split), default=0))
     for piece in split:
         size = min(RUN_OF_WORDS, len(piece))
-        if size >= max(least, 1):
+        if size >= max(min_words, 1):
             for start in range(len(piece) - size + 1):
                 yield tuple(piece[start : start + size])
 
 
 @pytest.fixture(scope="module")
-def tested() -> set[tuple[str, ...]]:
+def tested_sequences() -> set[tuple[str, ...]]:
     """All sequences of one, two and three words in the texts of the tests."""
     sequences: set[tuple[str, ...]] = set()
     for path in sorted((ROOT / "tests").rglob("*.py")):
@@ -132,10 +131,10 @@ def tested() -> set[tuple[str, ...]]:
     return sequences
 
 
-def test_every_message_occurs_in_a_test(tested: set[tuple[str, ...]]) -> None:
-    unread = []
+def test_every_message_occurs_in_a_test(tested_sequences: set[tuple[str, ...]]) -> None:
+    untested = []
     for place, pieces in messages():
         candidates = [run for run in runs(pieces) if run]
-        if candidates and not any(run in tested for run in candidates):
-            unread.append(f"{place}: {' … '.join(pieces)}")
-    assert unread == [], f"{len(unread)} messages that no test reads:\n" + "\n".join(unread)
+        if candidates and not any(run in tested_sequences for run in candidates):
+            untested.append(f"{place}: {' … '.join(pieces)}")
+    assert untested == [], f"{len(untested)} messages that no test reads:\n" + "\n".join(untested)

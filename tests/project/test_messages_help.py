@@ -41,7 +41,7 @@ def constructions() -> Iterator[tuple[str, str, ast.Call]]:
                     yield f"{place}:{node.lineno}", kind, node
 
 
-def lacking(place: str, kind: str, call: ast.Call) -> set[str]:
+def missing_arguments(place: str, kind: str, call: ast.Call) -> set[str]:
     """The missing arguments of an error's construction."""
     message = {keyword.arg for keyword in call.keywords if not _is_empty(keyword.value)}
     missing = {"where", "fix"} - message - PROVIDED.get(kind, set())
@@ -58,7 +58,7 @@ def test_every_error_has_a_place_and_a_remedy() -> None:
     incomplete = [
         f"{place} {kind} lacks {sorted(m)}"
         for place, kind, call in all_errors
-        if (m := lacking(place, kind, call))
+        if (m := missing_arguments(place, kind, call))
     ]
     assert incomplete == [], f"{len(incomplete)} errors give no help:\n" + "\n".join(incomplete)
 
@@ -66,5 +66,5 @@ def test_every_error_has_a_place_and_a_remedy() -> None:
 def test_the_check_detects_missing_arguments() -> None:
     call = ast.parse('InputError("x is 3", where="", allowed="2")', mode="eval").body
     assert isinstance(call, ast.Call)
-    assert lacking("face/arm.py:1", "InputError", call) == {"where", "fix"}
-    assert lacking("blocks/maths.py:1", "InputError", call) == {"fix"}
+    assert missing_arguments("face/arm.py:1", "InputError", call) == {"where", "fix"}
+    assert missing_arguments("blocks/maths.py:1", "InputError", call) == {"fix"}

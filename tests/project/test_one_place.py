@@ -42,7 +42,7 @@ class Doubled(Block):
 USE = """
 import armblocks as ab
 from armblocks.blocks import BLOCKS, Clock, Doubled
-from armblocks.studio.sheet.shown import library
+from armblocks.studio.sheet.drawing_data import library
 
 assert BLOCKS.family_of(Doubled) == "maths"
 builder = ab.DiagramBuilder("made")
@@ -138,7 +138,7 @@ def _read(data, name):
     return {"arm": Robot(name="arm", links=serial_chain(links))}
 
 
-TABLE = RobotFormat(name="D-H table", suffixes=(".dh",), most_bytes=10_000, read=_read)
+TABLE = RobotFormat(name="D-H table", suffixes=(".dh",), max_bytes=10_000, read=_read)
 '''
 USE_OF_FORMAT = """
 from pathlib import Path

@@ -88,7 +88,7 @@ def forbidden_parts(nodes: Iterable[ast.AST], imports: set[str]) -> Iterator[int
                 pass
 
 
-def test_nothing_is_evaluated_pickled_or_fetched(nodes: dict[str, list[ast.AST]]) -> None:
+def test_no_file_evaluates_text_unpickles_files_or_uses_the_network(nodes: dict[str, list[ast.AST]]) -> None:
     assert [
         f"{name}:{line}"
         for name, inside in nodes.items()
@@ -135,7 +135,7 @@ def test_files_do_not_have_generic_names() -> None:
     assert [name for name in NAMES if set(Path(name).with_suffix("").parts) & VAGUE_NAMES] == []
 
 
-def imported(nodes: Iterable[ast.AST], modules: Collection[str]) -> Iterator[str]:
+def imported_modules(nodes: Iterable[ast.AST], modules: Collection[str]) -> Iterator[str]:
     """Every module among ``modules`` from which an import takes something.
 
     Imports in functions and under ``TYPE_CHECKING`` are included, because a reader of the module needs them.
@@ -152,7 +152,7 @@ def imported(nodes: Iterable[ast.AST], modules: Collection[str]) -> Iterator[str
                     yield node.module
 
 
-def circles(graph: Mapping[str, set[str]]) -> list[list[str]]:
+def import_cycles(graph: Mapping[str, set[str]]) -> list[list[str]]:
     """The groups of mutually dependent modules (Tarjan's strongly connected components), sorted."""
     number: dict[str, int] = {}
     lowest: dict[str, int] = {}
@@ -192,7 +192,7 @@ def circles(graph: Mapping[str, set[str]]) -> list[list[str]]:
     ],
 )
 def test_import_cycles_are_detected(graph: dict[str, set[str]], expected: list[list[str]]) -> None:
-    assert circles(graph) == expected
+    assert import_cycles(graph) == expected
 
 
 def test_every_kind_of_import_is_included() -> None:
@@ -207,7 +207,7 @@ def late():
     from armblocks.e import (f, g)
 """
     modules = {f"armblocks.{name}" for name in ("a", "b", "c", "d", "e", "e.f", "unused")}
-    groups = set(imported(ast.walk(ast.parse(source)), modules))
+    groups = set(imported_modules(ast.walk(ast.parse(source)), modules))
     assert groups == {f"armblocks.{name}" for name in ("a", "b", "c", "d", "e", "e.f")}
 
 
@@ -216,4 +216,7 @@ def test_there_are_no_import_cycles(nodes: dict[str, list[ast.AST]]) -> None:
         ".".join(("armblocks", *Path(name).with_suffix("").parts)).removesuffix(".__init__"): inside
         for name, inside in nodes.items()
     }
-    assert circles({name: set(imported(inside, modules)) for name, inside in modules.items()}) == []
+    assert (
+        import_cycles({name: set(imported_modules(inside, modules)) for name, inside in modules.items()})
+        == []
+    )

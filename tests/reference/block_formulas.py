@@ -19,7 +19,7 @@ Inputs = Mapping[str, np.ndarray]
 Formula = Callable[[Any, Inputs, np.ndarray], np.ndarray]
 """Function of a block, its inputs (N, *shape) by port, and the time (N, 1, …); it returns the output y."""
 
-BORDER = 1e-8
+SWITCHING_TOLERANCE = 1e-8
 """Tolerance of switching times, as a difference of inputs relative to 1 + |u|."""
 
 _RELATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
@@ -66,8 +66,8 @@ def _modulo(block: Any, u: Inputs, t: np.ndarray) -> np.ndarray:
 
 
 def _switch(block: Any, u: Inputs, t: np.ndarray) -> np.ndarray:
-    met = u["u2"] >= block.threshold if block.criterion == ">=" else u["u2"] > block.threshold
-    return np.where(met, u["u1"], u["u3"])
+    is_first = u["u2"] >= block.threshold if block.criterion == ">=" else u["u2"] > block.threshold
+    return np.where(is_first, u["u1"], u["u3"])
 
 
 def _multiport(block: Any, u: Inputs, t: np.ndarray) -> np.ndarray:
@@ -91,7 +91,7 @@ def _table(block: Any, u: Inputs, t: np.ndarray) -> np.ndarray:
 
 
 def _phase(t: np.ndarray, period: float) -> np.ndarray:
-    """Return the time since the start of the period; a time a few rounding errors before it belongs to it."""
+    """Return the time since the start of the period; rounding errors just before the start are ignored."""
     count = np.floor(t / period * (1.0 + 2e-14))
     return np.maximum(t - count * period, 0.0)
 
@@ -190,7 +190,7 @@ def contradictions(
 ) -> tuple[int, float, float] | None:
     """Return the first row whose output contradicts the formula for all inputs near the recorded ones.
 
-    Inputs are near if they differ by at most ``BORDER``.
+    Inputs are near if they differ by at most ``SWITCHING_TOLERANCE``.
     """
     rank = y.ndim
     wide = {name: _spread(value, rank) for name, value in inputs.items()}
@@ -201,11 +201,11 @@ def contradictions(
         moved = {k: v + move * (1.0 + np.abs(v)) for (k, v), move in zip(wide.items(), moves)}
         with np.errstate(all="ignore"):
             expected = np.broadcast_to(_array(formula(block, moved, t)), y.shape)
-        return (np.abs(y - expected) <= 4 * BORDER * size) | ~np.isfinite(expected), expected
+        return (np.abs(y - expected) <= 4 * SWITCHING_TOLERANCE * size) | ~np.isfinite(expected), expected
 
     exact, expected = fits((0.0,) * len(wide))
     near = exact.copy()
-    for moves in itertools.product((0.0, BORDER, -BORDER), repeat=len(wide)):
+    for moves in itertools.product((0.0, SWITCHING_TOLERANCE, -SWITCHING_TOLERANCE), repeat=len(wide)):
         near |= fits(moves)[0]
     # A switching time may be located slightly late, which affects one row; longer deviations are errors.
     deviating = np.pad(~exact, [(2, 2)] + [(0, 0)] * (rank - 1))
@@ -217,14 +217,14 @@ def contradictions(
         ],
         axis=0,
     )
-    # Rounding may also leave an input next to a border, such as -0.15000000000000002 next to -0.15.
+    # Rounding may also leave an input next to a switching value, such as -0.15000000000000002 next to -0.15.
     rounded = np.zeros(y.shape, dtype=bool)
     for value in wide.values():
         rounded = rounded | _has_rounding_error(value)
-    right = exact | (near & (~stays | rounded))
-    if right.all():
+    is_consistent = exact | (near & (~stays | rounded))
+    if is_consistent.all():
         return None
-    entry = tuple(np.argwhere(~right)[0])
+    entry = tuple(np.argwhere(~is_consistent)[0])
     return int(entry[0]), float(y[entry]), float(expected[entry])
 
 

@@ -50,8 +50,8 @@ def judged(recipe: Recipe, laws: Sequence[str]) -> Found:
         return findings(recipe, laws)
     except InconclusiveError as reason:
         return {"inconclusive": [str(reason)]}
-    except ArmblocksError as refused:
-        return {"refused": [str(refused)]}
+    except ArmblocksError as caught:
+        return {"refused": [str(caught)]}
     except Exception as error:
         return {"error": [f"{error!r}\n{traceback.format_exc(limit=-4)}"]}
 
@@ -78,13 +78,13 @@ class Judge:
     def judge(self, recipe: Recipe, laws: Sequence[str]) -> Found:
         if self.process is None:
             context = multiprocessing.get_context("fork")
-            self.ours, self.theirs = context.Pipe()
-            self.process = context.Process(target=_judging, args=(self.theirs, self.seconds), daemon=True)
+            self.parent_end, self.child_end = context.Pipe()
+            self.process = context.Process(target=_judging, args=(self.child_end, self.seconds), daemon=True)
             self.process.start()
-        self.ours.send((recipe, laws))
-        self.theirs.close()  # only the process holds this end: if it dies, ``recv`` raises EOFError
+        self.parent_end.send((recipe, laws))
+        self.child_end.close()  # only the process holds this end: if it dies, ``recv`` raises EOFError
         try:
-            return self.ours.recv()
+            return self.parent_end.recv()
         except EOFError:
             self.process.join()
             code = self.process.exitcode

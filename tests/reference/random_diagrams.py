@@ -1,8 +1,8 @@
 """Random diagrams of all block types, represented such that they can be changed and reduced.
 
-Sources jump to, touch and graze the switching values of other blocks: sawtooth waves that reach a limit
-exactly when they jump, square waves equal to a limit, steps at recorded times, sines whose crest touches a
-limit, and pulses in phase with ticks.
+Sources jump to, touch and graze the switching values of other blocks. Examples are sawtooth waves that reach
+a limit exactly when they jump, square waves equal to a limit, sines whose crest touches a limit, steps at
+recorded times, and pulses in phase with ticks.
 """
 
 from __future__ import annotations
@@ -236,11 +236,11 @@ class RecipeGenerator:
         r = self.random
         frequency = float(r.choice([math.pi, 2 * math.pi, 2.0, r.uniform(0.5, 9.0)]))
         phase = float(r.choice([0.0, math.pi / 2, r.uniform(0, 6)]))
-        anywhere = float(r.uniform(0, 6))
+        any_phase = float(r.uniform(0, 6))
         return {
             "amplitude": amplitude,
             "frequency": frequency,
-            "phase": anywhere if frequency % math.pi == 0.0 else phase,
+            "phase": any_phase if frequency % math.pi == 0.0 else phase,
             "bias": float(r.choice([0.0, 0.5, -0.5])),
         }
 
@@ -378,16 +378,16 @@ class RecipeGenerator:
             "branches",
         )
         kind = str(r.choice(kinds))
-        fed = [scalars[int(r.integers(len(scalars)))] for _ in range(int(r.integers(1, 3)))]
+        subsystem_inputs = [scalars[int(r.integers(len(scalars)))] for _ in range(int(r.integers(1, 3)))]
         for_trigger = "Triggered" in kind
         if kind == "branches":
-            self.branches(nodes, signals, scalars, fed, depth)
+            self.branches(nodes, signals, scalars, subsystem_inputs, depth)
             return
-        inside = self.inside(fed, depth, for_trigger)
+        inside = self.inside(subsystem_inputs, depth, for_trigger)
         if inside is None:
             return
         parameters: dict[str, Any] = {}
-        ports: dict[str, Signal] = {f"in{k}": s for k, s in enumerate(fed)}
+        ports: dict[str, Signal] = {f"in{k}": s for k, s in enumerate(subsystem_inputs)}
         control = scalars[int(r.integers(len(scalars)))]
         if kind == "EnabledSubsystem":
             parameters["states_when_enabling"] = str(r.choice(["held", "reset"]))
@@ -412,10 +412,12 @@ class RecipeGenerator:
             kind, limit = (("HitCrossing", "offset"), ("Relay", "on_point"))[int(r.integers(2))]
             self.add(nodes, signals, kind, {limit: float(r.uniform(-1.0, 1.5))}, {"u": latest_signal})
 
-    def inside(self, fed: Sequence[Signal], depth: int, for_trigger: bool) -> tuple[Node, ...] | None:
+    def inside(
+        self, subsystem_inputs: Sequence[Signal], depth: int, for_trigger: bool
+    ) -> tuple[Node, ...] | None:
         """Return In blocks, some other blocks, and one or two Out blocks."""
-        entries = [Node(f"in{k}", "Inport") for k in range(len(fed))]
-        sources = [Signal(f"in{k}/y", s.shape, False) for k, s in enumerate(fed)]
+        entries = [Node(f"in{k}", "Inport") for k in range(len(subsystem_inputs))]
+        sources = [Signal(f"in{k}/y", s.shape, False) for k, s in enumerate(subsystem_inputs)]
         inner = self.level(int(self.random.integers(1, 4)), depth + 1, sources, for_trigger)
         if not inner:
             return None
@@ -440,7 +442,7 @@ class RecipeGenerator:
         nodes: list[Node],
         signals: list[Signal],
         scalars: Sequence[Signal],
-        fed: Sequence[Signal],
+        subsystem_inputs: Sequence[Signal],
         depth: int,
     ) -> None:
         """Add an If block, two action subsystems and a Merge."""
@@ -450,11 +452,13 @@ class RecipeGenerator:
         choice = nodes[-1].name
         merged: dict[str, Signal] = {}
         for number, port in enumerate(("if1", "else"), 1):
-            inside = self.inside(fed, depth, False)
+            inside = self.inside(subsystem_inputs, depth, False)
             if inside is None:
                 return
             inside = tuple(n for n in inside if n.kind != "Outport" or n.name == "out0")
-            ports = {f"in{k}": s for k, s in enumerate(fed)} | {"action": Signal(f"{choice}/{port}", ())}
+            ports = {f"in{k}": s for k, s in enumerate(subsystem_inputs)} | {
+                "action": Signal(f"{choice}/{port}", ())
+            }
             states = str(self.random.choice(["held", "reset"]))
             if not self.add(
                 nodes, signals, "ActionSubsystem", {"states_when_resuming": states}, ports, inside
@@ -473,8 +477,8 @@ class RecipeGenerator:
             "Step",
             {"time": float(r.choice([0.0, 0.5, r.uniform(0, 1)])), "initial": 0.0, "final": -9.81},
         )
-        weight = signals[-1]
-        self.add(nodes, signals, "Bias", {"bias": 0.0}, {"u": weight})
+        gravity = signals[-1]
+        self.add(nodes, signals, "Bias", {"bias": 0.0}, {"u": gravity})
         parameters = {"lower": 0.0, "initial": float(r.choice([0.0, 0.3, 1.0])), "reinitialize": True}
         self.count += 1
         name = f"ball {self.count}"
@@ -482,7 +486,7 @@ class RecipeGenerator:
             f"bounce {self.count}", "Gain", {"gain": -float(r.uniform(0.1, 0.95))}, {"u": f"{name}/dx"}
         )
         ball = Node(
-            name, "SecondOrderIntegratorLimited", parameters, {"u": weight.ref, "dx0": f"{back.name}/y"}
+            name, "SecondOrderIntegratorLimited", parameters, {"u": gravity.ref, "dx0": f"{back.name}/y"}
         )
         nodes += [back, ball]
         signals += [Signal(f"{name}/x", ()), Signal(f"{name}/dx", ())]
@@ -497,16 +501,16 @@ class RecipeGenerator:
         scalars = [s for s in signals if s.shape == ()]
         if not scalars:
             return
-        fed = scalars[int(r.integers(len(scalars)))]
+        block_input = scalars[int(r.integers(len(scalars)))]
         operands: list[Signal] = []
         for _ in range(2):
             kind = str(r.choice(HYSTERESIS.split() if r.random() < 0.6 else SWITCHING.split()))
             if len(BLOCKS[kind]().input_ports()) == 1 and self.add(
-                nodes, signals, kind, self.parameters(kind), {"u": fed}
+                nodes, signals, kind, self.parameters(kind), {"u": block_input}
             ):
                 operands.append(signals[-1])
-                fed = signals[-1] if r.random() < 0.5 else fed
-        inputs = dict(zip(("u1", "u2"), [*operands, fed, fed]))
+                block_input = signals[-1] if r.random() < 0.5 else block_input
+        inputs = dict(zip(("u1", "u2"), [*operands, block_input, block_input]))
         if self.add(nodes, signals, "Sum", {"signs": "+-"}, inputs):
             difference = signals[-1]
             for kind, limit in (("HitCrossing", "offset"), ("Relay", "on_point")):

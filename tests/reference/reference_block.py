@@ -72,7 +72,7 @@ class BlockNumbers:
         self.clock: int | None = None
         self.period = 0.0
         self.gate: dict[str, np.ndarray] = {}
-        self.begun = False
+        self.was_restarted = False
         self.states = block.states(shapes)
         self.discrete = block.discrete_states(shapes)
         self.lines = block.delay_lines(shapes)
@@ -149,7 +149,7 @@ class BlockNumbers:
         self._needs: dict[tuple[str, str], set[str]] = {}
         self._buffers: list[Any] = []
         read = {key for entry in self.expressions for key in self.needs(*entry)}
-        self.fed = sorted(key[2:] for key in read if key.startswith("u:"))
+        self.inputs_read = sorted(key[2:] for key in read if key.startswith("u:"))
 
     def needs(self, kind: str, name: str) -> set[str]:
         """Return the keys of the arrays that an equation reads."""
@@ -213,7 +213,7 @@ class BlockNumbers:
         return "?fire" in self.gate and self.gate["?fire"][0] != 0.0
 
     def restart(self) -> None:
-        self.begun = True
+        self.was_restarted = True
         for name in self.names("start"):
             self.arrays[f"x:{name}"][:] = self.value("start", name)
         for name in (*(mode.name for mode in self.modes), *(mode.before for mode in self.remembered)):

@@ -42,13 +42,13 @@ class _ControlBlock:
         self.discrete = tuple(_Named(entry) for entry in self.memory)
         for entry in self.memory:
             self.arrays[f"x:{entry}"] = np.zeros(math.prod(outputs.get("y", ())))
-        self.fed = [key[2:] for key in self.arrays if key.startswith("u:")]
+        self.inputs_read = [key[2:] for key in self.arrays if key.startswith("u:")]
         self.begin()
 
     on, restarts, fires = True, False, False
     ticking = False
     """Whether the present evaluation is part of a tick."""
-    begun = False
+    was_restarted = False
     """Whether the block has been restarted at this instant."""
 
     def begin(self) -> None: ...
@@ -138,11 +138,11 @@ class Trigger(_ControlBlock):
         side, previous = self.arrays["x:side"][0], self.arrays["x:seen"][0]
         rises, falls = side == 1.0 and previous == 0.0, side == 0.0 and previous == 1.0
         fires = {"rising": rises, "falling": falls, "either": rises or falls}[self.block.edge]
-        anew = bool(self.u("anew", 0.0))
-        fires = fires and bool(self.u("outer")) and not anew and not self.begun
+        outer_restarts = bool(self.u("anew", 0.0))
+        fires = fires and bool(self.u("outer")) and not outer_restarts and not self.was_restarted
         values = {
             "fire": float(fires),
-            "restart": float(fires or anew),
+            "restart": float(fires or outer_restarts),
             "elapsed": self.arrays["t"][0] - self.arrays["x:last"][0],
         }
         return np.array([values[port]])
@@ -154,7 +154,7 @@ class Trigger(_ControlBlock):
             return False
         if self.value("out", "fire")[0] or self.u("anew", 0.0):
             self.arrays["x:last"][:] = t
-        self.begun = self.begun or bool(self.u("anew", 0.0))
+        self.was_restarted = self.was_restarted or bool(self.u("anew", 0.0))
         self.arrays["x:seen"][:] = side
         return bool(side != previous)
 
@@ -173,7 +173,7 @@ class Held(_ControlBlock):
     def value(self, kind: str, port: str) -> np.ndarray:
         if self.u("works"):
             return self.arrays["u:u"] + 0.0 * self.arrays["x:held"]
-        reset = kind == "out" and not self.block.fires and self.block.when_off == "reset"
+        reset = kind == "out" and not self.block.pulsed and self.block.when_off == "reset"
         if reset or self.u("anew", 0.0):
             return np.zeros_like(self.arrays["x:held"]) + np.ravel(self.block.initial)
         return self.arrays["x:held"]
@@ -185,12 +185,12 @@ class Held(_ControlBlock):
         return ["u"]
 
     def names(self, kind: str) -> list[str]:
-        return ["held"] if kind == "capture" and not self.block.fires else []
+        return ["held"] if kind == "capture" and not self.block.pulsed else []
 
     def act(self, t: float) -> bool:
         if self.u("anew", 0.0):
             self.arrays["x:held"][:] = np.ravel(self.block.initial)
-        if self.block.fires and self.u("works"):
+        if self.block.pulsed and self.u("works"):
             self.arrays["x:held"][:] = self.arrays["u:u"]
         return False
 

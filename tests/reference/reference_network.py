@@ -45,7 +45,7 @@ class Network:
         self._locate_states()
         self.clocks = assign_clocks(flat, self.blocks, self.drivers)
         self.order = EvaluationOrder(self.blocks, self.drivers, flat.gates)
-        self.links = {b.name: [self._link(b, port) for port in b.fed] for b in self.blocks.values()}
+        self.links = {b.name: [self._link(b, port) for port in b.inputs_read] for b in self.blocks.values()}
         self.links_of_node: dict[Node, list[Link]] = {}
         self.plans: dict[tuple[bool, bool], list[Work]] = {}
         self.followed = [b for b in self.blocks.values() if b.clock is None and (b.lines or b.modes)]
@@ -74,7 +74,7 @@ class Network:
         self.t = 0.0
         for block in self.blocks.values():
             block.restart()
-            block.begun = False
+            block.was_restarted = False
             for name in block.names("held") if block.block.sampled else ():
                 block.outputs[name][:] = block.value("held", name)
             for name in block.names("guess"):
@@ -323,7 +323,7 @@ class Network:
         events: dict[tuple[str, str], np.ndarray] = {}
         for (name, guard), before in self.signs.items():
             block = self.blocks[name]
-            if not block.on or block.begun:
+            if not block.on or block.was_restarted:
                 continue
             self._feed_all(block)
             sign = np.sign(block.value("guard", guard))
@@ -471,11 +471,11 @@ class Network:
         self._remember()
         for name in {name for name, _ in self.signs}:
             block = self.blocks[name]
-            if block.begun or (block.on and not self.was_on[name]):
+            if block.was_restarted or (block.on and not self.was_on[name]):
                 self._begin_signs(block)
         self.was_on = {name: self.blocks[name].on for name in self.was_on}
         for block in self.blocks.values():
-            block.begun = False
+            block.was_restarted = False
 
     @property
     def delays(self) -> bool:

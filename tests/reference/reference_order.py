@@ -120,7 +120,7 @@ class EvaluationOrder:
         nodes = {("out", ref.block, ref.port) for gate in self.gates.values() for ref in gate.values()}
         for block in self.blocks.values():
             if block.states or block.modes or block.guards or block.lines:
-                ports = {*block.fed, *(line.input for line in block.lines)}
+                ports = {*block.inputs_read, *(line.input for line in block.lines)}
                 nodes |= self._inputs_of(block, {f"u:{port}" for port in ports})
         return nodes
 

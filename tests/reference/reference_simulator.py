@@ -1,8 +1,8 @@
 """Executable semantics of a diagram: a slow reference for the native simulator.
 
-It shares with the package the definitions of the blocks (``Block.outputs``, ``derivatives``, ``mode_values``,
-``resets`` …, evaluated one block at a time), the flattening of hierarchies and the inference of shapes. It
-does not use ``trace_diagram``, ``HybridSystem`` or the compiler.
+The simulator shares with the package the equations of single blocks (``Block.outputs``, ``derivatives``,
+``mode_values``, ``resets`` …), the flattening of hierarchies and the inference of shapes. The simulator does
+not use ``trace_diagram``, ``HybridSystem`` or the compiler.
 
 **Signals.** At a time t, with the continuous states x and the discrete states z, every output is evaluated
 once all inputs that it depends on are known. Outputs that depend on each other form an algebraic loop, which
@@ -14,9 +14,9 @@ itself (a relay's hysteresis) does the mode have a memory: the value before the 
 event at it. Where modes and signals depend on each other, both are evaluated again until no mode changes.
 
 **Flow.** Between instants x follows the classical Runge-Kutta method with steps of at most ``step``. Within a
-step the modes are those of its start. The step is accepted if the signals give the same modes at all stages,
-no guard has changed its sign, and no delayed jump has arrived. Otherwise bisection finds the shortest step
-that is not accepted, to 1e-14; its end is an instant.
+step the modes are those of its start. A step is accepted under three conditions: the signals give the same
+modes at all stages, no guard changes its sign, and no delayed jump arrives. Otherwise bisection finds the
+shortest step that is not accepted, to 1e-14; its end is an instant.
 
 **Instant.** An instant is t = 0, a tick, a breakpoint (a time at which a source jumps), a recorded time, or
 the time of an event. At an instant, in this order:
@@ -64,16 +64,16 @@ class ReferenceRun:
     """One run of a diagram from 0 to ``stop``; ``record`` (N,) has the times to record, the first is 0."""
 
     def __init__(
-        self, diagram: Diagram, record: np.ndarray, step: float = 0.01, most_events: int = 500
+        self, diagram: Diagram, record: np.ndarray, step: float = 0.01, max_events: int = 500
     ) -> None:
         self.network = network = Network(diagram)
         self.step = min([step, *network.shortest_delays()])
         self.stop = float(record[-1])
         self.record = record
-        self.most_events = most_events
+        self.max_events = max_events
         self.events = 0
         self.event_time = 0.0
-        self.longest = self.step
+        self.max_step = self.step
         self.t = 0.0
         self.rows: list[dict[str, np.ndarray]] = []
         self.stopped = False
@@ -124,8 +124,8 @@ class ReferenceRun:
         latest = float(np.nextafter(end, 0.0)) if jumps else np.inf
         x = network.x.copy()
         h = end - self.t
-        h = h if h < 1.5 * self.longest else self.longest
-        self.longest = min(self.step, 2.0 * self.longest)
+        h = h if h < 1.5 * self.max_step else self.max_step
+        self.max_step = min(self.step, 2.0 * self.max_step)
         modes_hold = self.stepped(x, h, latest)
         if not modes_hold:
             low, high = 0.0, h
@@ -148,11 +148,11 @@ class ReferenceRun:
             network.take_signs()
             return
         # Intervals between bounces may decrease: no step may cross a bounce.
-        self.longest = min(self.step, max(1e-9, (self.t - self.event_time) / 16))
+        self.max_step = min(self.step, max(1e-9, (self.t - self.event_time) / 16))
         self.event_time = self.t
         self.events += 1
-        if self.events > self.most_events:
-            raise EndlessEventsError(f"more than {self.most_events} events at {self.t}")
+        if self.events > self.max_events:
+            raise EndlessEventsError(f"more than {self.max_events} events at {self.t}")
         if self.t < end:
             self.instant(self.t, [])
 
@@ -181,14 +181,14 @@ class ReferenceRun:
         if not (modes_hold or whole):
             return False
         network.x[:] = start + h / 6 * (a + 2 * b + 2 * c + d)
-        self.slopes = a, d
+        self.end_derivatives = a, d
         network.evaluate(min(t + h, latest), frozen=True, flowing=True)
         return modes_hold and not network.modes_differ() and not network.fired()
 
     def thirds(self, start: np.ndarray, h: float) -> dict[float, np.ndarray]:
         """Return the states at 0, 1/3, 2/3 and 1 of the last step by cubic Hermite interpolation."""
         end = self.network.x.copy()
-        a, d = self.slopes
+        a, d = self.end_derivatives
         states: dict[float, np.ndarray] = {}
         for s in (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0):
             cubic = (1 + 2 * s) * (1 - s) ** 2 * start + s * s * (3 - 2 * s) * end
@@ -222,7 +222,7 @@ class ReferenceRun:
 
 
 def run_reference(
-    diagram: Diagram, record: Sequence[float], step: float = 0.01, most_events: int = 500
+    diagram: Diagram, record: Sequence[float], step: float = 0.01, max_events: int = 500
 ) -> dict[str, np.ndarray]:
     """Return signals ``(N, *shape)`` by ``block/port`` at the times ``record`` (N,), which start at 0."""
-    return ReferenceRun(diagram, np.asarray(record, dtype=np.float64), step, most_events).run()
+    return ReferenceRun(diagram, np.asarray(record, dtype=np.float64), step, max_events).run()

@@ -1,6 +1,6 @@
 """Conditional subsystems whose controls and inputs jump at the same times, compared with the reference.
 
-All times are multiples of 0.25 s. Levels and limits are different numbers: no signal rests at a border.
+All times are multiples of 0.25 s. Levels and limits differ, so that no signal stays at a switching value.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def add_subsystem(
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_controls_and_inputs_that_jump_at_the_same_times(seed: int) -> None:
+def test_simultaneous_jumps_of_controls_and_inputs_agree_with_the_reference(seed: int) -> None:
     rng = random.Random(seed)
     builder = ab.DiagramBuilder("coincident")
     u = builder.add("u", source(rng))

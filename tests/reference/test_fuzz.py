@@ -19,11 +19,11 @@ OTHER_LAWS = tuple(name for name in LAWS if name not in BASIC_LAWS)
 @pytest.mark.parametrize(("number", "seed"), list(enumerate(SEEDS)))
 def test_a_random_diagram_obeys_the_laws(number: int, seed: int) -> None:
     """Check all laws that need one run, and two of the others."""
-    turn = (OTHER_LAWS[number % len(OTHER_LAWS)], OTHER_LAWS[(3 * number + 1) % len(OTHER_LAWS)])
+    other_laws = (OTHER_LAWS[number % len(OTHER_LAWS)], OTHER_LAWS[(3 * number + 1) % len(OTHER_LAWS)])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            contradictions = findings(random_recipe(seed), (*BASIC_LAWS, *dict.fromkeys(turn)))
+            contradictions = findings(random_recipe(seed), (*BASIC_LAWS, *dict.fromkeys(other_laws)))
         except InconclusiveError:
             return
     contradictions.pop("inconclusive", None)
@@ -38,15 +38,17 @@ def test_a_seed_always_gives_the_same_diagram() -> None:
 
 def test_a_finding_is_reduced_to_the_necessary_block() -> None:
     """The judge of this test reports only sine waves, in a diagram of many blocks."""
-    recipe = next(recipe for recipe in map(random_recipe, range(100)) if has(recipe.nodes, "SineWave"))
-    judge = lambda smaller, laws: {"law": ["a sine"]} if has(smaller.nodes, "SineWave") else {}  # noqa: E731
+    recipe = next(
+        recipe for recipe in map(random_recipe, range(100)) if contains_kind(recipe.nodes, "SineWave")
+    )
+    judge = lambda smaller, laws: {"law": ["a sine"]} if contains_kind(smaller.nodes, "SineWave") else {}  # noqa: E731
     smallest, text = reduced(judge, recipe, "law", until=np.inf)
     assert [node.kind for node in smallest.nodes] == ["SineWave"]
     assert text == "a sine"
 
 
-def has(nodes: tuple[Node, ...], kind: str) -> bool:
-    return any(node.kind == kind or has(node.inside, kind) for node in nodes)
+def contains_kind(nodes: tuple[Node, ...], kind: str) -> bool:
+    return any(node.kind == kind or contains_kind(node.inside, kind) for node in nodes)
 
 
 def test_a_loop_without_a_solution_contradicts_the_equations() -> None:

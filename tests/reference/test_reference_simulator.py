@@ -41,7 +41,7 @@ def test_a_mode_is_consistent_after_a_jump_at_a_limit() -> None:
     np.testing.assert_allclose(result["b2/y"], (phase - phase**2) / 2.652, atol=1e-10)
 
 
-def test_a_hysteresis_has_a_memory() -> None:
+def test_a_relay_keeps_its_mode_within_the_hysteresis() -> None:
     """The relay is on from sin t = 0.5 (rising) to sin t = -0.5 (falling)."""
     t = np.arange(101) * 0.1
     result = run_reference(chain(bl.SineWave(), bl.Relay(), bl.Integrator()), t)
@@ -107,7 +107,7 @@ def test_an_algebraic_loop_is_solved() -> None:
 
 def test_too_many_events_raise_an_error() -> None:
     with pytest.raises(EndlessEventsError, match="more than 20 events"):
-        run_reference(chain(bl.SineWave(frequency=1e3), bl.Sign()), TIMES, most_events=20)
+        run_reference(chain(bl.SineWave(frequency=1e3), bl.Sign()), TIMES, max_events=20)
 
 
 def test_an_unsupported_diagram_raises_an_error() -> None:

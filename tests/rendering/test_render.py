@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from armblocks.pictures.picture import Polyline, Raster, text_marks
-from armblocks.rendering.arm_drawing import arm_picture, arm_picture_svg, moments_picture
+from armblocks.rendering.arm_drawing import arm_picture, arm_picture_svg, pose_sequence_picture
 from armblocks.rendering.camera import Camera
-from armblocks.rendering.render import cropped, faded, over, render, shadow
+from armblocks.rendering.render import composite, crop, render, shadow, with_opacity
 from armblocks.robot import Robot
 from armblocks.robot.geometry import link_frames
 from armblocks.robot.shapes import Box, Material, Sphere
@@ -81,17 +81,17 @@ def test_a_shadow_is_black_and_soft() -> None:
 def test_layers_are_composited_with_their_opacity() -> None:
     red = np.array([[[255, 0, 0, 255]]], dtype=np.uint8)
     blue = np.array([[[0, 0, 255, 255]]], dtype=np.uint8)
-    assert over(red, blue).tolist() == red.tolist()
-    assert over(faded(red, 0.0), blue).tolist() == blue.tolist()
-    assert over(faded(red, 0.5), blue)[0, 0, 3] == 255
+    assert composite(red, blue).tolist() == red.tolist()
+    assert composite(with_opacity(red, 0.0), blue).tolist() == blue.tolist()
+    assert composite(with_opacity(red, 0.5), blue)[0, 0, 3] == 255
 
 
 def test_cropping_keeps_all_drawn_pixels() -> None:
     pixels = np.zeros((10, 12, 4), dtype=np.uint8)
     pixels[3:5, 6:9, 3] = 9
-    part, left, top = cropped(pixels)
+    part, left, top = crop(pixels)
     assert (part.shape, left, top) == ((2, 3, 4), 6, 3)
-    assert cropped(np.zeros((4, 4, 4), dtype=np.uint8))[0].shape == (1, 1, 4)
+    assert crop(np.zeros((4, 4, 4), dtype=np.uint8))[0].shape == (1, 1, 4)
 
 
 def test_every_robot_can_be_drawn(robot: Robot) -> None:
@@ -110,7 +110,7 @@ def test_snapshots_show_their_times_and_tool_positions(kr180: Robot) -> None:
     time = np.linspace(0, 10, 41)
     q = np.outer(time / 10, [3.14, 0, 1.57, 0])
     poses = np.stack([link_frames(kr180, row) for row in q.tolist()])
-    picture = moments_picture(kr180, time, poses)
+    picture = pose_sequence_picture(kr180, time, poses)
     texts = [mark.text for mark in text_marks(picture)]
     assert [t for t in texts if t.startswith("t =")] == [f"t = {k} s" for k in (0, 2, 4, 6, 8, 10)]
     assert "x 1.95  y −1.25  z −1.85 m" in texts

@@ -12,8 +12,8 @@ from armblocks.pictures.style import Tone
 from armblocks.pictures.text_width import text_width
 from armblocks.pictures.thinning import thin_out
 from armblocks.report.charts.path_chart import path_chart
-from armblocks.report.charts.scale import padded
-from armblocks.report.charts.time_chart import Panel, Trace, separated, time_chart
+from armblocks.report.charts.scale import padded_range
+from armblocks.report.charts.time_chart import Panel, Trace, separated_positions, time_chart
 
 
 def boxes(picture: Picture) -> list[tuple[float, float, float, float]]:
@@ -56,13 +56,13 @@ def test_texts_do_not_overlap_and_are_inside_the_picture(scale: float) -> None:
 
 @given(st.lists(st.floats(0, 150), min_size=1, max_size=9))
 def test_labels_are_spread_within_their_panel(preferred: list[float]) -> None:
-    positions = separated(sorted(preferred), 15.0, 0.0, 150.0)
+    positions = separated_positions(sorted(preferred), 15.0, 0.0, 150.0)
     assert all(b - a >= 15.0 - 1e-9 for a, b in itertools.pairwise(positions))
     assert positions[0] >= 0.0 and positions[-1] <= 150.0 + 1e-9
 
 
 def test_labels_that_do_not_overlap_are_not_moved() -> None:
-    assert separated([10.0, 60.0, 120.0], 15.0, 0.0, 150.0) == [10.0, 60.0, 120.0]
+    assert separated_positions([10.0, 60.0, 120.0], 15.0, 0.0, 150.0) == [10.0, 60.0, 120.0]
 
 
 def test_thinning_keeps_the_ends_and_every_peak() -> None:
@@ -81,10 +81,10 @@ def test_a_limit_is_drawn_when_near_and_highlighted_when_exceeded() -> None:
     near = chart(ramp, (-500.0, 90.0))
     broken = chart(ramp, (-500.0, 70.0))
 
-    def dashed(picture: Picture) -> int:
+    def dashed_lines(picture: Picture) -> int:
         return sum(isinstance(mark, Polyline) and mark.dash == (7.0, 4.0) for mark in picture.marks)
 
-    assert (dashed(far), dashed(near)) == (0, 2)
+    assert (dashed_lines(far), dashed_lines(near)) == (0, 2)
     assert not any(isinstance(m, Polyline) and m.stroke is Tone.ERROR for m in near.marks)
     assert any(isinstance(m, Polyline) and m.stroke is Tone.ERROR for m in broken.marks)
     assert any("over limit" in mark.text for mark in text_marks(broken))
@@ -130,5 +130,5 @@ def test_start_and_end_have_different_marks() -> None:
 
 @pytest.mark.parametrize("values", [[1.0, 1.0], [0.0, 0.0], [np.nan, np.nan], [1.0, 1.0 + 1e-15]])
 def test_the_axis_range_of_a_constant_is_not_empty(values: list[float]) -> None:
-    low, high = padded(np.array(values), 0.1)
+    low, high = padded_range(np.array(values), 0.1)
     assert high - low > 0.1

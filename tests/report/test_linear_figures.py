@@ -25,7 +25,7 @@ from armblocks.report import (
     step_picture,
     write_linear_report,
 )
-from armblocks.report.charts.axes import clipped_to, straight_field
+from armblocks.report.charts.axes import clip_line, linear_area
 from armblocks.report.charts.scale import LogScale
 
 
@@ -92,8 +92,8 @@ def test_several_channels_have_a_legend() -> None:
 
 
 def test_lines_are_clipped_exactly_at_the_edge() -> None:
-    field = straight_field((0.0, 1.0), (0.0, 1.0), (0.0, 0.0, 100.0, 100.0))
-    points = clipped_to(field.points(np.array([-1.0, 0.5, 2.0]), np.array([0.5, 0.5, 0.5])), field.box)
+    field = linear_area((0.0, 1.0), (0.0, 1.0), (0.0, 0.0, 100.0, 100.0))
+    points = clip_line(field.points(np.array([-1.0, 0.5, 2.0]), np.array([0.5, 0.5, 0.5])), field.box)
     assert points.tolist() == [[0.0, 50.0], [50.0, 50.0], [100.0, 50.0]]
 
 

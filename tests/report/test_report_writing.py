@@ -31,7 +31,7 @@ from armblocks.diagram import DiagramBuilder
 from armblocks.equations import SimulationOptions
 from armblocks.errors import FormatError, LimitWarning, UnknownNameError
 from armblocks.report import write_report
-from armblocks.report.figures import file_name, in_shown_unit
+from armblocks.report.figures import file_name, in_display_unit
 from armblocks.robot import JointLimits, Robot, serial_chain, standard_dh
 
 VOID_TAGS = {"meta", "br", "img", "link", "rect", "path", "circle", "image"}
@@ -43,23 +43,23 @@ class Outline(HTMLParser):
     def __init__(self) -> None:
         super().__init__(convert_charrefs=True)
         self.tags: list[str] = []
-        self.open: list[str] = []
+        self.open_tags: list[str] = []
         self.attributes: list[tuple[str, str, str | None]] = []
-        self.mistakes: list[str] = []
+        self.wrong_end_tags: list[str] = []
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append(tag)
         self.attributes += [(tag, name, value) for name, value in attrs]
         if tag not in VOID_TAGS:
-            self.open.append(tag)
+            self.open_tags.append(tag)
 
     def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append(tag)
         self.attributes += [(tag, name, value) for name, value in attrs]
 
     def handle_endtag(self, tag: str) -> None:
-        if not self.open or self.open.pop() != tag:
-            self.mistakes.append(tag)
+        if not self.open_tags or self.open_tags.pop() != tag:
+            self.wrong_end_tags.append(tag)
 
 
 def outline(page: Path) -> Outline:
@@ -68,9 +68,9 @@ def outline(page: Path) -> Outline:
     return parsed
 
 
-def small_run(nasty: str = "wave") -> tuple[ab.Diagram, ab.SimulationResult]:
-    builder = DiagramBuilder(nasty, settings=SimulationOptions(stop_time=1.0, sample_time=0.05))
-    wave = builder.add(f"{nasty} source", SineWave(amplitude=(1.0, 2.0)))
+def small_run(block_name: str = "wave") -> tuple[ab.Diagram, ab.SimulationResult]:
+    builder = DiagramBuilder(block_name, settings=SimulationOptions(stop_time=1.0, sample_time=0.05))
+    wave = builder.add(f"{block_name} source", SineWave(amplitude=(1.0, 2.0)))
     total = builder.add("total", Integrator(initial=(0.0, 0.0)), wave)
     builder.add("Scope", Scope(inputs=2), wave, total)
     level = builder.add("level", Constant(value=0.25))
@@ -139,7 +139,7 @@ def test_the_page_needs_no_network_and_no_script(paper: Path) -> None:
 
 def test_the_page_is_well_formed_and_accessible(paper: Path) -> None:
     parsed = outline(paper / "report.html")
-    assert parsed.mistakes == [] and parsed.open == []
+    assert parsed.wrong_end_tags == [] and parsed.open_tags == []
     headings = [tag for tag in parsed.tags if re.fullmatch("h[1-6]", tag)]
     assert headings[0] == "h1" and headings.count("h1") == 1 and "h3" in headings
     identifiers = [value for _, name, value in parsed.attributes if name == "id"]
@@ -264,7 +264,7 @@ def test_file_names_of_figures_are_sanitised(name: str, expected: str) -> None:
 def test_quantities_are_shown_in_display_units(
     value: float, unit: str, shown: float, shown_unit: str
 ) -> None:
-    values, unit_text = in_shown_unit(np.array([value]), unit)
+    values, unit_text = in_display_unit(np.array([value]), unit)
     assert (values[0], unit_text) == (pytest.approx(shown, rel=1e-3), shown_unit)
 
 
@@ -290,9 +290,9 @@ def test_every_different_sheet_is_in_the_report(tmp_path: Path) -> None:
     write_report(tmp_path, *nested_run())
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert re.findall(r"<summary>(.*?)</summary>", text) == ["axis 1", "axis 3"]
-    assert "The same is inside axis 2." in text
+    assert "The following subsystems have the same content: axis 2." in text
     assert "first-order &lt;lag&gt;" in text and "twice (Gain)" in text
-    assert not outline(tmp_path / "report.html").mistakes
+    assert not outline(tmp_path / "report.html").wrong_end_tags
 
 
 def test_a_report_of_a_thinned_log_states_the_number_of_shown_rows(tmp_path: Path) -> None:

@@ -98,7 +98,9 @@ def test_a_symbolic_link_out_of_the_folder_is_refused(tmp_path: Path) -> None:
     outside.mkdir()
     (folder / "link").symlink_to(outside)
     model = diagram(sink=ToFile(file="link/kept.csv"))
-    with pytest.raises(FormatError, match=r"'link/kept\.csv' of 'sink' leads out of the folder by a link"):
+    with pytest.raises(
+        FormatError, match=r"'link/kept\.csv' of 'sink' leads out of the folder through a link"
+    ):
         ab.write_files(folder, model, ab.simulate(model))
     assert list(outside.iterdir()) == []
 

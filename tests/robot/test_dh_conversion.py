@@ -88,5 +88,5 @@ def test_robots_that_are_not_a_chain_of_dh_rows_are_refused() -> None:
         with pytest.raises(RobotError, match="not a single chain of D-H rows"):
             converted(other, MODIFIED)
     first = reread(robot, MODIFIED).links[0]
-    with pytest.raises(RobotError, match="rows are of both conventions"):
+    with pytest.raises(RobotError, match="rows of both conventions"):
         converted(replace(robot, links=(first, *robot.links[1:])), STANDARD)

@@ -74,7 +74,7 @@ def test_frames_equal_the_traced_link_poses(robot: Robot) -> None:
 
     q = np.random.default_rng(3).uniform(-1, 1, robot.n)
     (traced,) = trace_link_poses(robot)(q)
-    # Both are products of the same few rotations.
+    # Frames and link poses are products of the same few rotations.
     assert link_frames(robot, q.tolist()) == pytest.approx(traced, abs=1e-12)
 
 

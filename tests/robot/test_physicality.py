@@ -28,10 +28,10 @@ def test_physically_possible_inertias_are_accepted():
     [
         ({"mass": 1.0, "inertia": (-0.1, 1, 1)}, "a principal moment of inertia is negative"),
         ({"mass": 1.0, "inertia": (1, 1, 1, 2, 0, 0)}, "a principal moment of inertia is negative"),
-        ({"inertia": (0, 0.35, 0)}, "it has inertia but no mass"),
+        ({"inertia": (0, 0.35, 0)}, "the link has inertia but no mass"),
         (
             {"mass": 1.0, "inertia": (1, 1, 3)},
-            "its greatest principal moment of inertia exceeds the sum of the other two",
+            "the greatest principal moment of inertia exceeds the sum of the other two",
         ),
     ],
 )
@@ -44,9 +44,9 @@ def test_warning_names_robot_link_and_moments(kr180: Robot):
         warn_of_inertias(kr180)
     texts = [str(warning.message) for warning in caught]
     assert texts == [
-        "robot 'KR180', link 'link1': it has inertia but no mass (principal moments 0, 0, 0.35 kg m2). "
+        "robot 'KR180', link 'link1': the link has inertia but no mass (principal moments 0, 0, 0.35 kg m2). "
         "No rigid body has this inertia; it is used as given.",
-        "robot 'KR180', link 'link3': its greatest principal moment of inertia exceeds the sum of the other "
+        "robot 'KR180', link 'link3': the greatest principal moment of inertia exceeds the sum of the other "
         "two (principal moments 0.0125, 0.066, 0.086 kg m2). No rigid body has this inertia; it is used as "
         "given.",
     ]

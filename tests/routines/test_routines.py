@@ -42,7 +42,7 @@ def both(write: Callable[..., Any], *arguments: Any, result: type | None = None,
     program.define(write, "run", public=True)
     parts = definitions(program)
     code = load_code(("routines test", *parts.values()), lambda: "\n\n".join(parts.values()))
-    arrays = [aligned(argument) if isinstance(argument, list) else None for argument in arguments]
+    arrays = [aligned_array(argument) if isinstance(argument, list) else None for argument in arguments]
     kinds = [CTYPES[type(argument)] for argument in arguments]
     function = ctypes.CFUNCTYPE(CTYPES[result], *kinds)(code.address("run"))
     native = function(*(x if a is None else a.ctypes.data for x, a in zip(arguments, arrays)))
@@ -56,7 +56,7 @@ def both(write: Callable[..., Any], *arguments: Any, result: type | None = None,
     return native
 
 
-def aligned(numbers: list[Any]) -> np.ndarray:
+def aligned_array(numbers: list[Any]) -> np.ndarray:
     """The numbers as an array; rows of lanes are aligned to their size."""
     if not isinstance(numbers[0], tuple):
         return np.array(numbers, dtype=type(numbers[0]))
@@ -178,7 +178,7 @@ def test_unrolled_and_looped_iterations_are_equal(n: int) -> None:
     assert y[:n] == [2.0 * value for value in x[:n]]
 
 
-def test_break_and_continue_in_a_loop() -> None:
+def test_break_and_continue_act_on_their_loop() -> None:
     """Sum the numbers up to ``n`` that are not divisible by 3, until the sum exceeds 100."""
 
     def run(r: Routine, n: Integer) -> Integer:
@@ -253,7 +253,7 @@ def test_stages_can_be_entered_at_each_stage_and_continue_with_the_next() -> Non
 
 def test_functions_call_one_another_and_read_tables() -> None:
     def run(r: Routine, x: Reals, n: Integer) -> Real:
-        def weighted(r: Routine, x: Reals, flip: Boolean) -> Real:
+        def weighted_sum(r: Routine, x: Reals, flip: Boolean) -> Real:
             weights, indices = r.reals("weights", [2.0, 3.0]), r.integers("places", [1, 0])
             first = fma(weights[0], x[indices[0]], weights[1] * x[indices[1]])
             return select(flip, -first, first)
@@ -261,9 +261,9 @@ def test_functions_call_one_another_and_read_tables() -> None:
         def store(r: Routine, x: Reals, value: Real) -> None:
             x[0] = value
 
-        function = r.program.define(weighted, inlined=False)
+        function = r.program.define(weighted_sum, inlined=False)
         keep = r.program.define(store)
-        assert r.program.define(weighted) == r.program.define(weighted)
+        assert r.program.define(weighted_sum) == r.program.define(weighted_sum)
         last = r.real(0.0)
         for i in r.range(0, n):
             r.call(keep, last.memory, r.call(function, x.after(i), i > 0))
@@ -332,7 +332,7 @@ def test_fields_of_structures_are_read_by_their_offsets() -> None:
     """The sum of a vector: its length is in the upper half of a word, its address in the word before."""
 
     def run(r: Routine, structure: Address, out: Integers) -> Real:
-        room = r.integer_room(3)
+        room = r.local_integers(3)
         for k, value in enumerate((structure.int32(8), structure.int32(12), 7)):
             room[k] = value
         r.copy(room, out, 3)
@@ -387,12 +387,12 @@ def test_functions_are_called_by_their_addresses() -> None:
     assert native(2.5, (1 << 32) - 4) == -10
 
 
-def test_null_addresses_and_repeated_declarations() -> None:
+def test_null_addresses_are_passed_and_declarations_may_be_repeated() -> None:
     @external
     def take(r: Routine, x: Reals) -> None: ...
 
     def run(r: Routine, a: Real) -> Real:
-        r.call(take, r.nowhere)
+        r.call(take, r.null_array)
         return abs(abs(a))
 
     program = Program()

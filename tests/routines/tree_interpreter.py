@@ -22,20 +22,20 @@ LANES = (Kind.LANES, Kind.MASK)
 
 
 @dataclass
-class Jumped(Exception):  # noqa: N818
+class JumpException(Exception):  # noqa: N818
     mark: tree.Mark
 
 
 @dataclass
-class Returned(Exception):  # noqa: N818
+class ReturnException(Exception):  # noqa: N818
     value: Any
 
 
-def _wrapped(value: int) -> int:
+def _wrap_int64(value: int) -> int:
     return (value + (1 << 63)) % (1 << 64) - (1 << 63)
 
 
-def _divided(a: Any, b: Any) -> Any:
+def _divide(a: Any, b: Any) -> Any:
     if isinstance(a, float):
         if b == 0.0:
             nan = math.isnan(a) or a == 0.0
@@ -48,7 +48,7 @@ OPERATIONS: dict[Operation, Callable[..., Any]] = {
     Operation.ADD: lambda a, b: a + b,
     Operation.SUBTRACT: lambda a, b: a - b,
     Operation.MULTIPLY: lambda a, b: a * b,
-    Operation.DIVIDE: _divided,
+    Operation.DIVIDE: _divide,
     Operation.DIVIDE_UNSIGNED: lambda a, b: (a % (1 << 64)) // (b % (1 << 64)),
     Operation.REMAINDER_UNSIGNED: lambda a, b: (a % (1 << 64)) % (b % (1 << 64)),
     Operation.SHIFT_LEFT: lambda a, b: a << b,
@@ -59,8 +59,8 @@ OPERATIONS: dict[Operation, Callable[..., Any]] = {
     Operation.FMA: lambda a, b, c: math.fma(a, b, c) if hasattr(math, "fma") else _fma(a, b, c),
     Operation.LESS: lambda a, b: a < b,
     Operation.LESS_EQUAL: lambda a, b: a[1] <= b[1] if isinstance(a, tuple) else a <= b,
-    Operation.EQUAL: lambda a, b: _same(a, b) if _pointing(a) or _pointing(b) else a == b,
-    Operation.NOT_EQUAL: lambda a, b: not _same(a, b) if _pointing(a) or _pointing(b) else a != b,
+    Operation.EQUAL: lambda a, b: _same_address(a, b) if _is_address(a) or _is_address(b) else a == b,
+    Operation.NOT_EQUAL: lambda a, b: not _same_address(a, b) if _is_address(a) or _is_address(b) else a != b,
     Operation.GREATER: lambda a, b: a > b,
     Operation.GREATER_EQUAL: lambda a, b: a >= b,
     Operation.ORDERED: lambda a, b: a == a and b == b,
@@ -77,11 +77,11 @@ OPERATIONS: dict[Operation, Callable[..., Any]] = {
 }
 
 
-def _pointing(value: Any) -> bool:
+def _is_address(value: Any) -> bool:
     return value is None or isinstance(value, tuple) or callable(value)
 
 
-def _same(a: Any, b: Any) -> bool:
+def _same_address(a: Any, b: Any) -> bool:
     if isinstance(a, tuple) and isinstance(b, tuple):
         return a[0] is b[0] and a[1] == b[1]
     return a is b
@@ -119,7 +119,7 @@ class _Call:
     def run(self) -> Any:
         try:
             self.part(self.function.body)
-        except Returned as returned:
+        except ReturnException as returned:
             return returned.value
         raise AssertionError("a function ends with a return")
 
@@ -148,7 +148,7 @@ class _Call:
                     outcome = tuple(OPERATIONS[operation](*lane) for lane in zip(*values, strict=True))
                 else:
                     outcome = OPERATIONS[operation](*values)
-                self.values[result] = _wrapped(outcome) if result.kind is Kind.INTEGER else outcome
+                self.values[result] = _wrap_int64(outcome) if result.kind is Kind.INTEGER else outcome
             case tree.Locate(result, base, index, element):
                 memory, offset = self.value(base)
                 step = self.value(index) / 8 if element is Kind.BYTE else self.value(index)
@@ -162,7 +162,7 @@ class _Call:
             case tree.FetchAdd(result, address, value):
                 memory, offset = self.value(address)
                 self.values[result] = memory[offset]
-                memory[offset] = _wrapped(memory[offset] + self.value(value))
+                memory[offset] = _wrap_int64(memory[offset] + self.value(value))
             case tree.Store(value, address):
                 memory, offset = self.value(address)
                 memory[int(offset)] = self.value(value)
@@ -179,9 +179,9 @@ class _Call:
                 self.values.update(zip(results, outcome if len(results) > 1 else (outcome,)))
             case tree.Return(values):
                 outcome = tuple(map(self.value, values))
-                raise Returned(outcome if len(outcome) > 1 else outcome[0] if outcome else None)
+                raise ReturnException(outcome if len(outcome) > 1 else outcome[0] if outcome else None)
             case tree.Jump(mark):
-                raise Jumped(mark)
+                raise JumpException(mark)
             case tree.When(condition, yes, no, _):
                 self.part(yes if self.value(condition) else no)
             case tree.Region():
@@ -196,7 +196,7 @@ class _Call:
             try:
                 self.part(region.body, start)
                 return
-            except Jumped as jumped:
+            except JumpException as jumped:
                 if jumped.mark is region.end:
                     return
                 if jumped.mark is not region.start and jumped.mark not in stages:

@@ -21,7 +21,7 @@ SCHEMA = Path(formats.__file__).parent / "schema" / "robot.schema.json"
 
 
 @pytest.fixture(params=list_robots())
-def shipped(request: pytest.FixtureRequest) -> Robot:
+def shipped_robot(request: pytest.FixtureRequest) -> Robot:
     return load_robot(request.param)
 
 
@@ -29,8 +29,8 @@ def test_the_documented_robots_are_shipped() -> None:
     assert {"kr180", "puma560", "twolink", "planar3r"} <= set(list_robots())
 
 
-def test_robot_files_are_canonical_and_follow_the_schema(shipped: Robot) -> None:
-    text = (FOLDER / shipped.source / "robot.json").read_text(encoding="utf-8")
+def test_robot_files_are_canonical_and_follow_the_schema(shipped_robot: Robot) -> None:
+    text = (FOLDER / shipped_robot.source / "robot.json").read_text(encoding="utf-8")
     document = json.loads(text)
     jsonschema.Draft202012Validator(json.loads(SCHEMA.read_text())).validate(document)
     notes = document.pop("notes")
@@ -38,13 +38,13 @@ def test_robot_files_are_canonical_and_follow_the_schema(shipped: Robot) -> None
     written = [line for line in text.splitlines() if not line.startswith('  "notes": ')]
     # Without the notes, the previous line may end without a comma.
     assert [line.rstrip(",") for line in written] == [
-        line.rstrip(",") for line in write_robot(shipped).decode().splitlines()
+        line.rstrip(",") for line in write_robot(shipped_robot).decode().splitlines()
     ]
 
 
-def test_a_robot_that_is_loaded_again_is_equal(shipped: Robot) -> None:
-    assert load_robot(shipped.source) == shipped
-    assert hash(replace(shipped, comment=shipped.comment)) == hash(shipped)
+def test_a_robot_that_is_loaded_again_is_equal(shipped_robot: Robot) -> None:
+    assert load_robot(shipped_robot.source) == shipped_robot
+    assert hash(replace(shipped_robot, comment=shipped_robot.comment)) == hash(shipped_robot)
 
 
 def test_puma560_has_the_parameters_of_corke(puma560: Robot) -> None:

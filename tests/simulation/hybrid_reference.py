@@ -21,25 +21,25 @@ GRID = 30
 NAMES = ("derivative", "signals", "residual", "update", "guards", "reset")
 
 
-class Evaluated:
+class FunctionEvaluator:
     """A CasADi function with fixed buffers for arguments and results: CasADi converts arrays slowly."""
 
     def __init__(self, function: ca.Function) -> None:
         assert all(function.sparsity_in(k).is_dense() for k in range(function.n_in()))
         assert all(function.sparsity_out(k).is_dense() for k in range(function.n_out()))
-        self.taken = [np.zeros(function.nnz_in(k)) for k in range(function.n_in())]
-        self.given = [np.zeros(function.nnz_out(k)) for k in range(function.n_out())]
+        self.arguments = [np.zeros(function.nnz_in(k)) for k in range(function.n_in())]
+        self.results = [np.zeros(function.nnz_out(k)) for k in range(function.n_out())]
         self.buffer, self.evaluate = function.buffer()
-        for k, array in enumerate(self.taken):
+        for k, array in enumerate(self.arguments):
             self.buffer.set_arg(k, memoryview(array))
-        for k, array in enumerate(self.given):
+        for k, array in enumerate(self.results):
             self.buffer.set_res(k, memoryview(array))
 
     def __call__(self, *values: float | np.ndarray) -> list[np.ndarray]:
-        for array, value in zip(self.taken, values, strict=True):
+        for array, value in zip(self.arguments, values, strict=True):
             array[:] = value
         self.evaluate()
-        return [array.copy() for array in self.given]
+        return [array.copy() for array in self.results]
 
 
 class Reference:
@@ -47,7 +47,7 @@ class Reference:
 
     def __init__(self, system: HybridSystem) -> None:
         self.system = system
-        self.functions = {name: Evaluated(getattr(system, name).casadi_function()) for name in NAMES}
+        self.functions = {name: FunctionEvaluator(getattr(system, name).casadi_function()) for name in NAMES}
         self.p = system.parameter_values
         self.x, self.z, self.w = (
             np.asarray(getattr(system, name)(self.p)[0])
@@ -83,7 +83,7 @@ class Reference:
                 number += 1
         return [(float(instant), marks[instant]) for instant in sorted(marks)]
 
-    def fired(self, g: np.ndarray) -> np.ndarray:
+    def firing_guards(self, g: np.ndarray) -> np.ndarray:
         signs_now, directions = np.sign(g), np.array(self.system.guard_directions)
         return np.where((signs_now * self.signs < 0) & (signs_now * directions >= 0), signs_now, 0.0)
 
@@ -91,7 +91,7 @@ class Reference:
         """Process the events at the present time until no guard fires."""
         for _ in range(1000):
             g = self.call("guards", self.t, self.x)[0]
-            e = self.fired(g)
+            e = self.firing_guards(g)
             self.signs = np.where(g != 0, np.sign(g), self.signs)
             if not e.any():
                 return
@@ -116,23 +116,23 @@ class Reference:
                     dense_output=True,
                 )
                 values = solution.sol
-            hit = self.first_zero(start, end, values)
-            reached = end if hit is None else hit
-            inside = samples[(samples > start) & (samples < reached * (1 - 1e-14))]
-            for instant in inside[inside > self.recorded]:
+            event_time = self.first_zero(start, end, values)
+            end_time = end if event_time is None else event_time
+            inside = samples[(samples > start) & (samples < end_time * (1 - 1e-14))]
+            for instant in inside[inside > self.last_recorded]:
                 rows.append(self.call("signals", instant, values(instant))[0])
-                self.recorded = instant
-            self.t, self.x = reached, np.asarray(values(reached))
-            if hit is not None:
+                self.last_recorded = instant
+            self.t, self.x = end_time, np.asarray(values(end_time))
+            if event_time is not None:
                 self.process_events()
                 self.record_here(samples, rows)
 
     def record_here(self, samples: np.ndarray, rows: list[np.ndarray]) -> None:
         """Record the sample at the present time, if there is one that is not recorded yet."""
         for sample in samples[np.isclose(samples, self.t, rtol=1e-14, atol=0)]:
-            if sample > self.recorded:
+            if sample > self.last_recorded:
                 rows.append(self.call("signals", sample, self.x)[0])
-                self.recorded = sample
+                self.last_recorded = sample
 
     def first_zero(self, start: float, end: float, values: object) -> float | None:
         """Return a time just after the first crossing, or ``None``; update the signs of the guards."""
@@ -141,7 +141,7 @@ class Reference:
         before = start
         for instant in np.linspace(start, end, GRID)[1:]:
             g = self.call("guards", instant, values(instant))[0]
-            e = self.fired(g)
+            e = self.firing_guards(g)
             if e.any():
                 roots = []
                 for k in np.flatnonzero(e):
@@ -161,7 +161,7 @@ class Reference:
     def run(self, samples: np.ndarray) -> np.ndarray:
         """Return the signals at the samples, ``(ny, N)``."""
         rows: list[np.ndarray] = []
-        self.recorded = -1.0
+        self.last_recorded = -1.0
         stop = float(samples[-1])
         instants = self.ticks(stop)
         if not instants or instants[0][0] > 0:

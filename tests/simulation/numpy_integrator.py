@@ -35,8 +35,8 @@ def first_step(
     h0 = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
     h0 = min(h0, end - t)
     d2 = rms((f(t + h0, x + h0 * k0) - k0) / scale) / h0
-    steepest = max(d1, d2)
-    h1 = max(1e-6, h0 * 1e-3) if steepest <= 1e-15 else (0.01 / steepest) ** (1 / (order + 1))
+    max_derivative = max(d1, d2)
+    h1 = max(1e-6, h0 * 1e-3) if max_derivative <= 1e-15 else (0.01 / max_derivative) ** (1 / (order + 1))
     return min(100 * h0, h1, end - t)
 
 
@@ -51,7 +51,7 @@ def error_norm(tableau: Tableau, K: np.ndarray, h: float, scale: np.ndarray) -> 
     return 0.0 if e5 == e3 == 0 else float(h * e5 / np.sqrt((e5 + 0.01 * e3) * scale.size))
 
 
-def slopes_of(f: Field, t: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def partial_derivatives(f: Field, t: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Jacobian and time derivative of ``f`` by complex steps, which have no cancellation error."""
     tiny = 1e-100
     columns = [np.imag(f(t, x + 1j * tiny * unit)) / tiny for unit in np.eye(x.size)]
@@ -60,7 +60,7 @@ def slopes_of(f: Field, t: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 def rosenbrock_stages(
     tableau: RosenbrockTableau,
-    slope: Field,
+    derivative: Field,
     jacobian: tuple[np.ndarray, np.ndarray],
     t: float,
     x: np.ndarray,
@@ -72,7 +72,11 @@ def rosenbrock_stages(
     matrix = np.eye(x.size) / tableau.gamma - h * J
     for i in range(tableau.stages):
         before = K[1 : i + 1]
-        f = slope(t + tableau.nodes[i] * h, x + h * (np.array(tableau.matrix[i]) @ before)) if i else K[0]
+        f = (
+            derivative(t + tableau.nodes[i] * h, x + h * (np.array(tableau.matrix[i]) @ before))
+            if i
+            else K[0]
+        )
         right = f + np.array(tableau.couplings[i]) @ before + h * tableau.time_weights[i] * T
         K[1 + i] = np.linalg.solve(matrix, right)
     return x + h * (np.array(tableau.weights) @ K[1 : tableau.stages + 1])
@@ -80,7 +84,7 @@ def rosenbrock_stages(
 
 def defect_norm(
     tableau: RosenbrockTableau,
-    slope: Field,
+    derivative: Field,
     J: np.ndarray,
     t: float,
     x: np.ndarray,
@@ -92,7 +96,7 @@ def defect_norm(
     k = K[1 : tableau.stages + 1]
     polynomials = [np.polynomial.Polynomial([0.0, *row]) for row in tableau.dense]
     middle = x + h * np.array([q(0.5) for q in polynomials]) @ k
-    defect = slope(t + 0.5 * h, middle) - np.array([q.deriv()(0.5) for q in polynomials]) @ k
+    defect = derivative(t + 0.5 * h, middle) - np.array([q.deriv()(0.5) for q in polynomials]) @ k
     return rms(h * np.linalg.solve(np.eye(x.size) / tableau.gamma - h * J, defect) / scale)
 
 
@@ -118,20 +122,20 @@ def integrate(
     s = tableau.stages
     for end, limit in zip(ends, limits):
 
-        def slope(time: float, state: np.ndarray, limit: float = limit) -> np.ndarray:
+        def derivative(time: float, state: np.ndarray, limit: float = limit) -> np.ndarray:
             counts.evaluations += 1
             return np.asarray(f(min(time, limit), state))
 
         jacobian = np.zeros((0, 0)), np.zeros(0)
 
-        def complex_slope(time: float, state: np.ndarray) -> np.ndarray:
+        def complex_derivative(time: float, state: np.ndarray) -> np.ndarray:
             return np.asarray(f(time, state))
 
         K = np.zeros((tableau.rows, x.size))
-        K[0] = slope(t, x)
+        K[0] = derivative(t, x)
         h = step
         if tableau.adaptive:
-            h = first_step(slope, t, x, K[0], end, tableau.error_order, rtol, atol)
+            h = first_step(derivative, t, x, K[0], end, tableau.error_order, rtol, atol)
         while t < end:
             rejected = False
             while True:
@@ -145,19 +149,21 @@ def integrate(
                 t_new = min(t_new, end)
                 h = t_new - t
                 if isinstance(tableau, RosenbrockTableau):
-                    jacobian = slopes_of(complex_slope, min(t, limit), x)
-                    x_new = rosenbrock_stages(tableau, slope, jacobian, t, x, h, K)
+                    jacobian = partial_derivatives(complex_derivative, min(t, limit), x)
+                    x_new = rosenbrock_stages(tableau, derivative, jacobian, t, x, h, K)
                 else:
                     for i in range(1, s):
-                        K[i] = slope(t + tableau.nodes[i] * h, x + h * (np.array(tableau.matrix[i]) @ K[:i]))
+                        K[i] = derivative(
+                            t + tableau.nodes[i] * h, x + h * (np.array(tableau.matrix[i]) @ K[:i])
+                        )
                     x_new = x + h * (np.array(tableau.weights) @ K[:s])
-                K[tableau.end_row] = slope(t_new, x_new)
+                K[tableau.end_row] = derivative(t_new, x_new)
                 if not tableau.adaptive:
                     break
                 scale = atol + rtol * np.maximum(np.abs(x), np.abs(x_new))
                 norm = error_norm(tableau, K, h, scale)
                 if isinstance(tableau, RosenbrockTableau):
-                    norm = max(norm, defect_norm(tableau, slope, jacobian[0], t, x, h, K, scale))
+                    norm = max(norm, defect_norm(tableau, derivative, jacobian[0], t, x, h, K, scale))
                 factor = 10.0 if norm == 0 else 0.9 * norm ** (-1 / (tableau.error_order + 1))
                 if norm < 1:
                     h_next = h * min(1.0 if rejected else 10.0, factor)
@@ -170,7 +176,7 @@ def integrate(
             if isinstance(tableau, ButcherTableau) and tableau.extra_nodes and np.any(inside < t_new):
                 for i, node in enumerate(tableau.extra_nodes):
                     weights = np.array(tableau.extra_matrix[i])
-                    K[s + 1 + i] = slope(t + node * h, x + h * (weights @ K[: s + 1 + i]))
+                    K[s + 1 + i] = derivative(t + node * h, x + h * (weights @ K[: s + 1 + i]))
             for instant in inside:
                 theta = (instant - t) / h
                 powers = theta ** np.arange(1, len(tableau.dense[0]) + 1)

@@ -44,7 +44,7 @@ def test_unbounded_growth_is_reported_with_its_time() -> None:
 def test_the_state_with_the_largest_error_is_named() -> None:
     """Two decaying states and one that grows without bound."""
     states = states_of("a/x", "b/x", "c/x")
-    quiet = system(
+    three_states = system(
         "three",
         states=states,
         signals=signature(("a/y", ())),
@@ -53,7 +53,7 @@ def test_the_state_with_the_largest_error_is_named() -> None:
         initial=(1.0, 1.0, 1.0),
     )
     with pytest.raises(SimulationError, match=r"relative to the tolerance: 'b/x' \("):
-        simulate(compile_system(quiet), SimulationOptions(stop_time=2.0))
+        simulate(compile_system(three_states), SimulationOptions(stop_time=2.0))
 
 
 def chain(stop_at: float = 1.0) -> object:
@@ -137,9 +137,11 @@ def test_the_message_suggests_a_stiff_solver_only_for_a_stiff_system() -> None:
     assert "1e+06 1/s" in result.run.message
     np.testing.assert_allclose(result["block/y"], np.cos(result.time), atol=1e-5)
     # As many steps because of accuracy: no suggestion.
-    busy = simulate(OSCILLATOR, SimulationOptions(stop_time=200.0, max_step=0.005, solver="rk45"))
-    assert busy.run.steps >= 40_000
-    assert busy.run.message == ""
+    result_without_stiffness = simulate(
+        OSCILLATOR, SimulationOptions(stop_time=200.0, max_step=0.005, solver="rk45")
+    )
+    assert result_without_stiffness.run.steps >= 40_000
+    assert result_without_stiffness.run.message == ""
 
 
 @pytest.mark.parametrize(
@@ -177,9 +179,9 @@ def test_invalid_options_are_refused(options: dict[str, object], message: str) -
 
 
 def test_an_unknown_solver_is_refused_even_if_none_is_needed() -> None:
-    still = compile_system(system("still", signals=signature(("a/y", ())), outputs=lambda t, x, p: t))
+    stateless = compile_system(system("still", signals=signature(("a/y", ())), outputs=lambda t, x, p: t))
     with pytest.raises(UnknownNameError, match=r"no solver named 'ode45s'.*did you mean 'ode45'"):
-        simulate(still, SimulationOptions(solver="ode45s"))
+        simulate(stateless, SimulationOptions(solver="ode45s"))
 
 
 @pytest.mark.parametrize(
@@ -217,14 +219,16 @@ def test_a_driven_system_with_tight_tolerance_is_not_reported_as_too_slow(solver
     assert run.time > 1000.0 and not run.finished
 
 
-@pytest.mark.parametrize(("solver", "most"), [("rk45", 200_000), ("dop853", 200_000), ("rodas5p", 50_000)])
-def test_a_run_with_extremely_short_steps_is_ended(solver: str, most: int) -> None:
+@pytest.mark.parametrize(
+    ("solver", "max_steps"), [("rk45", 200_000), ("dop853", 200_000), ("rodas5p", 50_000)]
+)
+def test_a_run_with_extremely_short_steps_is_ended(solver: str, max_steps: int) -> None:
     """x' = -1 + 2 (x < 0): after 1 s the sign of x' alternates; 1000 s would take 1e10 steps."""
     jumping = compile_system(scalar("friction", lambda t, x, p: -1 + 2 * (x < 0), 1.0))
     with pytest.raises(SimulationError, match=r"the run takes extremely short steps at 1\.\d+ s: ") as error:
         simulate(jumping, SimulationOptions(stop_time=1000.0, solver=solver))
     partial_result = partial(error)
-    assert partial_result.run.steps < most
+    assert partial_result.run.steps < max_steps
     assert partial_result.time[-1] == pytest.approx(1.0, abs=0.05)
     text = str(error.value)
     assert len(text) < 400
@@ -252,6 +256,6 @@ def test_unbounded_growth_raises_no_numpy_warning() -> None:
 
 def test_too_many_fixed_steps_are_refused() -> None:
     with pytest.raises(
-        InputError, match=r"step is 1e-12 s, and the stop time 1 s: 1e\+12 steps.*check that it is in seconds"
+        InputError, match=r"step is 1e-12 s, and the stop time 1 s: 1e\+12 steps.*that step is in seconds"
     ):
         simulate(OSCILLATOR, SimulationOptions(stop_time=1.0, solver="rk4", step=1e-12))

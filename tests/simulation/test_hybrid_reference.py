@@ -68,6 +68,6 @@ def test_runs_agree_with_the_reference(system: HybridSystem, stop: float, events
         result = simulate(compiled, options)
         if expected is None:
             expected = reference.run(result.time)
-        # Both have an error of 1e-11 per step, which successive events amplify. No event is at a sample.
+        # Both runs have an error of 1e-11 per step, which successive events amplify. No event is at a sample.
         np.testing.assert_allclose(result.signals, expected, rtol=0, atol=2e-9)
         assert result.run.events == reference.events == events

@@ -62,10 +62,10 @@ def test_infinitely_many_bounces_end_the_run_with_an_error(
     """The ball stays above the floor until the error, also with loose tolerances and long steps."""
     first = np.sqrt(2 / 9.81)
     zeno = first + 2 * restitution * first / (1 - restitution)
-    with pytest.raises(SimulationError, match="block 'ball' causes events without end at") as raised:
+    with pytest.raises(SimulationError, match="block 'ball' causes events without end at") as caught:
         run(bouncing_ball(restitution), 10.0, solver=solver, step=step, rtol=1e-3, atol=1e-3)
-    assert "give 'ball' a hysteresis" in str(raised.value)
-    partial = raised.value.partial
+    assert "give 'ball' a hysteresis" in str(caught.value)
+    partial = caught.value.partial
     assert isinstance(partial, SimulationResult)
     assert zeno - 0.011 < partial.time[-1] <= zeno
     assert partial["ball/h"].min() > -1e-9
@@ -245,7 +245,7 @@ def test_an_implicit_equation_is_solved_at_every_evaluation() -> None:
     np.testing.assert_allclose(result["loop/u"], 0.7390851332151607, rtol=0, atol=2e-16)
 
 
-def test_a_system_of_nonlinear_loops_with_pivoting() -> None:
+def test_nonlinear_loops_that_need_pivoting_are_solved() -> None:
     """``w1 w2 = 1 + t``, ``w1 + w2 = 3 + t``, and a third equation that needs a row exchange."""
     system = hybrid(
         "three",

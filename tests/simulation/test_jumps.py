@@ -146,9 +146,9 @@ def test_held_signals_are_stairs_between_samples(seed: int) -> None:
     t = np.random.default_rng(seed).uniform(0.0, case.stop_time, 2000)
     for name in ("step", "loop", "delayed", "hold", "sign", "product"):
         jumps = case.times(name)
-        clear = t[np.abs(t[:, np.newaxis] - jumps).min(axis=1, initial=1.0) > 1e-6]
-        drawn = np.interp(clear, rows.time, rows[name])
-        assert drawn == pytest.approx(case.value(name, clear, "after"), abs=1e-6), name
+        away_from_jumps = t[np.abs(t[:, np.newaxis] - jumps).min(axis=1, initial=1.0) > 1e-6]
+        drawn = np.interp(away_from_jumps, rows.time, rows[name])
+        assert drawn == pytest.approx(case.value(name, away_from_jumps, "after"), abs=1e-6), name
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -240,8 +240,10 @@ def test_a_change_of_parameters_is_a_jump(change: float, states: bool) -> None:
     assert np.interp(t, rows.time, rows["gain"]).tolist() == [6.0, 10.0, 10.0, 10.0]
 
 
-def tuned(seed: int, *, states: bool, hybrid: bool, log: Path | None = None) -> tuple[ab.Simulation, Jumped]:
-    """A run whose gain is tuned three times, and the jumps that its live samples had."""
+def tuned_run(
+    seed: int, *, states: bool, hybrid: bool, log: Path | None = None
+) -> tuple[ab.Simulation, LiveJumps]:
+    """A run whose gain is tuned three times, and the times of the jumps in its live samples."""
     random = np.random.default_rng(seed)
     b = DiagramBuilder("tuned")
     source = b.add("source", Step(time=float(random.uniform(0.2, 2.5)), initial=1.0, final=2.0))
@@ -252,15 +254,15 @@ def tuned(seed: int, *, states: bool, hybrid: bool, log: Path | None = None) -> 
     if states:
         b.add("integral", Integrator(), gain)
     live = ab.begin(b.build(), stop_time=3.0, sample_time=0.07, max_step=0.03, log=log)
-    seen = Jumped()
+    live_jumps = LiveJumps()
     for k, time in enumerate(np.sort(random.uniform(0.1, 2.9, 3)).tolist()):
-        seen.advance(live, time, exactly=bool(random.integers(2)))
+        live_jumps.advance(live, time, exactly=bool(random.integers(2)))
         live.set("gain.gain", float(k + 2))
-    seen.advance(live, np.inf)
-    return live, seen
+    live_jumps.advance(live, np.inf)
+    return live, live_jumps
 
 
-class Jumped:
+class LiveJumps:
     """The times of the jumps in live samples, s."""
 
     def __init__(self) -> None:
@@ -280,13 +282,13 @@ class Jumped:
 def test_a_tuned_run_has_the_same_jumps_live_and_in_its_log(
     seed: int, states: bool, hybrid: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    live, seen = tuned(seed, states=states, hybrid=hybrid)
+    live, live_jumps = tuned_run(seed, states=states, hybrid=hybrid)
     whole = live.result()
-    assert seen.times == whole.jumps.time.tolist()
+    assert live_jumps.times == whole.jumps.time.tolist()
     assert whole.jumps["gain"][0].size == 4
     assert np.all(np.diff(whole.with_jumps().time) >= 0.0)
     monkeypatch.setattr("armblocks.simulation.run_log.window_rows", lambda width: 7)
-    logged, _ = tuned(seed, states=states, hybrid=hybrid, log=tmp_path / "log.csv")
+    logged, _ = tuned_run(seed, states=states, hybrid=hybrid, log=tmp_path / "log.csv")
     whole.save(tmp_path / "saved.csv")
     logged.result()
     assert (tmp_path / "log.csv").read_bytes() == (tmp_path / "saved.csv").read_bytes()
@@ -331,14 +333,14 @@ def test_states_that_are_reset_have_both_sides() -> None:
     assert rows.states[:, 0] == pytest.approx(rows["integral"])
 
 
-def test_jumps_travel_with_a_pickled_result() -> None:
+def test_a_pickled_result_keeps_its_jumps() -> None:
     result = run(Case(1))
     copied = pickle.loads(pickle.dumps(result))
     assert same(copied, result)
     assert copied.jumps["hold"][0].tobytes() == result.jumps["hold"][0].tobytes()
 
 
-def test_a_run_with_too_many_jumps_says_from_when_on_they_are_not_recorded(
+def test_a_run_with_too_many_jumps_reports_when_their_recording_ends(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(jumps_module, "MAX_NUMBERS", 6000)
@@ -375,6 +377,6 @@ def test_a_saved_result_with_jumps_can_be_played_back(seed: int, tmp_path: Path)
     t = np.random.default_rng(seed).uniform(0.0, case.stop_time, 500)
     for column, name in enumerate(names):
         jumps = case.times(name)
-        clear = t[np.abs(t[:, np.newaxis] - jumps).min(axis=1, initial=1.0) > 1e-6]
-        drawn = np.interp(clear, rows.time, rows["file"][:, column])
-        assert drawn == pytest.approx(case.value(name, clear, "after"), abs=1e-6), name
+        away_from_jumps = t[np.abs(t[:, np.newaxis] - jumps).min(axis=1, initial=1.0) > 1e-6]
+        drawn = np.interp(away_from_jumps, rows.time, rows["file"][:, column])
+        assert drawn == pytest.approx(case.value(name, away_from_jumps, "after"), abs=1e-6), name

@@ -139,7 +139,7 @@ def test_a_mat_file_has_one_structure_per_block(result: SimulationResult, tmp_pa
     assert [row[1] for row in data["paths"]] == ["clock.y", "rne.tau", "fkine.T", "poses.T"]
 
 
-def named(*names: str) -> SimulationResult:
+def result_with_signals(*names: str) -> SimulationResult:
     layout = Signature(tuple(Slot(name) for name in names))
     return SimulationResult(
         name="named",
@@ -156,7 +156,7 @@ def named(*names: str) -> SimulationResult:
 
 
 def test_names_that_are_invalid_in_matlab_are_changed_and_listed(tmp_path: Path) -> None:
-    result = named("my block/out 1", "my_block/out_1", "1st/y", "time/y", "arm/ü")
+    result = result_with_signals("my block/out 1", "my_block/out_1", "1st/y", "time/y", "arm/ü")
     result.save(tmp_path / "run.mat")
     data = loadmat(tmp_path / "run.mat", squeeze_me=True, struct_as_record=False)
     places = {row[0]: row[1] for row in data["paths"]}
@@ -235,28 +235,32 @@ def test_the_notebook_view_draws_every_signal_with_a_text_description(result: Si
 
 def test_the_notebook_view_escapes_names_and_is_limited_in_size() -> None:
     hostile = "<script>alert(1)</script>/\"y'"
-    result = dataclasses.replace(named(hostile), name="<b>&")
+    result = dataclasses.replace(result_with_signals(hostile), name="<b>&")
     html = result._repr_html_()
     assert "<script" not in html
     assert "&lt;b&gt;&amp;" in html
     assert drawings(html)[0].attrib["aria-label"].startswith(hostile)
-    many = named(*(f"block{k}/y" for k in range(40)))
+    many = result_with_signals(*(f"block{k}/y" for k in range(40)))
     assert "Not drawn: block30/y" in many._repr_html_()
     long = dataclasses.replace(
-        named("a/y"), time=np.arange(100_000.0), signals=np.sin(np.arange(100_000.0))[np.newaxis]
+        result_with_signals("a/y"),
+        time=np.arange(100_000.0),
+        signals=np.sin(np.arange(100_000.0))[np.newaxis],
     )
     assert len(long._repr_html_()) < 10_000
 
 
-def test_the_notebook_view_of_constant_wide_and_empty_signals() -> None:
-    ticks = dataclasses.replace(named("a/y"), signals=np.array([[-1e-7, 0.0, 12_345.0]]))
+def test_the_notebook_view_shows_constant_wide_and_empty_signals() -> None:
+    ticks = dataclasses.replace(result_with_signals("a/y"), signals=np.array([[-1e-7, 0.0, 12_345.0]]))
     assert drawings(ticks._repr_html_())[0].attrib["aria-label"] == "a/y: from −1e−7 to 12300"
-    flat = dataclasses.replace(named("a/y"), signals=np.zeros((1, 3)))
+    flat = dataclasses.replace(result_with_signals("a/y"), signals=np.zeros((1, 3)))
     assert "−" not in drawings(flat._repr_html_())[0].attrib["aria-label"]
     wide = dataclasses.replace(
-        named("a/y"), signals_layout=signature(("a/y", (12,))), signals=np.arange(36.0).reshape(12, 3)
+        result_with_signals("a/y"),
+        signals_layout=signature(("a/y", (12,))),
+        signals=np.arange(36.0).reshape(12, 3),
     )
     assert "8 of 12 drawn" in wide._repr_html_()
-    empty = dataclasses.replace(named("a/y"), time=np.empty(0), signals=np.empty((1, 0)))
+    empty = dataclasses.replace(result_with_signals("a/y"), time=np.empty(0), signals=np.empty((1, 0)))
     assert drawings(empty._repr_html_())
     assert "0 samples" in repr(empty)

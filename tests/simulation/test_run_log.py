@@ -43,7 +43,7 @@ def read(path: Path) -> tuple[list[str], np.ndarray]:
     return rows[0], np.array([[float(value) for value in row] for row in rows[1:]]).T
 
 
-def logged(
+def run_with_log(
     system: CompiledSystem, path: Path, options: SimulationOptions, signals: tuple[str, ...] = ()
 ) -> SimulationResult:
     return simulate(system, options, log=LogRequest(path=path, signals=signals))
@@ -64,7 +64,7 @@ def test_a_log_equals_the_run_in_memory_bit_for_bit(
 ) -> None:
     options = SimulationOptions(stop_time=4.0, sample_time=0.01, solver=solver, step=step)
     whole = simulate(SYSTEMS[name], options).with_jumps()
-    result = logged(SYSTEMS[name], tmp_path / f"log{suffix}", options)
+    result = run_with_log(SYSTEMS[name], tmp_path / f"log{suffix}", options)
     names, columns = read(tmp_path / f"log{suffix}")
     assert tuple(names) == ("time", *whole.columns())
     assert columns[0].tobytes() == whole.time.tobytes()
@@ -91,13 +91,15 @@ def test_a_view_keeps_the_extremes_and_is_limited_in_size() -> None:
         assert view_rows[row].min() == table[row].min() and view_rows[row].max() == table[row].max()
     # The view has the extremes of every interval of the table.
     length = 300_000 * 7 // run_log.VIEW_ROWS
-    stretches = table[2, : 300_000 // length * length].reshape(-1, length)
-    assert np.isin(stretches.max(axis=1), view_rows[2]).all()
+    intervals = table[2, : 300_000 // length * length].reshape(-1, length)
+    assert np.isin(intervals.max(axis=1), view_rows[2]).all()
 
 
 def test_a_log_has_the_chosen_signals_and_the_run_report(tmp_path: Path) -> None:
     path = tmp_path / "log.parquet"
-    result = logged(SYSTEMS["van_der_pol"], path, SimulationOptions(stop_time=2.0), ("pid/u", "position"))
+    result = run_with_log(
+        SYSTEMS["van_der_pol"], path, SimulationOptions(stop_time=2.0), ("pid/u", "position")
+    )
     names, _ = read(path)
     assert names == ["time", "pid/u", "position/y"]
     message = json.loads(pq.read_metadata(str(path)).metadata[b"armblocks"])  # pyright: ignore
@@ -164,7 +166,7 @@ def test_the_log_of_a_failed_run_has_all_samples_before_the_failure(tmp_path: Pa
     options = SimulationOptions(stop_time=4.0, sample_time=0.01)
     system = compile_system(scalar("blow_up", lambda t, x, p: x * x, 1.0))
     with pytest.raises(SimulationError) as caught:
-        logged(system, tmp_path / "log.parquet", options)
+        run_with_log(system, tmp_path / "log.parquet", options)
     _, columns = read(tmp_path / "log.parquet")
     assert 0.95 < columns[0][-1] <= 1.0
     partial = caught.value.partial
@@ -178,7 +180,7 @@ def test_the_log_ends_before_a_signal_that_is_not_finite(tmp_path: Path) -> None
         small_system("pole", signals=signature(("pole/y", ())), outputs=lambda t, x, p: 1 / (t - 2.0))
     )
     with pytest.raises(SimulationError, match="signal 'pole/y' is inf at 2 s"):
-        logged(system, tmp_path / "log.csv", SimulationOptions(stop_time=4.0, sample_time=0.125))
+        run_with_log(system, tmp_path / "log.csv", SimulationOptions(stop_time=4.0, sample_time=0.125))
     _, columns = read(tmp_path / "log.csv")
     assert columns[0][-1] == 1.875
 
@@ -186,11 +188,11 @@ def test_the_log_ends_before_a_signal_that_is_not_finite(tmp_path: Path) -> None
 def test_invalid_log_requests_are_refused_before_the_run(tmp_path: Path) -> None:
     options = SimulationOptions()
     with pytest.raises(UnknownNameError, match=r"no log file type named '.npz'"):
-        logged(SYSTEMS["relay"], tmp_path / "log.npz", options)
+        run_with_log(SYSTEMS["relay"], tmp_path / "log.npz", options)
     with pytest.raises(UnknownNameError, match="no signal named 'relai"):
-        logged(SYSTEMS["relay"], tmp_path / "log.csv", options, ("relai/y",))
+        run_with_log(SYSTEMS["relay"], tmp_path / "log.csv", options, ("relai/y",))
     with pytest.raises(FormatError, match="does not exist"):
-        logged(SYSTEMS["relay"], tmp_path / "nowhere" / "log.csv", options)
+        run_with_log(SYSTEMS["relay"], tmp_path / "nowhere" / "log.csv", options)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -213,5 +215,5 @@ def test_a_full_disk_ends_the_logged_run_with_an_error(
 
     monkeypatch.setattr("armblocks.simulation.export._CsvLog._append", full)
     with pytest.raises(FormatError, match=r"writing to the log failed \(No space left"):
-        logged(SYSTEMS["relay"], tmp_path / "log.csv", SimulationOptions(stop_time=4.0))
+        run_with_log(SYSTEMS["relay"], tmp_path / "log.csv", SimulationOptions(stop_time=4.0))
     assert list(tmp_path.iterdir()) == []

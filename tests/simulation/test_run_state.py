@@ -87,7 +87,7 @@ def test_a_run_continues_from_a_step_that_ends_at_the_stop_time_to_rounding() ->
     builder = DiagramBuilder("falling")
     push = builder.add("push", Constant())
     builder.add("mass", SecondOrderIntegrator(), push)
-    builder.add("seen", ZeroOrderHold(sample_time=0.3), push)  # ticks at 0.8999999999999999 s
+    builder.add("sampled", ZeroOrderHold(sample_time=0.3), push)  # ticks at 0.8999999999999999 s
     system = compile_system(trace_diagram(builder.build()))
 
     def options(stop: float) -> SimulationOptions:

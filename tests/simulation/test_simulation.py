@@ -192,12 +192,12 @@ def test_a_parameter_change_after_the_end_is_refused() -> None:
 def test_a_stopped_run_keeps_its_samples_and_does_not_continue() -> None:
     run = Simulation(SYSTEMS["relay"], options())
     run.advance(1.0)
-    run.stop("enough seen")
+    run.stop("inspection finished")
     run.advance()
     result = run.result()
     assert 0.95 <= result.time[-1] < 2.0
     assert result.final_state is not None and result.final_state.time >= 1.0
-    assert not result.run.complete and result.run.message == "enough seen"
+    assert not result.run.complete and result.run.message == "inspection finished"
 
 
 def test_a_failed_run_raises_the_same_error_each_time() -> None:

@@ -36,7 +36,7 @@ STIFF_LAG = compile_system(scalar("lag", lambda t, x, p: -1e6 * (x - ca.cos(t)),
 
 
 @pytest.mark.parametrize(("rtol", "error"), [(1e-4, 1e-4), (1e-6, 2e-6), (1e-9, 2e-9)])
-def test_robertson_to_1e11_seconds(rtol: float, error: float) -> None:
+def test_robertson_at_1e11_seconds_agrees_with_the_published_state(rtol: float, error: float) -> None:
     """The accuracy is near the tolerance, with at most 1500 steps over 11 decades of time."""
     options = SimulationOptions(stop_time=1e11, solver="rodas5p", rtol=rtol, atol=rtol * 1e-8)
     result = simulate(ROBERTSON, options)
@@ -46,7 +46,7 @@ def test_robertson_to_1e11_seconds(rtol: float, error: float) -> None:
     np.testing.assert_allclose(result["y"].sum(axis=1), 1.0, rtol=1e-12)
 
 
-def test_robertson_with_the_conservation_law_as_an_implicit_equation() -> None:
+def test_robertson_with_an_implicit_conservation_law_agrees_with_the_published_state() -> None:
     options = SimulationOptions(stop_time=1e11, solver="rodas5p", rtol=1e-6, atol=1e-14)
     result = simulate(compile_system(robertson_dae()), options)
     actual = np.array([result[name][-1] for name in "abc"])
@@ -56,7 +56,7 @@ def test_robertson_with_the_conservation_law_as_an_implicit_equation() -> None:
 
 
 @pytest.mark.parametrize(("rtol", "error"), [(1e-4, 1e-3), (1e-6, 1e-6), (1e-9, 1e-9)])
-def test_van_der_pol_with_mu_1000(rtol: float, error: float) -> None:
+def test_van_der_pol_with_mu_1000_agrees_with_the_published_state(rtol: float, error: float) -> None:
     options = SimulationOptions(stop_time=2000.0, solver="rodas5p", rtol=rtol, atol=rtol * 1e-3)
     result = simulate(VAN_DER_POL, options)
     np.testing.assert_allclose(result["y"][-1], VAN_DER_POL_END, rtol=error)
@@ -77,7 +77,7 @@ def test_chemical_kinetics_agree_with_radau(name: str) -> None:
         np.testing.assert_allclose(result["y"][::100], expected(time).T, rtol=allowed, atol=1e-9)
 
 
-def test_heat_in_a_rod_of_500_states() -> None:
+def test_heat_in_a_rod_of_500_states_decays_at_the_known_rate() -> None:
     """The fastest rate is 1e6 1/s: few steps, each with work proportional to the number of states."""
     rod, mode, rate = heat(500)
     compiled = compile_system(rod)
@@ -109,7 +109,7 @@ def test_an_implicit_equation_is_solved_at_every_stage() -> None:
 
 def test_an_implicit_equation_that_becomes_singular_is_reported() -> None:
     """``w^2 = x`` with ``x = 1 - t``: at 1 s the two solutions coincide, and later there is none."""
-    ending = hybrid(
+    without_later_solution = hybrid(
         "ending",
         states=("tank/x",),
         algebraic=("root/w",),
@@ -123,7 +123,7 @@ def test_an_implicit_equation_that_becomes_singular_is_reported() -> None:
     with pytest.raises(
         SimulationError, match="no solution of the implicit equations of the loop through 'root'"
     ) as error:
-        simulate(compile_system(ending), SimulationOptions(stop_time=2.0, solver="rodas5p"))
+        simulate(compile_system(without_later_solution), SimulationOptions(stop_time=2.0, solver="rodas5p"))
     partial_result = error.value.partial
     assert partial_result is not None
     np.testing.assert_allclose(partial_result["w"], np.sqrt(1.0 - partial_result.time), atol=1e-6)  # pyright: ignore
@@ -149,7 +149,7 @@ def test_events_and_ticks_are_at_the_known_times_with_stiff_methods(solver: str)
 
 # Implicit Euler linearises its input, with an error of h^2 / 2 for the cosine.
 @pytest.mark.parametrize(("solver", "error"), [("ros5", 2e-6), ("implicit_euler", 5.1e-5)])
-def test_fixed_steps_far_above_the_stability_limit_of_explicit_methods(solver: str, error: float) -> None:
+def test_fixed_steps_may_exceed_the_stability_limit_of_explicit_methods(solver: str, error: float) -> None:
     """Steps of 0.01 s for a lag of 1e-6 s: the output equals the input up to the order of the method."""
     result = simulate(STIFF_LAG, SimulationOptions(stop_time=2.0, solver=solver, step=0.01))
     assert result.run.steps == 200
@@ -223,9 +223,9 @@ def test_pauses_between_steps_do_not_move_the_change_of_the_method() -> None:
 
 
 def test_unbounded_growth_with_a_stiff_method_is_reported_with_its_time() -> None:
-    blow_up = compile_system(scalar("blow_up", lambda t, x, p: x * x, 1.0))
+    unbounded = compile_system(scalar("blow_up", lambda t, x, p: x * x, 1.0))
     with pytest.raises(SimulationError, match="the step became as small as the rounding") as error:
-        simulate(blow_up, SimulationOptions(stop_time=2.0, solver="rodas5p"))
+        simulate(unbounded, SimulationOptions(stop_time=2.0, solver="rodas5p"))
     text = str(error.value)
     assert "'block/x'" in text
     time = float(text.split("rounding of the time at ")[1].split(" s")[0])

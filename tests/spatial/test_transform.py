@@ -48,10 +48,10 @@ def test_a_matrix_that_is_not_a_pose_is_refused():
     with pytest.raises(InputError, match=r"the last row of a transform is \[0.0, 0.0, 0.0, 2.0\]"):
         Transform.from_matrix(np.diag((1, 1, 1, 2)))
     with pytest.raises(
-        InputError, match=r"should be a rotation is not: R'R differs from the identity by 0\.21"
+        InputError, match=r"rotation matrix is not orthonormal: R'R differs from the identity by 0\.21"
     ):
         Transform(rotation=np.diag((1.1, 1, 1)))
-    with pytest.raises(InputError, match="should be a rotation is a mirror"):
+    with pytest.raises(InputError, match="the rotation matrix is a reflection"):
         Transform(rotation=np.diag((1, 1, -1)))
 
 

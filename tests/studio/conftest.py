@@ -63,7 +63,7 @@ for (const draw of ['drawArrays', 'drawElements', 'drawArraysInstanced', 'drawEl
 """Three-dimensional scenes are set up but not drawn, because software rendering takes longer than all other
 work. Shaders are compiled, and a shader error is reported on the console."""
 TIMEOUT_MS = 180_000
-"""Long enough for a busy machine; nothing waits longer than needed."""
+"""Time limit of waiting for the page, ms; sufficient for a busy computer."""
 expect.set_options(timeout=TIMEOUT_MS)
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
@@ -236,11 +236,11 @@ def watched(browser: Browser, address: str) -> Generator[Page]:
     page = context.new_page()
     faults: list[str] = []
 
-    def hear(message: ConsoleMessage) -> None:
+    def on_console(message: ConsoleMessage) -> None:
         if message.type == "error":
             faults.append(message.text)
 
-    page.on("console", hear)
+    page.on("console", on_console)
     page.on("pageerror", lambda error: faults.append(str(error)))
     page.goto(address)
     page.locator(".react-flow__node").first.wait_for()

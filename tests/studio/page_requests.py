@@ -27,13 +27,13 @@ def run_scenario(
     async def main() -> None:
         hub = Hub(ProjectFolder(folder))
 
-        async def hear(text: str) -> None:
+        async def receive(text: str) -> None:
             received.append(json.loads(text))
 
-        async def hear_bytes(data: bytes) -> None:
+        async def receive_bytes(data: bytes) -> None:
             assert runs, "samples arrived without a run"
 
-        page = Page(hear, hear_bytes)
+        page = Page(receive, receive_bytes)
         await hub.welcome(page)
         number = 0
 

@@ -1,4 +1,4 @@
-"""Acceptance tests of hybrid and delayed systems: comparison with closed forms, as objects and as files."""
+"""Acceptance tests of hybrid and delayed systems against closed forms, before and after saving to a file."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ SOLVERS: Mapping[str, Mapping[str, object]] = {
 
 @pytest.fixture(params=SOLVERS)
 def run(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[..., ab.SimulationResult]:
-    """Return a function that runs a diagram with one solver, also after saving and loading it."""
+    """A function that runs a diagram with one solver. The saved and loaded diagram gives equal results."""
 
-    def by_solver(diagram: ab.Diagram, stop_time: float, **settings: object) -> ab.SimulationResult:
+    def run_and_reload(diagram: ab.Diagram, stop_time: float, **settings: object) -> ab.SimulationResult:
         options = {**SOLVERS[request.param], "sample_time": stop_time / 97.0, **settings}
         result = ab.simulate(diagram, stop_time=stop_time, **options)
         ab.save_diagram(diagram, tmp_path / "saved.json")
@@ -35,26 +35,28 @@ def run(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[..., ab.Simu
             assert np.array_equal(result[name], reloaded[name]), name
         return result
 
-    return by_solver
+    return run_and_reload
 
 
 Run = Callable[..., ab.SimulationResult]
 
 
-def integrating(builder: ab.DiagramBuilder, name: str, rate: object, **parameters: object) -> ab.BlockHandle:
+def add_integrator(
+    builder: ab.DiagramBuilder, name: str, rate: object, **parameters: object
+) -> ab.BlockHandle:
     """Add an integrator with the input ``rate``."""
     return builder.add(name, bl.Integrator(**parameters), rate)
 
 
 def test_a_ball_rolls_down_a_slope_and_bounces_at_the_end(run: Run) -> None:
-    """On a slope of 30 degrees a = -g/2; with e = 0.6 the bounces are at t1, t1 + 2 e v1/a, ..."""
+    """On a slope of 30 degrees, a = g/2. With restitution e = 0.6, the bounces are at t1, t1 + 2 e v1/a, …"""
     a, e, s0 = 9.81 / 2, 0.6, 2.0
     builder = ab.DiagramBuilder("slope")
-    pull = builder.add("pull", bl.Constant(value=-a))
+    gravity = builder.add("gravity", bl.Constant(value=-a))
     ball = builder.add(
         "ball",
         bl.SecondOrderIntegratorLimited(initial=s0, lower=0.0, reinitialize=True),
-        pull,
+        gravity,
     )
     bounce = builder.add("bounce", bl.Gain(gain=-e), ball["dx"])
     builder.connect(bounce, ball["dx0"])
@@ -81,18 +83,18 @@ def test_a_mass_on_a_belt_sticks_and_slips_periodically(run: Run) -> None:
     # In belt coordinates, y = x - V t, the input of the friction block is the relative speed.
     mass = builder.add("mass", bl.StickSlipFriction(mass=m, coulomb=Fc, static=Fs))
     belt = builder.add("belt", bl.Ramp(slope=V))
-    place = builder.add("place", bl.Sum(signs="++"), mass["x"], belt)
-    builder.connect(builder.add("spring", bl.Gain(gain=-k), place), mass["F"])
+    position = builder.add("position", bl.Sum(signs="++"), mass["x"], belt)
+    builder.connect(builder.add("spring", bl.Gain(gain=-k), position), mass["F"])
     t1 = Fs / (k * V)  # end of sticking from x = 0
     w = math.sqrt(k / m)
-    # slipping: x'' = -w^2 x + Fc/m, from x = Fs/k, x' = V
+    # During the slip, x'' = -w^2 x + Fc/m, from x = Fs/k, x' = V.
     A, B = Fs / k - Fc / k, V / w
 
     def x(time: Array) -> Array:
         s = time - t1
         return Fc / k + A * np.cos(w * s) + B * np.sin(w * s)
 
-    # it sticks again when x' = V for the first time after that
+    # The mass sticks again at the first time after t1 with x' = V, s2 later.
     s2 = (2 * math.pi - 2 * math.atan2(A, B)) / w
     result = run(builder.build(), t1 + s2 + 0.3)
     t = result.time
@@ -100,12 +102,12 @@ def test_a_mass_on_a_belt_sticks_and_slips_periodically(run: Run) -> None:
     expected = np.where(t <= t1, V * t, x(t))
     end = float(x(np.array([t1 + s2]))[0])
     expected = np.where(t > t1 + s2, end + V * (t - t1 - s2), expected)
-    np.testing.assert_allclose(result["place/y"], expected, atol=1e-8)
+    np.testing.assert_allclose(result["position/y"], expected, atol=1e-8)
     stuck = ~slip & (np.abs(t - t1) > 1e-9)
     assert (result["mass/v"][stuck] == 0.0).all()
 
 
-def test_a_thermostat_with_exponential_branches(run: Run) -> None:
+def test_a_thermostat_with_exponential_branches_agrees_with_its_closed_form(run: Run) -> None:
     """T' = -(T - 10 - 20 on): heating from 15 to 22, then cooling to 18, ...: exponentials in closed form."""
     builder = ab.DiagramBuilder("thermostat")
     room = builder.add("room", bl.Integrator(initial=15.0))
@@ -123,7 +125,7 @@ def test_a_thermostat_with_exponential_branches(run: Run) -> None:
     np.testing.assert_allclose(result["room"], expected, atol=3e-8)
 
 
-def test_two_rates_with_offsets_around_a_plant(run: Run) -> None:
+def test_a_loop_of_two_rates_with_offsets_is_piecewise_linear(run: Run) -> None:
     """x' = u held at 0.02 + 0.1 j, u = -K w, w = x held at 0.07 + 0.25 j: x is exactly piecewise linear."""
     builder = ab.DiagramBuilder("rates")
     x = builder.add("x", bl.Integrator(initial=1.0))
@@ -150,12 +152,12 @@ def test_two_rates_with_offsets_around_a_plant(run: Run) -> None:
     np.testing.assert_allclose(result["x"], expected, atol=1e-12)
 
 
-def test_a_relay_with_hysteresis_in_a_double_integrator_loop(run: Run) -> None:
+def test_a_double_integrator_with_a_relay_moves_on_parabolas(run: Run) -> None:
     """x'' = -relay(x) with hysteresis h: parabolas, on which v^2 grows by 4 h in each half period."""
     h = 0.1
     builder = ab.DiagramBuilder("relay")
     v = builder.add("v", bl.Integrator(initial=1.0))
-    x = integrating(builder, "x", v)
+    x = add_integrator(builder, "x", v)
     relay = builder.add("relay", bl.Relay(on_point=h, off_point=-h, on_value=-1.0, off_value=1.0), x)
     builder.connect(relay, v["u"])
     result = run(builder.build(), 6.0)
@@ -171,7 +173,7 @@ def test_a_relay_with_hysteresis_in_a_double_integrator_loop(run: Run) -> None:
     np.testing.assert_allclose(result["x"], expected, atol=2e-8)
 
 
-def test_dead_time_in_a_loop(run: Run) -> None:
+def test_a_loop_with_dead_time_agrees_with_the_method_of_steps(run: Run) -> None:
     """x'(t) = -x(t - 1) with x = 1 for t <= 0: the method of steps gives a polynomial for every second."""
     builder = ab.DiagramBuilder("dead time")
     x = builder.add("x", bl.Integrator(initial=1.0))
@@ -186,8 +188,8 @@ def test_dead_time_in_a_loop(run: Run) -> None:
     np.testing.assert_allclose(result["x"], 1.0 + expected, atol=2e-8)
 
 
-def test_a_sampled_pi_with_a_delay_of_one_tick(run: Run) -> None:
-    """The exact recurrence of plant, integrator and delay, with e^-T for the plant between two ticks."""
+def test_a_sampled_pi_with_a_delay_of_one_tick_agrees_with_its_recurrence(run: Run) -> None:
+    """The recurrence of plant, integrator and delay is exact: between two ticks the plant decays by e^-T."""
     T, kp, ki = 0.2, 0.8, 0.5
     builder = ab.DiagramBuilder("pi")
     plant = builder.add("plant", bl.TransferFunction(numerator=[2.0], denominator=[1.0, 1.0]))
@@ -205,20 +207,20 @@ def test_a_sampled_pi_with_a_delay_of_one_tick(run: Run) -> None:
     np.testing.assert_allclose(result["plant/y"], expected, atol=2e-9)
 
 
-def test_an_event_exactly_at_a_tick(run: Run) -> None:
+def test_a_hold_samples_the_value_after_an_event_at_its_tick(run: Run) -> None:
     """A ramp crosses 0.5 exactly at the tick at 0.5 s: the hold samples the value after the event."""
     builder = ab.DiagramBuilder("instant")
     ramp = builder.add("ramp", bl.Ramp(slope=1.0))
     above = builder.add("above", bl.CompareToConstant(relation=">=", constant=0.5), ramp)
     builder.add("hold", bl.ZeroOrderHold(sample_time=0.25), above)
-    integrating(builder, "count", above)
+    add_integrator(builder, "count", above)
     result = run(builder.build(), 1.0, sample_time=0.0625)
     t = result.time
     assert result["hold/y"].tolist() == (t >= 0.5).astype(float).tolist()
     np.testing.assert_allclose(result["count"], np.maximum(t - 0.5, 0.0), atol=1e-12)
 
 
-def test_backlash_in_an_integrating_loop(run: Run) -> None:
+def test_backlash_in_an_integrating_loop_agrees_with_its_closed_form(run: Run) -> None:
     """x' = -b(x): first the backlash is crossed, then x decays exponentially to the edge of the backlash."""
     builder = ab.DiagramBuilder("play")
     x = builder.add("x", bl.Integrator(initial=2.0))
@@ -247,7 +249,7 @@ def test_an_enabled_counter_agrees_with_a_state_machine(run: Run) -> None:
     count, expected, k = 0, [], 0
     for row in range(result.time.size):
         if row % 5 == 0:
-            # the output at a tick is the state before it
+            # the output at a tick is the state before the update at this tick
             if (0.1 * k + 1e-9) % 0.7 < 0.35:
                 shown, count = count, count + 1
             k += 1

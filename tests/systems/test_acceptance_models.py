@@ -71,7 +71,7 @@ OREGONATOR_END = (
 
 
 @pytest.mark.parametrize("solver", ["auto", "rodas5p"])
-def test_hires(solver: str, tmp_path: Path) -> None:
+def test_hires_agrees_with_the_published_end_values(solver: str, tmp_path: Path) -> None:
     diagram = system_of("hires", HIRES, (1, 0, 0, 0, 0, 0, 0, 0.0057))
     settings = {"stop_time": 321.8122, "solver": solver, "rtol": 1e-8, "atol": 1e-12}
     result = ab.simulate(diagram, **settings)
@@ -82,7 +82,7 @@ def test_hires(solver: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("solver", ["auto", "rodas5p"])
-def test_the_oregonator(solver: str) -> None:
+def test_the_oregonator_agrees_with_the_published_end_values(solver: str) -> None:
     diagram = system_of("oregonator", OREGONATOR, (1.0, 2.0, 3.0))
     result = ab.simulate(diagram, stop_time=360.0, solver=solver, rtol=1e-9, atol=1e-10)
     np.testing.assert_allclose(ends(result, 3), OREGONATOR_END, rtol=2e-6)
@@ -102,23 +102,25 @@ def test_a_diode_rectifier_agrees_with_scipy() -> None:
     assert result["y1"].max() > 4.0
 
 
-def test_a_brusselator_on_a_line_as_two_vectors() -> None:
+def test_a_brusselator_of_two_vectors_agrees_with_scipy() -> None:
     """u' = 1 + u^2 v - 4 u + D u, v' = 3 u - u^2 v + D v on 20 points with fixed boundary values."""
-    n, spread = 20, 0.02 * 21**2
-    D = spread * (np.diag(np.full(n, -2.0)) + np.diag(np.ones(n - 1), 1) + np.diag(np.ones(n - 1), -1))
+    n, diffusion = 20, 0.02 * 21**2
+    D = diffusion * (np.diag(np.full(n, -2.0)) + np.diag(np.ones(n - 1), 1) + np.diag(np.ones(n - 1), -1))
     position = np.arange(1, n + 1) / (n + 1)
-    edge = spread * (np.arange(n) % (n - 1) == 0)
+    edge = diffusion * (np.arange(n) % (n - 1) == 0)
     builder = ab.DiagramBuilder("brusselator")
     u = builder.add("u", bl.Integrator(initial=1.0 + np.sin(2 * np.pi * position)))
     v = builder.add("v", bl.Integrator(initial=np.full(n, 3.0)))
-    for name, own, reaction, border in (
+    for name, state, reaction, boundary_value in (
         ("du", u, "1 + u1^2*u2 - 4*u1", 1.0),
         ("dv", v, "3*u1 - u1^2*u2", 3.0),
     ):
-        reaction_rate = builder.add(f"{name} made", bl.Expression(formula=reaction, inputs=2), u, v)
-        moved = builder.add(f"{name} moved", bl.MatrixGain(gain=D), own)
-        ends_ = builder.add(f"{name} ends", bl.Constant(value=border * edge))
-        builder.connect(builder.add(name, bl.Sum(signs="+++"), reaction_rate, moved, ends_), own["u"])
+        reaction_rate = builder.add(f"{name} reaction", bl.Expression(formula=reaction, inputs=2), u, v)
+        diffusion_rate = builder.add(f"{name} diffusion", bl.MatrixGain(gain=D), state)
+        boundary = builder.add(f"{name} boundary", bl.Constant(value=boundary_value * edge))
+        builder.connect(
+            builder.add(name, bl.Sum(signs="+++"), reaction_rate, diffusion_rate, boundary), state["u"]
+        )
     result = ab.simulate(builder.build(), stop_time=10.0, solver="rodas5p", rtol=1e-8, atol=1e-10)
 
     def rate(_: float, y: Array) -> Array:
@@ -163,7 +165,9 @@ def test_the_solution_of_a_loop_with_three_solutions_stays_on_its_branch(
 
 
 @RUNS
-def test_a_vector_loop_through_a_matrix_solve(settings: Mapping[str, object]) -> None:
+def test_a_vector_loop_through_a_matrix_solve_agrees_with_its_closed_form(
+    settings: Mapping[str, object],
+) -> None:
     """A w = b - 0.3 w with b = (cos t, sin t): a linear loop, whose integral has a closed form."""
     A = np.array([[3.0, 1.0], [-1.0, 2.0]])
     builder = ab.DiagramBuilder("solve")
@@ -328,7 +332,9 @@ def test_the_linearised_arm_agrees_with_differences_of_lagranges_equations() -> 
 
 
 @RUNS
-def test_two_tanks_in_subsystems_on_a_bus(settings: Mapping[str, object], tmp_path: Path) -> None:
+def test_two_tanks_on_a_bus_agree_with_the_matrix_exponential(
+    settings: Mapping[str, object], tmp_path: Path
+) -> None:
     """Lags of 1 s and 0.5 s in series, connected by tags and a bus, compared with the matrix exponential."""
 
     def tank(rate: float) -> ab.Diagram:

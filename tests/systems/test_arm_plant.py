@@ -59,21 +59,21 @@ def pair(gravity: float = 9.81) -> Robot:
     return Robot(name="pair", gravity=(0.0, -gravity, 0.0), links=serial_chain(links))
 
 
-def driven(
+def simulate_arm(
     plant: ArmPlant | ForwardDynamics,
     *torques: Block,
     stop: float,
     solver: str = "rk45",
     inputs: Mapping[str, Block] | None = None,
-    held: float | None = None,
+    torque_period: float | None = None,
 ) -> SimulationResult:
     """Simulate the arm with joint torques, and record its energy and the work of all torques."""
     builder = DiagramBuilder("d")
     arm = builder.add("arm", plant)
     sources = [builder.add(f"torque {k}", block) for k, block in enumerate(torques)]
     tau = builder.add("tau", Mux(inputs=len(sources)), *sources)
-    if held is not None:
-        tau = builder.add("held", ZeroOrderHold(sample_time=held), tau)
+    if torque_period is not None:
+        tau = builder.add("held", ZeroOrderHold(sample_time=torque_period), tau)
     builder.connect(tau, arm["tau"])
     for name, block in (inputs or {}).items():
         builder.connect(builder.add(name, block), arm[name])
@@ -97,7 +97,7 @@ def energy_balance(actual: SimulationResult) -> np.ndarray:
 def test_a_joint_breaks_away_exactly_when_the_torque_exceeds_friction(solver: str) -> None:
     """tau = t, friction 0.6 N m, breakaway 0.9 N m: qd' = (t - 0.6) / 2 after 0.9 s."""
     plant = ArmPlant(robot=wheel(gear_ratio=3.0, coulomb_friction=(0.2, -0.1)), breakaway=1.5)
-    result = driven(plant, Clock(), stop=2.0, solver=solver)
+    result = simulate_arm(plant, Clock(), stop=2.0, solver=solver)
     t, qd = result.time, result["arm/qd"][:, 0]
     assert not qd[t <= 0.9].any()
     assert not result["arm/q"][t <= 0.9].any()
@@ -111,7 +111,7 @@ def test_a_joint_breaks_away_exactly_when_the_torque_exceeds_friction(solver: st
 def test_a_sliding_joint_comes_to_rest_and_sticks(solver: str) -> None:
     """-1.5 rad/s, decelerated by (0.3 + 0.25) N m with 2 kg m2; afterwards the speed is exactly 0."""
     robot = wheel(gear_ratio=3.0, coulomb_friction=(0.2, -0.1))
-    result = driven(ArmPlant(robot=robot, qd0=-1.5), Constant(value=0.25), stop=20.0, solver=solver)
+    result = simulate_arm(ArmPlant(robot=robot, qd0=-1.5), Constant(value=0.25), stop=20.0, solver=solver)
     end = 1.5 / ((0.3 + 0.25) / 2.0)
     t = np.minimum(result.time, end)
     np.testing.assert_allclose(result["arm/qd"][:, 0], -1.5 + 0.275 * t, rtol=0, atol=1e-10)
@@ -123,7 +123,7 @@ def test_a_sliding_joint_comes_to_rest_and_sticks(solver: str) -> None:
 def test_a_joint_reverses_without_sticking_when_the_torque_exceeds_friction(solver: str) -> None:
     """From -1 rad/s with 2 N m: decelerated by 2.3 / 2 rad/s2, then accelerated by 1.4 / 2 rad/s2."""
     robot = wheel(gear_ratio=3.0, coulomb_friction=(0.2, -0.1))
-    result = driven(ArmPlant(robot=robot, qd0=-1.0), Constant(value=2.0), stop=3.0, solver=solver)
+    result = simulate_arm(ArmPlant(robot=robot, qd0=-1.0), Constant(value=2.0), stop=3.0, solver=solver)
     turn = 1.0 / 1.15
     before = np.minimum(result.time, turn)
     expected = -1.0 + 1.15 * before + 0.7 * (result.time - before)
@@ -132,7 +132,7 @@ def test_a_joint_reverses_without_sticking_when_the_torque_exceeds_friction(solv
 
 def test_a_hard_stop_ends_the_motion_without_rebound_and_releases_the_joint(solver: str) -> None:
     """1 N m accelerates 2 kg m2 to 1 rad in 2 s; a torque of -1 N m after 3 s moves the joint back."""
-    result = driven(
+    result = simulate_arm(
         ArmPlant(robot=wheel(), stops="hard"),
         Step(time=3.0, initial=1.0, final=-1.0),
         stop=4.0,
@@ -155,7 +155,7 @@ def test_an_elastic_stop_is_a_spring_and_damper_that_never_pull(solver: str) -> 
     """Contact with the stop at 1 rad/s: a damped half period, until spring and damper would pull."""
     k, d, J = 800.0, 16.0, 2.0
     plant = ArmPlant(robot=wheel(), stops="elastic", stiffness=k, damping=d, qd0=1.0)
-    result = driven(plant, Constant(value=0.0), stop=1.5, solver=solver)
+    result = simulate_arm(plant, Constant(value=0.0), stop=1.5, solver=solver)
     decay, w = d / 2 / J, np.sqrt(k / J - (d / 2 / J) ** 2)
     # k x + d x' = 0 at tan(w t) = -d w / (k - d decay)
     contact = (np.pi - np.arctan2(d * w, k - d * decay)) / w
@@ -190,7 +190,7 @@ def test_sticking_and_sliding_of_two_joints_agree_with_the_scipy_reference() -> 
         return np.array([9.0 * np.sin(2.0 * t), 4.0 * np.sin(3.1 * t + 1.0)])
 
     plant = ArmPlant(robot=robot, q0=q0)
-    by_rk45, by_rk4 = (driven(plant, *torques, stop=5.0, solver=solver) for solver in ("rk45", "rk4"))
+    by_rk45, by_rk4 = (simulate_arm(plant, *torques, stop=5.0, solver=solver) for solver in ("rk45", "rk4"))
     exact = reference(robot, tau, q0, by_rk45.time)
     rests = (exact[:, 2:] == 0.0).sum(axis=0)
     assert rests.min() > 5, "each joint must stick in some samples"
@@ -212,11 +212,11 @@ def test_joints_stick_or_slide_consistently_after_a_torque_step(tau: tuple[float
     plant = ArmPlant(robot=robot, q0=q0)
     times = np.linspace(0.0, 0.3, 101)
     exact = reference(robot, lambda t: np.array(tau), q0, times)
-    result = driven(plant, *(Constant(value=one) for one in tau), stop=0.3)
+    result = simulate_arm(plant, *(Constant(value=one) for one in tau), stop=0.3)
     np.testing.assert_allclose(result["arm/q"], exact[:, :2], rtol=0, atol=1e-9)
     np.testing.assert_allclose(result["arm/qd"], exact[:, 2:], rtol=0, atol=1e-8)
     steps = [Step(time=0.15, final=one) for one in tau]
-    result = driven(plant, *steps, stop=0.45, held=0.15)
+    result = simulate_arm(plant, *steps, stop=0.45, torque_period=0.15)
     for name, columns in (("arm/q", exact[:, :2]), ("arm/qd", exact[:, 2:])):
         at = [np.interp(result.time - 0.15, times, column) for column in columns.T]
         np.testing.assert_allclose(result[name], np.array(at).T, rtol=0, atol=1e-4)
@@ -225,7 +225,7 @@ def test_joints_stick_or_slide_consistently_after_a_torque_step(tau: tuple[float
 
 
 def test_an_arm_falls_comes_to_rest_and_stays_at_rest(solver: str) -> None:
-    result = driven(
+    result = simulate_arm(
         ArmPlant(robot=pair(), q0=[-0.3, 0.2]), *[Constant(value=0.0)] * 2, stop=20.0, solver=solver
     )
     assert not result["arm/qd"][-30:].any()
@@ -239,8 +239,8 @@ def test_an_arm_falls_comes_to_rest_and_stays_at_rest(solver: str) -> None:
 def test_an_arm_without_dry_friction_agrees_with_forward_dynamics(solver: str) -> None:
     robot = pair().nofriction(viscous=False)
     torques = SineWave(amplitude=9.0, frequency=2.0), Constant(value=1.0)
-    result = driven(ArmPlant(robot=robot, q0=0.1), *torques, stop=1.0, solver=solver)
-    plain = driven(ForwardDynamics(robot=robot, q0=0.1), *torques, stop=1.0, solver=solver)
+    result = simulate_arm(ArmPlant(robot=robot, q0=0.1), *torques, stop=1.0, solver=solver)
+    plain = simulate_arm(ForwardDynamics(robot=robot, q0=0.1), *torques, stop=1.0, solver=solver)
     np.testing.assert_allclose(result["arm/q"], plain["arm/q"], rtol=0, atol=1e-9)
 
 
@@ -260,14 +260,14 @@ def test_an_impact_at_a_hard_stop_changes_the_speed_of_the_other_joint(solver: s
     q, qd = np.split(first.y[:, -1], 2)
     M = np.asarray(arm.inertia(q))
     after = np.array([0.0, qd[1] + M[1, 0] * qd[0] / M[1, 1]])
-    then = solve_ivp(flow, (first.t[-1], 0.7), [*q, *after], "DOP853", rtol=1e-12, atol=1e-13)
+    after_impact = solve_ivp(flow, (first.t[-1], 0.7), [*q, *after], "DOP853", rtol=1e-12, atol=1e-13)
     # the centrifugal torque moves the joint away from its stop immediately
-    assert then.y[2, -1] < 0.0
+    assert after_impact.y[2, -1] < 0.0
     zero = [Constant(value=0.0)] * 2
-    result = driven(ArmPlant(robot=robot, stops="hard", q0=q0, qd0=qd0), *zero, stop=0.7, solver=solver)
+    result = simulate_arm(ArmPlant(robot=robot, stops="hard", q0=q0, qd0=qd0), *zero, stop=0.7, solver=solver)
     assert result.run.events == 1, "the joint leaves the stop at the time of the impact"
-    np.testing.assert_allclose(result["arm/q"][-1], then.y[:2, -1], rtol=0, atol=1e-8)
-    np.testing.assert_allclose(result["arm/qd"][-1], then.y[2:, -1], rtol=0, atol=1e-8)
+    np.testing.assert_allclose(result["arm/q"][-1], after_impact.y[:2, -1], rtol=0, atol=1e-8)
+    np.testing.assert_allclose(result["arm/qd"][-1], after_impact.y[2:, -1], rtol=0, atol=1e-8)
     dissipated = 0.5 * qd @ M @ qd - 0.5 * after @ M @ after
     balance = energy_balance(result)
     expected = balance[0] - np.where(result.time > first.t[-1], dissipated, 0.0)
@@ -280,7 +280,7 @@ def test_energy_of_a_falling_puma_is_balanced_by_friction_and_elastic_stops(puma
     torques = [
         SineWave(amplitude=a, frequency=f) for a, f in ((30, 2), (60, 3), (20, 1), (1, 4), (1, 5), (1, 3))
     ]
-    result = driven(plant, *torques, stop=4.0)
+    result = simulate_arm(plant, *torques, stop=4.0)
     assert result.run.events > 20
     assert (result["arm/qd"] == 0.0).any()
     balance = energy_balance(result)
@@ -296,7 +296,7 @@ def test_a_dropped_payload_changes_the_acceleration_but_not_the_speed() -> None:
     payload = np.array([2.0, 0.05, 0.0, 0.1, 0.01, 0.02, 0.02, 0.0, 0.0, 0.0])
     step = Step(time=0.3, initial=payload, final=np.zeros(10))
     wrench = (1.0, 2.0, 0.0, 0.0, 0.0, 0.5)
-    result = driven(
+    result = simulate_arm(
         ArmPlant(robot=robot, payload_input=True, wrench_input=True),
         Constant(value=1.0),
         Constant(value=2.0),
@@ -317,7 +317,9 @@ def test_a_dropped_payload_changes_the_acceleration_but_not_the_speed() -> None:
 
 def test_friction_that_drives_a_joint_is_refused() -> None:
     robot = pair().with_friction_model(FrictionModel.SIGNED_GEAR)
-    with pytest.raises(InputError, match="the Coulomb friction of joint 'lower' drives it"):
+    with pytest.raises(
+        InputError, match="the Coulomb friction of joint 'lower' has the direction of the motion"
+    ):
         ArmPlant(robot=robot)
 
 
@@ -336,7 +338,7 @@ def test_each_torque_pulse_moves_a_joint_by_the_same_angle() -> None:
     """Pulses of 0.5 s, 0.5 N m above friction: the joint moves equally far during and after each pulse."""
     robot = wheel(gear_ratio=1.0, coulomb_friction=(0.5, -0.5))
     pulses = PulseGenerator(amplitude=1.0, period=2.0, width=25.0)
-    result = driven(ArmPlant(robot=robot), pulses, stop=8.0)
+    result = simulate_arm(ArmPlant(robot=robot), pulses, stop=8.0)
     # 0.25 rad/s2 for 0.5 s, then -0.25 rad/s2 until rest: 2 * 0.25 * 0.5^2 / 2 per pulse
     angles = result["arm/q"][result.time.searchsorted([1.5, 3.5, 5.5, 7.5]), 0]
     np.testing.assert_allclose(angles, 0.0625 * np.arange(1, 5), rtol=0, atol=1e-10)

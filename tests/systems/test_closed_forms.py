@@ -84,7 +84,7 @@ def test_the_step_response_of_a_filter_agrees_with_its_closed_form(start: str) -
     assert result["y/y"].ravel() == pytest.approx(expected, abs=1e-8)
 
 
-def test_a_filter_with_as_many_zeros_as_poles() -> None:
+def test_a_filter_with_as_many_zeros_as_poles_agrees_with_its_closed_form() -> None:
     """(2 s + 3) / (s + 1) on a ramp t: y = 3 t - (1 - exp(-t))."""
     builder = DiagramBuilder("lead")
     builder.add("y", TransferFunction(numerator=(2.0, 3.0), denominator=(1.0, 1.0)), builder.add("u", Ramp()))
@@ -148,8 +148,8 @@ def van_der_pol() -> Diagram:
     action = builder.add("action", PID(P=2.0, I=0.5), error)
     u = builder.add("u", Sum(signs="+-"), action, builder.add("damping", Gain(gain=0.5), x2))
     square = builder.add("square", MathFunction(function="square"), x1)
-    stretch = builder.add("stretch", Sum(signs="+-"), builder.add("one", Constant()), square)
-    push = builder.add("push", Product(), stretch, x2)
+    damping_factor = builder.add("damping factor", Sum(signs="+-"), builder.add("one", Constant()), square)
+    push = builder.add("push", Product(), damping_factor, x2)
     builder.connect(builder.add("total", Sum(signs="+-+"), push, x1, u), x2)
     return builder.build()
 

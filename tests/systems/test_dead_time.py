@@ -80,7 +80,7 @@ def decay(delay: float = 1.0) -> Diagram:
     return builder.build()
 
 
-def decayed(t: float) -> float:
+def decay_solution(t: float) -> float:
     """The method of steps in fractions: the sum of (-1)^k (t - (k - 1))^k / k! over all k with t >= k - 1."""
     time, total, k = Fraction(t), Fraction(1), 1
     while time >= k - 1:
@@ -91,9 +91,11 @@ def decayed(t: float) -> float:
 
 def test_a_delayed_decay_agrees_with_the_method_of_steps(run: Run) -> None:
     result = run(decay(), 10.0)
-    expected = np.array([decayed(t) for t in result.time])
+    expected = np.array([decay_solution(t) for t in result.time])
     close(result["x/y"], expected, 5e-9)
-    close(result["late/y"], np.array([decayed(t - 1.0) if t > 1.0 else 1.0 for t in result.time]), 5e-9)
+    close(
+        result["late/y"], np.array([decay_solution(t - 1.0) if t > 1.0 else 1.0 for t in result.time]), 5e-9
+    )
 
 
 def test_the_error_of_the_history_is_proportional_to_the_tolerance() -> None:
@@ -101,10 +103,10 @@ def test_the_error_of_the_history_is_proportional_to_the_tolerance() -> None:
     errors = []
     for rtol in (1e-4, 1e-6, 1e-8, 1e-10):
         result = native(solver="rk45", rtol=rtol, atol=rtol * 1e-3)(decay(), 10.0)
-        expected = np.array([decayed(t) for t in result.time])
+        expected = np.array([decay_solution(t) for t in result.time])
         errors.append(float(np.abs(result["x/y"] - expected).max()))
     assert errors[0] < 1e-3
-    assert all(later < 0.1 * sooner for sooner, later in pairwise(errors))
+    assert all(later < 0.1 * earlier for earlier, later in pairwise(errors))
 
 
 def test_the_output_of_a_delayed_step_jumps_exactly_one_delay_later(run: Run) -> None:
@@ -192,7 +194,7 @@ def test_pulses_and_sampled_signals_are_delayed(run: Run) -> None:
     close(result["stairs/y"], 0.25 * 0.25 * k * (k - 1) / 2 + 0.25 * k * rest, 1e-9)
 
 
-def test_a_loop_with_dead_time(run: Run) -> None:
+def test_a_loop_with_dead_time_oscillates_at_its_stability_limit(run: Run) -> None:
     """A loop of an integral controller and dead time, at the limit of its stability.
 
     y' = K (1 - y(t - 1)): the limit is K = pi / 2, with the undamped oscillation cos(pi t / 2).
@@ -203,10 +205,10 @@ def test_a_loop_with_dead_time(run: Run) -> None:
     builder.connect(builder.add("late", TransportDelay(delay=1.0), y), error["u2"])
     result = run(builder.build(), 60.0)
     t, e = result.time, 1.0 - result["y/y"]
-    decayed = t > 40.0
-    basis = np.column_stack([np.cos(math.pi / 2 * t[decayed]), np.sin(math.pi / 2 * t[decayed])])
-    fit, *_ = np.linalg.lstsq(basis, e[decayed], rcond=None)
-    assert np.abs(basis @ fit - e[decayed]).max() < 1e-5
+    stationary = t > 40.0
+    basis = np.column_stack([np.cos(math.pi / 2 * t[stationary]), np.sin(math.pi / 2 * t[stationary])])
+    fit, *_ = np.linalg.lstsq(basis, e[stationary], rcond=None)
+    assert np.abs(basis @ fit - e[stationary]).max() < 1e-5
     assert np.hypot(*fit) > 0.5
 
 
@@ -222,7 +224,7 @@ def test_a_thermostat_with_dead_time_overshoots_by_the_delayed_change(run: Run) 
     close(result["x/y"], triangle, 1e-9)
 
 
-def test_a_growing_delay(run: Run) -> None:
+def test_a_growing_delay_agrees_with_its_closed_form(run: Run) -> None:
     """d = 0.1 + t / 2 gives u((t - 0.2) / 2) after 0.2 s."""
     builder = DiagramBuilder("d")
     d = builder.add("d", Ramp(slope=0.5, initial=0.1))
@@ -236,7 +238,7 @@ def test_a_growing_delay(run: Run) -> None:
     close(result["late/y"], expected, 1e-7)
 
 
-def test_the_transport_delay_of_a_pipe_with_decreasing_flow(run: Run) -> None:
+def test_the_transport_delay_of_a_pipe_with_decreasing_flow_agrees_with_its_closed_form(run: Run) -> None:
     """T(t) = 1 + t / 2; the integral of 1/T over d is 1: 1 + (t - d) / 2 = (1 + t / 2) exp(-1/2)."""
     builder = DiagramBuilder("d")
     T = builder.add("T", Ramp(slope=0.5, initial=1.0))
@@ -290,9 +292,9 @@ def test_a_continued_run_uses_the_saved_history(tmp_path: Path) -> None:
         after = whole.time > 3.75
         assert rest["x/y"][rest.time > 3.75].tolist() == whole["x/y"][after].tolist()
         other = SimulationOptions(stop_time=8.0, sample_time=0.1, solver="dop853", rtol=1e-9, atol=1e-11)
-        anew = simulate(compiled, other, initial_state=state)
-        assert "with a restart of the solver" in anew.run.reason
-        close(anew["x/y"][anew.time > 3.75], whole["x/y"][after], 1e-6)
+        restarted = simulate(compiled, other, initial_state=state)
+        assert "with a restart of the solver" in restarted.run.reason
+        close(restarted["x/y"][restarted.time > 3.75], whole["x/y"][after], 1e-6)
 
 
 def test_a_changed_delay_takes_effect_without_compilation() -> None:

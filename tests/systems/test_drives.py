@@ -24,7 +24,7 @@ def affine(A: np.ndarray, b: np.ndarray, x0: np.ndarray, t: np.ndarray) -> np.nd
     return np.array([(expm(both * instant) @ [*x0, 1.0])[:n] for instant in t])
 
 
-def test_a_motor_with_voltage_and_load(solver: str) -> None:
+def test_a_motor_with_voltage_and_load_agrees_with_the_matrix_exponential(solver: str) -> None:
     motor = DcMotor(
         R=2.0, L=0.1, k=0.3, J=0.02, b=0.01, initial_current=0.5, initial_speed=-2.0, initial_angle=1.0
     )

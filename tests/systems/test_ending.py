@@ -34,7 +34,7 @@ def run(diagram: Diagram, solver: str, step: float | None) -> SimulationResult:
     return simulate(compiled(diagram), options)
 
 
-def watched(block: Block, relation: str = ">", level: float = 0.5) -> Diagram:
+def monitored_diagram(block: Block, relation: str = ">", level: float = 0.5) -> Diagram:
     """x = 1 - cos t, with a block that monitors a comparison of x with a level."""
     builder = DiagramBuilder("d")
     x = builder.add("x", Integrator(), builder.add("sine", SineWave()))
@@ -44,7 +44,7 @@ def watched(block: Block, relation: str = ">", level: float = 0.5) -> Diagram:
 
 @pytest.mark.parametrize(("solver", "step"), SOLVERS)
 def test_a_run_ends_exactly_when_its_condition_becomes_true(solver: str, step: float | None) -> None:
-    result = run(watched(StopSimulation()), solver, step)
+    result = run(monitored_diagram(StopSimulation()), solver, step)
     end = math.acos(0.5)
     assert result.time[-1] == pytest.approx(end, abs=1e-9)
     assert result.time[:-1] == pytest.approx(np.arange(11) * 0.1)
@@ -55,7 +55,7 @@ def test_a_run_ends_exactly_when_its_condition_becomes_true(solver: str, step: f
 
 
 def test_a_run_ends_at_the_start_if_the_condition_is_true() -> None:
-    result = run(watched(StopSimulation(), "<"), "rk45", None)
+    result = run(monitored_diagram(StopSimulation(), "<"), "rk45", None)
     assert result.time.tolist() == [0.0]
     assert result.run.message == "stopped by block 'watch' at 0 s"
 
@@ -78,25 +78,25 @@ def test_a_run_with_a_sampled_or_jumping_condition_ends_at_the_tick_or_jump() ->
 
 @pytest.mark.parametrize(("solver", "step"), SOLVERS)
 def test_a_violated_assertion_fails_the_run_and_keeps_the_samples(solver: str, step: float | None) -> None:
-    with pytest.raises(SimulationError, match=r"assertion 'watch' does not hold at 1\.0471975") as raised:
-        run(watched(Assertion(), "<="), solver, step)
-    partial = raised.value.partial
+    with pytest.raises(SimulationError, match=r"assertion 'watch' does not hold at 1\.0471975") as caught:
+        run(monitored_diagram(Assertion(), "<="), solver, step)
+    partial = caught.value.partial
     assert isinstance(partial, SimulationResult)
     assert partial.time[-1] == pytest.approx(math.acos(0.5), abs=1e-9)
     assert not partial.run.complete
-    assert "or set its action to warn" in str(raised.value)
+    assert "or set its action to warn" in str(caught.value)
 
 
 @pytest.mark.parametrize(("solver", "step"), SOLVERS)
 def test_a_violated_assertion_may_only_warn(solver: str, step: float | None) -> None:
-    result = run(watched(Assertion(action="warn"), "<="), solver, step)
+    result = run(monitored_diagram(Assertion(action="warn"), "<="), solver, step)
     assert result.time[-1] == 10.0
     assert result.run.complete
     second = 2 * math.pi + math.acos(0.5)
     assert result.run.message == f"assertion 'watch' did not hold, last from {second:.9g} s on"
-    result = run(watched(Assertion(action="warn"), ">", -1.0), solver, step)
+    result = run(monitored_diagram(Assertion(action="warn"), ">", -1.0), solver, step)
     assert result.run.message == ""
-    result = run(watched(Assertion(action="warn"), ">", 9.0), solver, step)
+    result = run(monitored_diagram(Assertion(action="warn"), ">", 9.0), solver, step)
     assert result.run.message == "assertion 'watch' did not hold, from the start on"
 
 

@@ -28,7 +28,7 @@ def masses(random: np.random.Generator) -> ab.Diagram:
     kinds = (CoulombFriction(), Sign(), CompareToZero(relation=">"), Relay(), HitCrossing())
     for k in range(9):
         size = float(random.choice((-1.0, 1.0)) * random.uniform(0.5, 6.0))
-        drives: tuple[Block, ...] = (
+        inputs: tuple[Block, ...] = (
             SineWave(amplitude=np.sign(size), frequency=abs(size)),
             Ramp(slope=size, start=0.3 * (k % 2)),
             Step(time=0.3, initial=0.0, final=size),
@@ -36,9 +36,9 @@ def masses(random: np.random.Generator) -> ab.Diagram:
         mass = SecondOrderLag(
             natural_frequency=float(random.uniform(1.0, 6.0)), damping=float(random.uniform(0.1, 1.5))
         )
-        moved = builder.add(f"mass {k}", mass, builder.add(f"drive {k}", drives[k % 3]))
-        builder.add(f"passes {k}", HitCrossing(), moved["y"])
-        builder.add(f"watches {k}", kinds[int(random.integers(5))], moved["rate"])
+        lag = builder.add(f"mass {k}", mass, builder.add(f"drive {k}", inputs[k % 3]))
+        builder.add(f"passes {k}", HitCrossing(), lag["y"])
+        builder.add(f"switch {k}", kinds[int(random.integers(5))], lag["rate"])
     return builder.build()
 
 

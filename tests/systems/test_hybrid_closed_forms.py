@@ -40,7 +40,7 @@ Run = Callable[[Diagram, float], dict[str, np.ndarray]]
 SAMPLES = 100
 
 
-def native(solver: str, step: float | None = None) -> Run:
+def native_run(solver: str, step: float | None = None) -> Run:
     def run(diagram: Diagram, stop: float) -> dict[str, np.ndarray]:
         options = SimulationOptions(
             stop_time=stop, sample_time=stop / SAMPLES, solver=solver, step=step, rtol=1e-10, atol=1e-12
@@ -51,12 +51,12 @@ def native(solver: str, step: float | None = None) -> Run:
     return run
 
 
-def by_reference(diagram: Diagram, stop: float) -> dict[str, np.ndarray]:
+def reference_run(diagram: Diagram, stop: float) -> dict[str, np.ndarray]:
     times = np.arange(SAMPLES + 1) * (stop / SAMPLES)
     return run_reference(diagram, times.tolist(), step=stop / SAMPLES / 3) | {"t": times}
 
 
-RUNS = {"adaptive": native("rk45"), "fixed": native("rk4", 0.01), "reference": by_reference}
+RUNS = {"adaptive": native_run("rk45"), "fixed": native_run("rk4", 0.01), "reference": reference_run}
 
 
 @pytest.fixture(params=RUNS.values(), ids=RUNS)
@@ -65,7 +65,7 @@ def run(request: pytest.FixtureRequest) -> Run:
 
 
 def with_integral(block: Block, source: Block, *, name: str = "block") -> Diagram:
-    """A source, a block, and the integral of its output, which depends on the switching times."""
+    """A source, a block, and the integral of its output. This integral depends on the switching times."""
     builder = DiagramBuilder("d")
     out = builder.add(name, block, builder.add("source", source))
     builder.add("integral", Integrator(), out)
@@ -80,7 +80,7 @@ def assert_close(actual: np.ndarray, expected: np.ndarray, tolerance: float = 5e
 # -- sampled blocks -----------------------------------------------------------------------------------------
 
 
-def test_a_sampled_loop_around_an_integrator(run: Run) -> None:
+def test_a_sampled_loop_around_an_integrator_agrees_with_its_recurrence(run: Run) -> None:
     """x' = -k x(jT): x((j+1)T) = (1 - kT) x(jT), and x is linear between the ticks."""
     builder = DiagramBuilder("d")
     x = builder.add("x", Integrator(initial=1.0))
@@ -93,7 +93,7 @@ def test_a_sampled_loop_around_an_integrator(run: Run) -> None:
     assert_close(result["x/y"], start * (1 - 2.0 * (result["t"] - 0.25 * j)), 1e-14)
 
 
-def test_a_held_exponential(run: Run) -> None:
+def test_a_hold_samples_an_exponential_exactly(run: Run) -> None:
     """The hold of x' = -x gives exp(-jT) exactly at jT, also where jT is not a multiple of the step."""
     builder = DiagramBuilder("d")
     x = builder.add("x", Integrator(initial=1.0))
@@ -104,7 +104,7 @@ def test_a_held_exponential(run: Run) -> None:
     assert_close(result["hold/y"], np.where(j >= 0, np.exp(-(0.1 + 0.3 * j)), 0.0))
 
 
-def test_two_rates_and_a_delay(run: Run) -> None:
+def test_slow_blocks_sample_fast_ones_at_common_ticks(run: Run) -> None:
     """A slow block samples the fast one at a common tick; the delay outputs the previous value."""
     builder = DiagramBuilder("d")
     t = builder.add("t", Clock())
@@ -135,7 +135,7 @@ def test_a_limiter_between_sampled_blocks_limits_at_the_tick(run: Run) -> None:
 # -- switching ---------------------------------------------------------------------------------------------
 
 
-def test_saturation_and_dead_zone_of_a_sine(run: Run) -> None:
+def test_saturation_and_dead_zone_of_a_sine_have_exact_integrals(run: Run) -> None:
     """The integral is exact only if steps end at the kinks, at sin t = 1/2."""
     t = np.linspace(0.0, 3.0, SAMPLES + 1)
     edge = np.pi / 6
@@ -150,13 +150,13 @@ def test_saturation_and_dead_zone_of_a_sine(run: Run) -> None:
     assert_close(result["integral/y"], 1 - np.cos(t) - limited)
 
 
-def test_a_limiter_starts_above_its_limit_and_jumps_to_the_other_limit(run: Run) -> None:
+def test_a_limited_step_jumps_from_the_upper_to_the_lower_limit(run: Run) -> None:
     result = run(with_integral(Saturation(), Step(time=1.0, initial=3.0, final=-2.0)), 2.0)
     assert result["block/y"].tolist() == [0.5] * 50 + [-0.5] * 51
     assert_close(result["integral/y"][-1:], np.zeros(1), 1e-14)
 
 
-def test_a_relay_with_hysteresis(run: Run) -> None:
+def test_a_relay_with_hysteresis_switches_at_its_thresholds(run: Run) -> None:
     """The relay is on from pi/6 (sin t = 0.5, rising) to 7 pi/6 (sin t = -0.5, falling)."""
     result = run(with_integral(Relay(on_value=2.0, off_value=-1.0), SineWave()), 6.0)
     t = result["t"]
@@ -166,7 +166,7 @@ def test_a_relay_with_hysteresis(run: Run) -> None:
 
 
 def test_a_thermostat_oscillates_with_the_exact_period(run: Run) -> None:
-    """T' = 1 until the relay switches on at 1, then -1 until -1: a triangle of period 4."""
+    """x' = 1 until x = 1, then x' = -1 until x = -1: a triangle wave with a period of 4 s."""
     builder = DiagramBuilder("d")
     x = builder.add("x", Integrator())
     relay = builder.add("relay", Relay(on_point=1.0, off_point=-1.0, on_value=-1.0, off_value=1.0), x)
@@ -176,17 +176,17 @@ def test_a_thermostat_oscillates_with_the_exact_period(run: Run) -> None:
     assert_close(result["x/y"], 1.0 - np.abs(phase - 2.0), 1e-10)
 
 
-def test_a_quantizer(run: Run) -> None:
+def test_a_quantizer_switches_between_its_levels_at_the_exact_times(run: Run) -> None:
     result = run(with_integral(Quantizer(interval=0.4), SineWave()), 3.0)
     t = result["t"]
     assert result["block/y"] == pytest.approx(0.4 * np.floor(np.sin(t) / 0.4 + 0.5), abs=1e-15)
     edges = np.arcsin([0.2, 0.6])
     levels = 0.4 * sum(np.clip(t - edge, 0, np.pi - 2 * edge) for edge in edges)
-    # the step down is late by 1e-9 of the interval
+    # Downward steps are late: their threshold is lower by 1e-9 intervals.
     assert_close(result["integral/y"], levels, 2e-9)
 
 
-def test_coulomb_friction_of_a_speed_that_changes_its_sign(run: Run) -> None:
+def test_coulomb_friction_changes_its_sign_with_the_speed(run: Run) -> None:
     result = run(with_integral(CoulombFriction(offset=2.0, gain=3.0), SineWave(frequency=2.0)), 3.0)
     t, u = result["t"], np.sin(2.0 * result["t"])
     assert result["block/y"][0] == 0.0
@@ -204,7 +204,7 @@ def test_the_output_of_a_backlash_follows_and_rests(run: Run) -> None:
     assert_close(result["block/y"], expected)
 
 
-def test_a_switch_controlled_by_the_time(run: Run) -> None:
+def test_a_switch_changes_at_its_threshold(run: Run) -> None:
     builder = DiagramBuilder("d")
     t, one = builder.add("t", Clock()), builder.add("one", Constant(value=5.0))
     switch = builder.add("switch", Switch(threshold=0.7), one, t, t)
@@ -218,7 +218,7 @@ def test_a_switch_controlled_by_the_time(run: Run) -> None:
     )
 
 
-def test_a_pulse_generator(run: Run) -> None:
+def test_a_pulse_generator_has_exact_edges(run: Run) -> None:
     builder = DiagramBuilder("d")
     pulses = builder.add("pulses", PulseGenerator(amplitude=3.0, period=0.5, width=50.0, delay=0.125))
     builder.add("integral", Integrator(), pulses)
@@ -243,7 +243,7 @@ def test_a_limited_integrator_stays_at_its_limit_and_leaves_it_without_delay(run
     assert result["x/saturated"].tolist() == ((t >= np.pi / 6) & (t < np.pi / 2)).astype(float).tolist()
 
 
-def test_an_integrator_reset_by_pulses(run: Run) -> None:
+def test_an_integrator_is_reset_at_the_edges_of_pulses(run: Run) -> None:
     """The integral of 1 is reset at rising edges (0.5 s, 1 s, …) or falling edges (0.25 s, 0.75 s, …)."""
     builder = DiagramBuilder("d")
     pulses = builder.add("pulses", PulseGenerator(period=0.5, width=50.0))
@@ -258,7 +258,7 @@ def test_an_integrator_reset_by_pulses(run: Run) -> None:
 
 
 def ball(builder: DiagramBuilder, restitution: float, height: float) -> BlockHandle:
-    """A falling ball that keeps ``restitution`` of its speed at each impact."""
+    """Add a ball that falls from ``height`` (m); each impact multiplies its speed by -``restitution``."""
     g = builder.add("g", Constant(value=-9.81))
     speed = builder.add(
         "speed",
@@ -272,7 +272,7 @@ def ball(builder: DiagramBuilder, restitution: float, height: float) -> BlockHan
 
 
 def test_a_bouncing_ball_reaches_the_ground_at_the_published_times(run: Run) -> None:
-    """h0 = 1, e = 0.7: impacts at 0.451523640985731, 1.08365673836575, 1.52614990653177 (FMI reference)."""
+    """h0 = 1 m, e = 0.7: the impact times (s) are those of the FMI reference."""
     builder = DiagramBuilder("d")
     ball(builder, 0.7, 1.0)
     result = run(builder.build(), 1.8)
@@ -306,7 +306,7 @@ def test_a_stuck_mass_breaks_away_at_the_exact_time(run: Run) -> None:
     assert not result["mass/v"][t < 1.2 - 1e-9].any()
     since = np.maximum(t - 1.2, 0.0)
     assert_close(result["mass/v"], 0.2 * since + since**2 / 2, 1e-10)
-    # at 1.2 s both values are correct
+    # at 1.2 s, the values before and after the event are both correct
     other = np.abs(t - 1.2) > 1e-9
     assert_close(result["mass/friction"][other], np.where(t < 1.2, t, 1.0)[other], 1e-10)
 
@@ -315,7 +315,7 @@ def test_a_stuck_mass_breaks_away_at_the_exact_time(run: Run) -> None:
 
 
 def test_a_constant_nonlinear_loop_is_solved(run: Run) -> None:
-    """u = cos(u) is 0.739…, and x' = u."""
+    """The solution of u = cos(u) is 0.739…, and x' = u."""
     builder = DiagramBuilder("d")
     u = builder.add("u", Trigonometry(function="cos"))
     builder.connect(u, u)
@@ -325,7 +325,7 @@ def test_a_constant_nonlinear_loop_is_solved(run: Run) -> None:
     assert_close(result["x/y"], 0.7390851332151607 * result["t"], 1e-12)
 
 
-def test_an_implicit_equation_that_depends_on_time(run: Run) -> None:
+def test_an_implicit_equation_that_depends_on_time_is_solved(run: Run) -> None:
     """u = t + cos(u)/2 has the derivative u' = 1 / (1 + sin(u)/2)."""
     builder = DiagramBuilder("d")
     t = builder.add("t", Clock())

@@ -41,7 +41,7 @@ def solver(request: pytest.FixtureRequest) -> str:
     return request.param
 
 
-def sensed(seed: float = 0.0) -> SimulationResult:
+def sensor_result(seed: float = 0.0) -> SimulationResult:
     """Simulate a joint sensor of a robot at rest for ten thousand ticks."""
     builder = DiagramBuilder("d")
     sensor = JointSensor(
@@ -57,7 +57,7 @@ def sensed(seed: float = 0.0) -> SimulationResult:
 
 
 def test_sensor_noise_has_the_given_deviations_and_is_uncorrelated() -> None:
-    result = sensed()
+    result = sensor_result()
     noise = np.hstack([result["sensor/q_measured"] - 0.5, result["sensor/qd_measured"]])
     assert not noise[:, 2].any(), "a deviation of 0 gives no noise"
     expected = np.array([0.01, 0.02, 0.1, 0.1, 0.1])
@@ -71,7 +71,7 @@ def test_sensor_noise_has_the_given_deviations_and_is_uncorrelated() -> None:
 
 
 def test_equal_seeds_give_equal_noise_and_other_seeds_other_noise() -> None:
-    one, repeated, other = sensed(seed=7.0), sensed(seed=7.0), sensed(seed=8.0)
+    one, repeated, other = sensor_result(seed=7.0), sensor_result(seed=7.0), sensor_result(seed=8.0)
     np.testing.assert_array_equal(one["sensor/qd_measured"], repeated["sensor/qd_measured"])
     assert (one["sensor/qd_measured"] != other["sensor/qd_measured"]).mean() > 0.99
 
@@ -138,19 +138,21 @@ def test_back_calculation_prevents_windup_of_a_limited_pid(solver: str) -> None:
     gains = {"Kp": 10.0, "Ki": 8.0, "Kd": 5.0, "lower": (-0.5, -0.4), "upper": 0.5}
     goal = Constant(value=(2.0, -2.0))
     result = loop(JointPID(Kb=5.0, **gains), 10.0, solver, goal)
-    wound = loop(JointPID(Kb=0.0, **gains), 10.0, solver, goal)
-    for k, (aim, low, high) in enumerate(((2.0, -0.5, 0.5), (-2.0, -0.4, 0.5))):
+    without_back_calculation = loop(JointPID(Kb=0.0, **gains), 10.0, solver, goal)
+    for k, (target, low, high) in enumerate(((2.0, -0.5, 0.5), (-2.0, -0.4, 0.5))):
 
-        def flow(_: float, x: np.ndarray, aim: float, low: float, high: float) -> list[float]:
-            free = 10.0 * (aim - x[0]) - 5.0 * x[1] + x[2]
+        def flow(_: float, x: np.ndarray, target: float, low: float, high: float) -> list[float]:
+            free = 10.0 * (target - x[0]) - 5.0 * x[1] + x[2]
             tau = min(max(free, low), high)
-            return [x[1], tau, 8.0 * (aim - x[0]) + 5.0 * (tau - free)]
+            return [x[1], tau, 8.0 * (target - x[0]) + 5.0 * (tau - free)]
 
-        options = {"rtol": 1e-10, "atol": 1e-12, "max_step": 0.01, "args": (aim, low, high)}
+        options = {"rtol": 1e-10, "atol": 1e-12, "max_step": 0.01, "args": (target, low, high)}
         exact = solve_ivp(flow, (0, 10), [0, 0, 0], "DOP853", result.time, **options)
         tolerance = 1e-7 if solver == "rk45" else 1e-4  # steps of 100 ms
         np.testing.assert_allclose(result["angle/y"][:, k], exact.y[0], rtol=0, atol=tolerance)
-        overshoots = [np.max(one["angle/y"][:, k] * np.sign(aim)) - 2.0 for one in (result, wound)]
+        overshoots = [
+            np.max(one["angle/y"][:, k] * np.sign(target)) - 2.0 for one in (result, without_back_calculation)
+        ]
         assert overshoots[0] < 0.5 * overshoots[1]
     assert result["pid/tau"].max() <= 0.5
 
@@ -168,8 +170,8 @@ def test_a_sampled_pid_agrees_with_its_recurrence(solver: str) -> None:
         e = np.array([1.0, -1.5]) * (k >= 4) - q
         free = np.array([10.0, 6.0]) * e - np.array([5.0, 4.0]) * qd + integral
         tau = np.clip(free, lower, upper)
-        outwards = (free != tau) & ((free - tau) * e > 0)
-        integral = integral + np.where(outwards, 0.0, T * np.array([4.0, 3.0]) * e)
+        winds_up = (free != tau) & ((free - tau) * e > 0)
+        integral = integral + np.where(winds_up, 0.0, T * np.array([4.0, 3.0]) * e)
         a = tau - 0.2
         q, qd = q + T * qd + T * T * a / 2, qd + T * a
     np.testing.assert_allclose(result["angle/y"], angles, rtol=0, atol=1e-11)

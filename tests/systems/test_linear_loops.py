@@ -40,7 +40,7 @@ def loop(M: np.ndarray, c: np.ndarray) -> ab.Diagram:
     return builder.build()
 
 
-def interpreted(system: HybridSystem) -> dict[str, np.ndarray]:
+def interpreted_signals(system: HybridSystem) -> dict[str, np.ndarray]:
     """Evaluate the signals of a system without states at t = 0 with the interpreter of the tape."""
     empty = np.empty(0)
     (y,) = interpret(tape_from(system.signals), [np.zeros(1), empty, empty, empty, system.parameter_values])
@@ -65,7 +65,7 @@ def test_a_loop_of_vectors_is_solved_as_accurately_as_by_numpy(n: int) -> None:
     for matrix in kinds:
         c, M = random.normal(size=n), np.eye(n) - matrix
         expected = np.linalg.solve(np.eye(n) - M, c)
-        error = np.abs(interpreted(trace_diagram(loop(M, c)))["s/y"] - expected).max()
+        error = np.abs(interpreted_signals(trace_diagram(loop(M, c)))["s/y"] - expected).max()
         assert error <= 5.0 * n * EPS * np.linalg.cond(matrix) * np.abs(expected).max()
 
 
@@ -102,7 +102,7 @@ def test_every_signal_of_a_loop_is_as_accurate_as_its_condition_allows(seed: int
             first = builder.add(f"g{i}_{j}", Gain(gain=gains[0, i, j]), sums[j])
             second = builder.add(f"h{i}_{j}", Gain(gain=gains[1, i, j]), first)
             builder.connect(second, sums[i][f"u{port + 2}"])
-    signals = interpreted(trace_diagram(builder.build()))
+    signals = interpreted_signals(trace_diagram(builder.build()))
 
     G = [
         [Fraction(gains[0, i, j]) * Fraction(gains[1, i, j]) * int(fed[i, j]) for j in range(n)]
@@ -130,7 +130,7 @@ def test_a_loop_of_high_gain_has_an_accurate_error_signal() -> None:
     builder = DiagramBuilder("follower")
     e = builder.add("e", Sum(signs="+-"), builder.add("r", Constant(value=1.3)))
     builder.connect(builder.add("y", Gain(gain=1e9), e), e["u2"])
-    signals = interpreted(trace_diagram(builder.build()))
+    signals = interpreted_signals(trace_diagram(builder.build()))
     assert float(signals["e/y"]) == pytest.approx(1.3 / (1.0 + 1e9), rel=4.0 * EPS)
     assert float(signals["y/y"]) == pytest.approx(1.3e9 / (1.0 + 1e9), rel=4.0 * EPS)
 
@@ -158,7 +158,7 @@ def test_the_condition_of_a_loop_does_not_depend_on_units() -> None:
     assert loop_conditions(np.zeros((1, 2, 2))) == [0.0]
 
 
-def test_a_loop_of_fifty_unknowns_runs() -> None:
+def test_a_loop_of_fifty_unknowns_is_solved() -> None:
     random = np.random.default_rng(50)
     M, c = random.normal(size=(50, 50)), random.normal(size=50)
     result = ab.simulate(loop(M, c), stop_time=1.0, sample_time=0.5)
@@ -206,7 +206,7 @@ def test_a_loop_of_vectors_is_solved_at_a_tick_with_the_new_samples() -> None:
     np.testing.assert_allclose(system.discrete.unpack(z)["again/y"], expected, rtol=1e-13)
 
 
-def test_linearisation_and_sensitivity_of_a_loop_of_vectors() -> None:
+def test_linearisation_and_sensitivity_of_a_loop_of_vectors_agree_with_closed_forms() -> None:
     """The system is x' = s with s = g M s - x."""
     M = np.array([[0.0, 2.0, 0.0], [0.5, 0.3, 0.7], [0.2, 0.0, -4.0]])
     builder = DiagramBuilder("inside")

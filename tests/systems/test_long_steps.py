@@ -34,7 +34,7 @@ def test_crossings_of_a_level_by_a_sine_are_found(solver: str, frequency: float,
 
 
 def parabolas() -> list[tuple[float, ...]]:
-    """Divisors, heights, centres and curvatures of parabolas; the first ones once had missed turns."""
+    """Divisors, heights, centres and curvatures of parabolas; the first six are regression cases."""
     random = np.random.default_rng(5)
     cases = [
         (-0.7973742649797251, 0.030320733805284217, 1.5323485590083694, 6.480506838230336),
@@ -51,8 +51,8 @@ def parabolas() -> list[tuple[float, ...]]:
     return cases
 
 
-def test_turns_just_before_the_event_of_a_step_are_found() -> None:
-    """The remainder of a parabola: a step may contain a turn near the top, its return, and the next turn."""
+def test_jumps_just_before_the_event_of_a_step_are_found() -> None:
+    """The remainder of a parabola: one step may contain three of its jumps near the vertex."""
     builder = ab.DiagramBuilder("parabola")
     formula = bl.Expression(formula="h - c*(u - b)^2", names="h, b, c", values=[0.0, 1.0, 1.0])
     parabola = builder.add("parabola", formula, builder.add("t", bl.Clock()))
@@ -76,7 +76,7 @@ def integrating(initial: float) -> ab.Diagram:
     return inner.build()
 
 
-def test_two_alternating_action_subsystems_and_their_merge() -> None:
+def test_alternating_action_subsystems_and_their_merge_agree_with_closed_forms() -> None:
     """While sin(pi t) > 1/2 one integrates 1 and keeps its state; otherwise one integrates -2 from 0.5."""
     builder = ab.DiagramBuilder("actions")
     wave = builder.add("wave", bl.SineWave(frequency=math.pi))
@@ -93,6 +93,6 @@ def test_two_alternating_action_subsystems_and_their_merge() -> None:
     result = ab.simulate(builder.build(), stop_time=4.0, sample_time=0.05, rtol=1e-9)
     t = result.time
     within = ((t > 1 / 6) & (t < 5 / 6)) | ((t > 13 / 6) & (t < 17 / 6))
-    works = 0.5 + np.clip(t - 1 / 6, 0.0, 2 / 3) + np.clip(t - 13 / 6, 0.0, 2 / 3)
+    first_output = 0.5 + np.clip(t - 1 / 6, 0.0, 2 / 3) + np.clip(t - 13 / 6, 0.0, 2 / 3)
     begun = np.where(t > 17 / 6, 17 / 6, np.where(t > 5 / 6, 5 / 6, 0.0))
-    np.testing.assert_allclose(result["y"], np.where(within, works, 0.5 - 2 * (t - begun)), atol=1e-9)
+    np.testing.assert_allclose(result["y"], np.where(within, first_output, 0.5 - 2 * (t - begun)), atol=1e-9)

@@ -28,20 +28,22 @@ def inside(block: Block, end: str = "") -> ab.Diagram:
     return inner.build()
 
 
-def enabled(block: Block, source: Block, enable: Block, *, end: str = "", when: str = "held") -> ab.Diagram:
-    return all_enabled({"": block}, source, enable, end=end, when=when)
+def enabled_diagram(
+    block: Block, source: Block, enable: Block, *, end: str = "", when: str = "held"
+) -> ab.Diagram:
+    return diagram_of_enabled_blocks({"": block}, source, enable, end=end, when=when)
 
 
-def all_enabled(
+def diagram_of_enabled_blocks(
     blocks: Mapping[str, Block], source: Block, enable: Block, *, end: str = "", when: str = "held"
 ) -> ab.Diagram:
     """Put each block in its own subsystem ``sub k`` with a common source; its integral is ``total k``."""
     builder = ab.DiagramBuilder("enabled")
-    fed = builder.add("source", source)
+    source_handle = builder.add("source", source)
     control = builder.add("control", enable)
     for key, block in blocks.items():
         subsystem = bl.EnabledSubsystem(diagram=inside(block, end), states_when_enabling=when)
-        held = builder.add(f"sub {key}".strip(), subsystem, fed, enable=control)
+        held = builder.add(f"sub {key}".strip(), subsystem, source_handle, enable=control)
         builder.add(f"total {key}".strip(), bl.Integrator(), held)
     return builder.build()
 
@@ -64,7 +66,7 @@ SWITCHING: list[tuple[Block, float]] = [
 def test_modes_are_consistent_with_a_jump_before_the_first_enabling(settings: dict[str, Any]) -> None:
     """The input jumps from -1 to 1 at 0.2 s; the subsystems are enabled at 0.5 s."""
     blocks = {block.type_name(): block for block, _ in SWITCHING}
-    diagram = all_enabled(blocks, bl.Step(time=0.2, initial=-1.0), bl.Step(time=0.5))
+    diagram = diagram_of_enabled_blocks(blocks, bl.Step(time=0.2, initial=-1.0), bl.Step(time=0.5))
     result = ab.simulate(diagram, stop_time=1.0, sample_time=0.1, **settings)
     for kind, (_, expected) in zip(blocks, SWITCHING):
         expected_values = pytest.approx([0.0] * 5 + [expected] * 6, abs=1e-12)
@@ -74,7 +76,7 @@ def test_modes_are_consistent_with_a_jump_before_the_first_enabling(settings: di
 
 @pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
 @pytest.mark.parametrize("sampled", [False, True])
-def test_a_limiter_in_an_intermittently_enabled_subsystem(sampled: bool, settings: dict[str, Any]) -> None:
+def test_a_limiter_limits_whenever_its_subsystem_is_enabled(sampled: bool, settings: dict[str, Any]) -> None:
     """While the subsystem is enabled, its output is the limited wave."""
     builder = ab.DiagramBuilder("intermittent")
     wave = builder.add("wave", bl.SineWave(frequency=3.0, phase=-0.1))
@@ -95,7 +97,7 @@ def test_a_relay_keeps_its_mode_while_disabled(settings: dict[str, Any]) -> None
     source = bl.FromTable(times=(0.0, 0.2, 0.3, 0.5, 0.6, 2.0), values=(0.0, 0.0, 1.0, 1.0, 0.1, 0.1))
     control = bl.FromTable(times=(0.0, 0.4, 0.8), values=(1.0, 0.0, 1.0), method="flat")
     result = ab.simulate(
-        enabled(bl.Relay(on_value=2.0, off_value=-1.0), source, control),
+        enabled_diagram(bl.Relay(on_value=2.0, off_value=-1.0), source, control),
         stop_time=1.0,
         sample_time=0.1,
         **settings,
@@ -108,7 +110,7 @@ def test_the_motion_of_a_sliding_mass_is_suspended_while_disabled(settings: dict
     """2 N stop 1 kg from 3 m/s within 1.5 s. It is disabled from 0.5 s to 1.5 s, so it rests after 2.5 s."""
     block = bl.StickSlipFriction(coulomb=2.0, static=2.5, initial_speed=3.0)
     control = bl.FromTable(times=(0.0, 0.5, 1.5), values=(1.0, 0.0, 1.0), method="flat")
-    diagram = enabled(block, bl.Constant(value=0.0), control, end="v")
+    diagram = enabled_diagram(block, bl.Constant(value=0.0), control, end="v")
     result = ab.simulate(diagram, stop_time=4.0, sample_time=0.1, **settings)
     passed = np.minimum(result.time, 0.5) + np.maximum(result.time - 1.5, 0.0)
     np.testing.assert_allclose(result["sub/o"], np.maximum(3.0 - 2.0 * passed, 0.0), atol=1e-9)
@@ -117,10 +119,10 @@ def test_the_motion_of_a_sliding_mass_is_suspended_while_disabled(settings: dict
 
 @pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
 def test_a_limited_integrator_that_is_reset_leaves_its_limit(settings: dict[str, Any]) -> None:
-    """It rises with rate 1 to 0.2 and stays there; each enabling resets it to 0."""
+    """The integral rises with rate 1 to its limit 0.2; each enabling resets the integral to 0."""
     block = bl.IntegratorLimited(lower=-0.2, upper=0.2)
     control = bl.PulseGenerator(period=1.0, width=50.0)
-    diagram = enabled(block, bl.Constant(value=1.0), control, end="y", when="reset")
+    diagram = enabled_diagram(block, bl.Constant(value=1.0), control, end="y", when="reset")
     result = ab.simulate(diagram, stop_time=3.0, sample_time=0.05, **settings)
     since = result.time - np.floor(result.time + 1e-9)
     np.testing.assert_allclose(result["sub/o"], np.minimum(since, 0.2), atol=1e-9)
@@ -145,7 +147,7 @@ def test_no_event_is_computed_from_the_old_states_of_a_subsystem_when_it_is_enab
 
 @pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
 def test_a_rate_limiter_that_is_reset_rises_again(settings: dict[str, Any]) -> None:
-    """Its input is constant: a reset has the same effect as the start of a run."""
+    """The input of the limiter is constant: a reset has the same effect as the start of a run."""
     builder = ab.DiagramBuilder("climbing")
     reset = builder.add("reset", bl.PulseGenerator(period=1.0, width=50.0, delay=0.25))
     limited = bl.ResettableSubsystem(diagram=inside(bl.RateLimiterContinuous()), edge="rising")
@@ -160,7 +162,7 @@ def test_a_rate_limiter_that_is_reset_rises_again(settings: dict[str, Any]) -> N
 def test_events_in_a_disabled_subsystem_do_not_change_the_result() -> None:
     """Events of comparisons are located also while the subsystem is disabled, without effect."""
     wave, control = bl.SineWave(frequency=50.0), bl.Step(time=0.7)
-    located = ab.simulate(enabled(bl.CompareToZero(), wave, control), stop_time=1.0, sample_time=0.01)
+    located = ab.simulate(enabled_diagram(bl.CompareToZero(), wave, control), stop_time=1.0, sample_time=0.01)
     assert located.run.events > 10
     off = located.time < 0.7 - 1e-9
     assert not located["sub/o"][off].any()
@@ -175,11 +177,11 @@ def test_events_in_a_disabled_subsystem_do_not_change_the_result() -> None:
 
 @pytest.mark.parametrize("settings", RUNS)
 @pytest.mark.parametrize("source", [bl.Constant(value=1.0), bl.Step(time=1.0)])
-def test_a_hysteresis_after_a_rate_limiter_sees_only_its_consistent_output(
+def test_a_hysteresis_after_a_rate_limiter_uses_only_consistent_outputs(
     source: Block, settings: dict[str, Any]
 ) -> None:
     """Enabled at 1 s with the input 1, the limiter rises from 0 at 1/s. Its old mode would give 1 at once,
-    which must not become the previous mode of the relay or of the backlash behind it."""
+    which must not become the previous mode of the relay or of the backlash after it."""
     inner = ab.DiagramBuilder("inside")
     limited = inner.add("limited", bl.RateLimiterContinuous(), inner.input("u"))
     inner.output("relay", inner.add("switch", bl.Relay(), limited))
@@ -202,7 +204,7 @@ def test_a_hysteresis_ignores_a_jump_at_the_instant_at_which_it_is_disabled(
     block: Block, settings: dict[str, Any]
 ) -> None:
     """The input jumps from 0 to 2 when the subsystem is disabled, through two blocks with modes, and returns
-    before it is enabled again: the block has never seen the 2."""
+    before it is enabled again: while it is enabled, the input of the block is never 2."""
     builder = ab.DiagramBuilder("disabled")
     jump = builder.add("jump", bl.Step(time=1.0, final=2.0))
     back = builder.add("back", bl.Step(time=2.0, final=2.0))

@@ -52,7 +52,7 @@ def run(request: pytest.FixtureRequest) -> Run:
     return request.param
 
 
-def fed(block: Block, source: Block) -> Diagram:
+def with_integral(block: Block, source: Block) -> Diagram:
     """A source, a block, and the integral of its output, which depends on the switching times."""
     builder = DiagramBuilder("d")
     out = builder.add("block", block, builder.add("source", source))
@@ -68,7 +68,7 @@ def sample_index(t: np.ndarray, period: float, offset: float = 0.0) -> np.ndarra
 def test_a_first_order_hold_of_a_sine_is_piecewise_linear(run: Run, method: str) -> None:
     period, offset, first = 0.3, 0.2, 0.7
     block = FirstOrderHold(method=method, period=period, offset=offset, initial=first)
-    result = run(fed(block, SineWave(frequency=1.3)), 4.0)
+    result = run(with_integral(block, SineWave(frequency=1.3)), 4.0)
     t = result["t"]
     k = sample_index(t, period, offset)
     last = np.where(k < 0, first, np.sin(1.3 * (offset + k * period)))
@@ -91,7 +91,7 @@ def test_a_first_order_hold_of_a_sine_is_piecewise_linear(run: Run, method: str)
 
 
 def test_an_extrapolating_hold_is_exact_for_a_ramp(run: Run) -> None:
-    result = run(fed(FirstOrderHold(period=0.25, initial=-0.25), Clock()), 3.0)
+    result = run(with_integral(FirstOrderHold(period=0.25, initial=-0.25), Clock()), 3.0)
     assert result["block/y"] == pytest.approx(result["t"], abs=1e-12)
 
 
@@ -103,8 +103,10 @@ def test_a_first_order_hold_samples_a_sampled_block_at_the_same_tick(run: Run) -
     assert result["block/y"] == pytest.approx(np.maximum(result["t"] - 0.1, 0.0), abs=1e-12)
 
 
-def test_a_first_order_hold_of_a_vector(run: Run) -> None:
-    result = run(fed(FirstOrderHold(period=0.5, initial=(1.0, 2.0)), Constant(value=(3.0, -4.0))), 2.0)
+def test_a_first_order_hold_extrapolates_each_element(run: Run) -> None:
+    result = run(
+        with_integral(FirstOrderHold(period=0.5, initial=(1.0, 2.0)), Constant(value=(3.0, -4.0))), 2.0
+    )
     assert result["block/y"][-1] == pytest.approx([3.0, -4.0])
     # 3 + (3 - 1) t / T within the first period
     early = result["t"] < 0.5 - 1e-9
@@ -169,7 +171,7 @@ def loop_through_a_hold(gain: float) -> Diagram:
 
 @pytest.mark.parametrize("duty", [-0.5, 0.0, 0.3, 1.0, 1.5])
 def test_the_pulse_width_is_given_by_the_duty_cycle(run: Run, duty: float) -> None:
-    result = run(fed(PWM(period=0.4, offset=0.1, amplitude=2.0), Constant(value=duty)), 3.99)
+    result = run(with_integral(PWM(period=0.4, offset=0.1, amplitude=2.0), Constant(value=duty)), 3.99)
     t, width = result["t"], 0.4 * min(max(duty, 0.0), 1.0)
     k = sample_index(t, 0.4, 0.1)
     into = t - 0.1 - 0.4 * k
@@ -180,7 +182,7 @@ def test_the_pulse_width_is_given_by_the_duty_cycle(run: Run, duty: float) -> No
 
 
 def test_the_duty_cycle_is_sampled_at_the_start_of_each_period(run: Run) -> None:
-    result = run(fed(PWM(period=0.5), Ramp(slope=0.25)), 4.0)
+    result = run(with_integral(PWM(period=0.5), Ramp(slope=0.25)), 4.0)
     t = result["t"]
     widths = 0.5 * np.minimum(0.25 * 0.5 * np.arange(9), 1.0)
     k = sample_index(t, 0.5).astype(int)

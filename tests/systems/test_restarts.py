@@ -49,8 +49,10 @@ PERIODS, SAMPLES = 4, 64
 
 @dataclass(frozen=True, kw_only=True)
 class Tally(Block):
-    """A sampled block with a guard: it counts its ticks from 6 to 7, then again and again from 2 to 7, and
-    counts how often the count exceeds 4.5."""
+    """A sampled tick counter with a guard, which counts the events at which the count exceeds 4.5.
+
+    The count starts at 6 and continues with 2 after each 7.
+    """
 
     title: ClassVar[str] = "Tally"
     sampled: ClassVar[bool] = True
@@ -63,25 +65,28 @@ class Tally(Block):
         return (Port("y", "the count", "", ()), Port("crossings", "number of times it exceeded 4.5", "", ()))
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return State("count", (), "the count"), State("seen", (), "number of times it exceeded 4.5")
+        return State("count", (), "the count"), State("crossing_count", (), "number of times it exceeded 4.5")
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         return (Guard("exceeds", (), "the count exceeds 4.5", 1),)
 
     def initial_states(self, p: Signals) -> Signals:
-        return {"count": SX(6.0), "seen": SX(0.0)}
+        return {"count": SX(6.0), "crossing_count": SX(0.0)}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": x["count"], "crossings": x["seen"]}
+        return {"y": x["count"], "crossings": x["crossing_count"]}
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"count": if_else(x["count"] == 7.0, 2.0, x["count"] + 1.0), "seen": x["seen"]}
+        return {
+            "count": if_else(x["count"] == 7.0, 2.0, x["count"] + 1.0),
+            "crossing_count": x["crossing_count"],
+        }
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"exceeds": x["count"] - 4.5}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        return {"seen": x["seen"] + if_else(e["exceeds"] != 0.0, 1.0, 0.0)}
+        return {"crossing_count": x["crossing_count"] + if_else(e["exceeds"] != 0.0, 1.0, 0.0)}
 
 
 def _around(block: Block) -> Diagram:

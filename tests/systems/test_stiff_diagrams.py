@@ -37,7 +37,7 @@ def loop_diagram(rate: float = 1e4) -> ab.Diagram:
 
 
 @pytest.mark.parametrize("solver", ["rodas5p", "ros23", "auto"])
-def test_an_implicit_loop_before_a_fast_lag(solver: str) -> None:
+def test_an_implicit_loop_before_a_fast_lag_is_solved(solver: str) -> None:
     """The error of the lag is ``y' / rate``, with ``y' = -sin(y + x) x' / (1 + sin(y + x))``."""
     result = ab.simulate(loop_diagram(), stop_time=2.0, solver=solver, rtol=1e-7, atol=1e-10)
     x, y = np.sin(result.time), result["loop"]

@@ -67,7 +67,7 @@ def pollution() -> tuple[str, ...]:
         1780.0,
         3.12,
     )
-    of = (
+    reactants = (
         (1,),
         (2, 4),
         (5, 2),
@@ -116,7 +116,7 @@ def pollution() -> tuple[str, ...]:
         "-21-22-24+23+25",
         "-25+24",
     )
-    terms = [f"({k!r}*" + "*".join(f"u[{j}]" for j in species) + ")" for k, species in zip(rates, of)]
+    terms = [f"({k!r}*" + "*".join(f"u[{j}]" for j in species) + ")" for k, species in zip(rates, reactants)]
     return tuple(
         "".join(sign + terms[int(number) - 1] for sign, number in re.findall(r"([+-])(\d+)", row))
         for row in balance

@@ -75,18 +75,20 @@ def close(actual: np.ndarray, expected: np.ndarray, tolerance: float = 5e-9) -> 
     assert actual == pytest.approx(expected, abs=tolerance)
 
 
-def ball(rest_speed: float = 1e-6, height: float = 1.0, speed: float = 0.0, keeps: float = 0.7) -> Diagram:
+def ball(
+    rest_speed: float = 1e-6, height: float = 1.0, speed: float = 0.0, restitution: float = 0.7
+) -> Diagram:
     builder = DiagramBuilder("d")
     motion = SecondOrderIntegratorLimited(
         initial=height, initial_speed=speed, lower=0.0, reinitialize=True, rest_speed=rest_speed
     )
     ball = builder.add("ball", motion, builder.add("gravity", Constant(value=-9.81)))
-    builder.connect(builder.add("bounce", Gain(gain=-keeps), ball["dx"]), ball["dx0"])
+    builder.connect(builder.add("bounce", Gain(gain=-restitution), ball["dx"]), ball["dx0"])
     return builder.build()
 
 
 @NATIVE
-def test_a_spring_and_mass_with_a_second_order_integrator(run: Run) -> None:
+def test_a_spring_and_mass_oscillate_with_their_closed_form(run: Run) -> None:
     builder = DiagramBuilder("d")
     mass = builder.add("mass", SecondOrderIntegrator(initial=1.0, initial_speed=2.0))
     builder.connect(builder.add("spring", Gain(gain=-4.0), mass["x"]), mass["u"])
@@ -156,7 +158,7 @@ def test_limits_of_the_speed_must_include_zero_if_the_position_is_limited() -> N
     SecondOrderIntegratorLimited(lower=0.0, lower_speed=1.0)
 
 
-def test_an_integrator_with_variable_limits(run: Run) -> None:
+def test_an_integrator_follows_a_falling_limit(run: Run) -> None:
     """The integral of a ramp reaches the falling limit 2 - t/2 at t = 4/3."""
     for kind, name in ((SaturationDynamic, "held"), (DeadZoneDynamic, "rest")):
         builder = DiagramBuilder("d")
@@ -173,7 +175,7 @@ def test_an_integrator_with_variable_limits(run: Run) -> None:
         close(result["integral/y"], expected, 1e-10)
 
 
-def test_a_ramp_wraps_to_zero(run: Run) -> None:
+def test_a_ramp_is_zero_after_its_wrap_threshold(run: Run) -> None:
     builder = DiagramBuilder("d")
     wrapped = builder.add("wrapped", WrapToZero(threshold=2.0), builder.add("t", Clock()))
     builder.add("integral", Integrator(), wrapped)
@@ -192,7 +194,7 @@ def test_crossings_are_counted_and_timed(run: Run) -> None:
         assert result["hits/last"][-1] == pytest.approx(last, abs=1e-9)
 
 
-def test_a_sine_whose_rate_is_limited(run: Run) -> None:
+def test_a_rate_limiter_follows_a_sine_where_its_rate_is_allowed(run: Run) -> None:
     """The output rises with rate 0.5 from 0 until it reaches sin t, which it follows where |cos t| <= 0.5."""
     builder = DiagramBuilder("d")
     limited = builder.add(
@@ -208,11 +210,13 @@ def test_a_sine_whose_rate_is_limited(run: Run) -> None:
         return guess
 
     up = meets(0.0, 0.0, 0.5, 1.9)
-    leaves = 2 * math.pi / 3  # cos = -0.5
-    down = meets(leaves, math.sin(leaves), -0.5, 5.0)
+    departure = 2 * math.pi / 3  # cos = -0.5
+    down = meets(departure, math.sin(departure), -0.5, 5.0)
     t = result["t"]
     expected = np.select(
-        [t < up, t < leaves, t < down], [0.5 * t, np.sin(t), math.sin(leaves) - 0.5 * (t - leaves)], np.sin(t)
+        [t < up, t < departure, t < down],
+        [0.5 * t, np.sin(t), math.sin(departure) - 0.5 * (t - departure)],
+        np.sin(t),
     )
     # after it reaches sin t at `down`, sin t rises faster than 0.5: limited to 0.5 again
     value = math.sin(down)
@@ -264,13 +268,13 @@ def test_after_a_jump_the_output_rises_with_a_growing_rate_limit(run: Run) -> No
 # -- sampled logic -----------------------------------------------------------------------------------------
 
 
-def at_ticks(block: Block, *courses: list[float]) -> dict[str, list[float]]:
+def tick_outputs(block: Block, *input_values: list[float]) -> dict[str, list[float]]:
     """Return the outputs of a block with the period 1 s for inputs given for each tick."""
     builder = DiagramBuilder("d")
-    n = len(courses[0])
+    n = len(input_values[0])
     fed = [
-        builder.add(f"u{k}", FromTable(times=np.arange(n), values=course, method="flat"))
-        for k, course in enumerate(courses)
+        builder.add(f"u{k}", FromTable(times=np.arange(n), values=values, method="flat"))
+        for k, values in enumerate(input_values)
     ]
     builder.add("block", block, *fed)
     options = SimulationOptions(stop_time=float(n - 1), sample_time=1.0)
@@ -293,37 +297,46 @@ U = [0.0, 1.0, 1.0, 0.0, -1.0, -1.0, 0.0, 2.0]
         ("fall nonpositive", [0, 0, 0, 1, 0, 0, 0, 0]),
     ],
 )
-def test_edges(edge: str, expected: list[float]) -> None:
-    assert at_ticks(EdgeDetection(edge=edge, sample_time=1.0), U)["y"] == expected
+def test_edges_are_detected_at_their_ticks(edge: str, expected: list[float]) -> None:
+    assert tick_outputs(EdgeDetection(edge=edge, sample_time=1.0), U)["y"] == expected
 
 
-def test_flip_flops() -> None:
+def test_flip_flops_agree_with_their_truth_tables() -> None:
     S, R = [0, 1, 0, 0, 1, 0, 0], [0, 0, 0, 1, 1, 0, 0]
-    result = at_ticks(SRFlipFlop(sample_time=1.0), S, R)
+    result = tick_outputs(SRFlipFlop(sample_time=1.0), S, R)
     assert result["Q"] == [0, 1, 1, 0, 0, 0, 0]
     assert result["not_Q"] == [1, 0, 0, 1, 0, 1, 1]
     D, clock = [3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0], [0, 1, 1, 0, 1, 0, 1]
-    result = at_ticks(DFlipFlop(sample_time=1.0), D, clock)
+    result = tick_outputs(DFlipFlop(sample_time=1.0), D, clock)
     assert result["Q"] == [0, 4, 4, 4, 7, 7, 9]
     assert result["not_Q"] == [1, 0, 0, 0, 0, 0, 0]
-    assert at_ticks(DFlipFlop(sample_time=1.0, trigger="level"), D, clock)["Q"] == [0, 4, 5, 5, 7, 7, 9]
+    assert tick_outputs(DFlipFlop(sample_time=1.0, trigger="level"), D, clock)["Q"] == [0, 4, 5, 5, 7, 7, 9]
     J, K = [1, 1, 0, 0, 1, 1, 1, 1], [0, 0, 1, 1, 1, 1, 1, 1]
     pulses = [1, 0, 1, 0, 1, 0, 1, 0]
-    result = at_ticks(JKFlipFlop(sample_time=1.0), J, pulses, K)
+    result = tick_outputs(JKFlipFlop(sample_time=1.0), J, pulses, K)
     assert result["Q"] == [0, 1, 1, 0, 0, 1, 1, 0]
     assert result["not_Q"] == [1, 0, 0, 1, 1, 0, 0, 1]
 
 
-def test_counters_and_running_extremes() -> None:
+def test_counters_and_running_extremes_restart_at_a_reset() -> None:
     reset = [0, 0, 0, 0, 0, 1, 0, 0]
-    assert at_ticks(Counter(sample_time=1.0, initial=10.0), U, reset)["y"] == [10, 11, 11, 11, 11, 10, 10, 11]
-    highest = at_ticks(MinMaxRunningResettable(function="max", initial=0.5, sample_time=1.0), U, reset)
+    assert tick_outputs(Counter(sample_time=1.0, initial=10.0), U, reset)["y"] == [
+        10,
+        11,
+        11,
+        11,
+        11,
+        10,
+        10,
+        11,
+    ]
+    highest = tick_outputs(MinMaxRunningResettable(function="max", initial=0.5, sample_time=1.0), U, reset)
     assert highest["y"] == [0.5, 1, 1, 1, 1, 0.5, 0.5, 2]
 
 
-def test_a_delay_of_variable_length() -> None:
+def test_a_delay_of_variable_length_outputs_the_chosen_sample() -> None:
     u, d = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [0.0, 1.0, 1.9, 3.0, 9.0, -1.0]
-    delayed = at_ticks(VariableIntegerDelay(longest=3, initial=-1.0, sample_time=1.0), u, d)
+    delayed = tick_outputs(VariableIntegerDelay(longest=3, initial=-1.0, sample_time=1.0), u, d)
     assert delayed["y"] == [1, 1, 2, 1, 2, 6]
     builder = DiagramBuilder("d")
     matrix = builder.add("m", Constant(value=np.eye(2)))

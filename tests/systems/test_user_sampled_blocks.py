@@ -31,8 +31,7 @@ VALUES = ("count", "left", "on", "above", "stuck", "area")
 
 @dataclass(frozen=True, kw_only=True)
 class Observer(Block):
-    """At its ticks: the number of ticks before, the left limit and the integral of u, whether u > 0.5, a
-    relay from 0 to 1, and whether there were five ticks."""
+    """Outputs at its ticks: tick count, left limit and integral of u, a relay, u > 0.5, and count >= 5."""
 
     title: ClassVar[str] = "Observer"
     sampled: ClassVar[bool] = True
@@ -84,7 +83,7 @@ def wave(t: np.ndarray) -> np.ndarray:
 
 
 def expected(restarts: list[float], stop: float) -> dict[str, list[float]]:
-    """The outputs at the ticks, from the definition, with a relay that is followed on a fine grid."""
+    """The outputs at the ticks, from the definition, with the relay evaluated on a fine grid."""
     values: dict[str, list[float]] = {name: [] for name in VALUES}
     for k in range(round(stop / PERIOD) + 1):
         t = k * PERIOD
@@ -124,7 +123,7 @@ def test_a_sampled_block_may_have_modes_left_limits_and_continuous_states(offset
         np.testing.assert_allclose(result[f"{path}/{name}_out"], values, atol=1e-8, err_msg=name)
 
 
-def test_a_sampled_block_reads_a_relay_without_past_at_the_tick_that_resets_both() -> None:
+def test_a_sampled_block_reads_the_restarted_relay_at_the_tick_that_resets_both() -> None:
     inner = DiagramBuilder("part")
     relay = inner.add("relay", Relay(on_point=1.0, off_point=-1.0), inner.add("u", Inport(port=1)))
     inner.add("y", Outport(port=1), inner.add("delay", UnitDelay(sample_time=0.25), relay))

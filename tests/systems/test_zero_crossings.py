@@ -96,12 +96,12 @@ def run(request: pytest.FixtureRequest) -> Run:
     return request.param
 
 
-def behind(block: Block, *sources: Block) -> Diagram:
+def with_integral(block: Block, *sources: Block) -> Diagram:
     """Sources, a block, and the integral of its first output, which depends on the switching times."""
-    return all_behind({"": block}, *sources)
+    return with_integrals({"": block}, *sources)
 
 
-def all_behind(blocks: Mapping[str, Block], *sources: Block) -> Diagram:
+def with_integrals(blocks: Mapping[str, Block], *sources: Block) -> Diagram:
     """Blocks in parallel with the same sources; the integral of the block ``k`` is ``integral k``."""
     builder = DiagramBuilder("d")
     fed = [builder.add(f"source{k}", source) for k, source in enumerate(sources)]
@@ -129,8 +129,8 @@ def time_above(level: float, t: np.ndarray) -> np.ndarray:
     return rounds * (last - first) + within
 
 
-def test_the_absolute_value_of_a_sine(run: Run) -> None:
-    result = run(behind(Abs(), SineWave(amplitude=2.0)), 10.0)
+def test_the_integral_of_the_absolute_value_of_a_sine_is_exact(run: Run) -> None:
+    result = run(with_integral(Abs(), SineWave(amplitude=2.0)), 10.0)
     whole = np.floor(result["t"] / math.pi)
     close(result["integral/y"], 4.0 * whole + 2.0 * (1.0 - np.cos(result["t"] - math.pi * whole)), 2e-8)
 
@@ -151,7 +151,7 @@ def test_the_durations_of_comparisons_are_exact(run: Run) -> None:
         for level in (0.3, -0.6)
     }
     blocks = {key: CompareToConstant(relation=relation, constant=c) for key, (relation, c) in cases.items()}
-    result = run(all_behind(blocks, SineWave()), 10.0)
+    result = run(with_integrals(blocks, SineWave()), 10.0)
     for key, (relation, level) in cases.items():
         above, t = time_above(level, result["t"]), result["t"]
         expected = {1.0: above, 0.0: t - above, None: 0.0 * t, 2.0: t}[parts[relation]]
@@ -168,16 +168,16 @@ def test_the_maximum_of_equal_signals_is_correct_until_one_changes(run: Run) -> 
     close(result["integral/y"], np.minimum(result["t"], 1.0), 1e-12)
 
 
-def test_a_sign_and_an_interval(run: Run) -> None:
-    result = run(all_behind({"1": Sign(), "2": IntervalTest(lower=-0.6, upper=0.3)}, SineWave()), 10.0)
+def test_the_integrals_of_a_sign_and_an_interval_test_are_exact(run: Run) -> None:
+    result = run(with_integrals({"1": Sign(), "2": IntervalTest(lower=-0.6, upper=0.3)}, SineWave()), 10.0)
     triangle = math.pi / 2 - np.abs(np.mod(result["t"], 2 * math.pi) - math.pi) + math.pi / 2
     close(result["integral 1/y"], triangle, 1e-9)
     close(result["integral 2/y"], time_above(-0.6, result["t"]) - time_above(0.3, result["t"]), 1e-9)
 
 
-def test_the_greater_of_sine_and_cosine(run: Run) -> None:
+def test_the_integral_of_the_greater_of_sine_and_cosine_is_exact(run: Run) -> None:
     cosine = SineWave(phase=math.pi / 2)
-    result = run(behind(MinMax(function="max"), SineWave(), cosine), 10.0)
+    result = run(with_integral(MinMax(function="max"), SineWave(), cosine), 10.0)
 
     def integral(t: float) -> float:
         edges = [0.0, *[e for e in (math.pi / 4, 5 * math.pi / 4, 9 * math.pi / 4) if e < t], t]
@@ -189,7 +189,7 @@ def test_the_greater_of_sine_and_cosine(run: Run) -> None:
     close(result["integral/y"], np.array([integral(t) for t in result["t"]]))
 
 
-def test_the_index_of_the_greatest_element(run: Run) -> None:
+def test_the_index_of_the_greatest_element_changes_at_the_exact_times(run: Run) -> None:
     builder = DiagramBuilder("d")
     parts = [builder.add(f"s{k}", SineWave(phase=-k * 2 * math.pi / 3)) for k in range(3)]
     three = builder.add("three", Mux(inputs=3), *parts)
@@ -207,18 +207,18 @@ def test_the_index_of_the_greatest_element(run: Run) -> None:
 
 def test_a_growing_index_selects_the_inputs_of_a_multiport_switch(run: Run) -> None:
     values = [Constant(value=float(value)) for value in (5.0, -1.0, 2.0)]
-    result = run(behind(MultiportSwitch(), Clock(), *values), 5.0)
+    result = run(with_integral(MultiportSwitch(), Clock(), *values), 5.0)
     t = result["t"]
     close(
         result["integral/y"], 5 * np.minimum(t, 2) - np.clip(t - 2, 0, 1) + 2 * np.clip(t - 3, 0, None), 1e-11
     )
 
 
-def test_roundings_of_a_sine(run: Run) -> None:
+def test_the_integrals_of_rounded_sines_are_exact(run: Run) -> None:
     """A rounded sine is a sum of comparisons, whose integrals are known."""
     functions = ("floor", "ceil", "round", "fix")
     blocks = {function: Rounding(function=function) for function in functions}
-    result = run(all_behind(blocks, SineWave(amplitude=2.5)), 10.0)
+    result = run(with_integrals(blocks, SineWave(amplitude=2.5)), 10.0)
     t = result["t"]
 
     def above(level: float) -> np.ndarray:
@@ -237,11 +237,11 @@ def test_roundings_of_a_sine(run: Run) -> None:
         close(result[f"integral {function}/y"], expected[function], 2e-9)
 
 
-def test_remainders_of_a_sine(run: Run) -> None:
+def test_the_integrals_of_remainders_of_a_sine_are_exact(run: Run) -> None:
     """The remainder is u - n v; the quotient n is a sum of comparisons, whose integrals are known."""
     for function, divisors in (("mod", (1.0, -0.7)), ("rem", (0.7, -1.0))):
         result = run(
-            behind(Modulo(function=function), SineWave(amplitude=2.5), Constant(value=divisors)), 10.0
+            with_integral(Modulo(function=function), SineWave(amplitude=2.5), Constant(value=divisors)), 10.0
         )
         for k, divisor in enumerate(divisors):
             integral = remainder_integral(function, divisor, result["t"])
@@ -264,7 +264,7 @@ def remainder_integral(function: str, divisor: float, t: np.ndarray) -> np.ndarr
 
 def test_the_difference_of_rotating_angles_jumps_when_they_are_opposite(run: Run) -> None:
     """3 t - 1, wrapped to a sawtooth between -pi and pi; its integral consists of parabolas."""
-    result = run(behind(AngleDifference(), Ramp(slope=3.0), Constant(value=1.0)), 10.0)
+    result = run(with_integral(AngleDifference(), Ramp(slope=3.0), Constant(value=1.0)), 10.0)
     angle = 3 * result["t"] - 1
     wrapped = np.mod(angle + math.pi, 2 * math.pi) - math.pi
     close(result["integral/y"], (wrapped**2 - 1) / 6, 1e-9)
@@ -284,7 +284,7 @@ def test_steps_end_at_every_cell_boundary_of_a_surface(count: int, run: Run) -> 
     surface = LookupTable2D(positions1=axes[0], positions2=axes[1], table=table)
     blocks = {method: surface.with_parameters(method=method) for method in METHODS}
     ramps = (Ramp(initial=a, slope=b) for a, b in zip(starts, slopes))
-    result = run(all_behind(blocks, *ramps), 4.0)
+    result = run(with_integrals(blocks, *ramps), 4.0)
     t = result["t"]
 
     def value(method: str, times: np.ndarray) -> np.ndarray:
@@ -330,7 +330,7 @@ def test_the_index_of_a_prelookup_changes_at_events(count: int, run: Run) -> Non
         close(result[f"f {extrapolation}/y"], np.interp(t, fine, area), 1e-9)
 
 
-def test_the_kinks_of_a_curve_with_variable_points(run: Run) -> None:
+def test_steps_end_at_the_kinks_of_a_curve_with_variable_points(run: Run) -> None:
     """Points at 1 and 2 + t/2, values 0 and 1, at t: 0, then (t - 1) / (1 + t/2), then 1 after t = 4."""
     builder = DiagramBuilder("d")
     positions = builder.add("x", Ramp(initial=[1.0, 2.0], slope=[0.0, 0.5]))
@@ -352,7 +352,7 @@ def test_the_kinks_of_a_curve_with_variable_points(run: Run) -> None:
     close(result["integral/y"], expected, 2e-9)
 
 
-def test_the_kinks_and_steps_of_a_table(run: Run) -> None:
+def test_steps_end_at_the_kinks_and_jumps_of_a_table(run: Run) -> None:
     """A ramp from -1 through the table -> its antiderivative, piece by piece."""
     points, values = [0.0, 1.0, 1.5, 3.0], [1.0, -1.0, 2.0, 2.5]
     table = LookupTable1D(positions=points, table=values)
@@ -378,10 +378,10 @@ def test_the_kinks_and_steps_of_a_table(run: Run) -> None:
             return 2.5 + (u - 3.0) / 3.0
         return float(np.interp(u, points, values))
 
-    borders = [-1.0, 0.0, 0.5, 1.0, 1.25, 1.5, 2.25, 3.0, 4.0]
+    breakpoints = [-1.0, 0.0, 0.5, 1.0, 1.25, 1.5, 2.25, 3.0, 4.0]
 
     def integral(end: float, method: str, extrapolation: str) -> float:
-        total, nodes = 0.0, [b for b in borders if b < end] + [end]
+        total, nodes = 0.0, [b for b in breakpoints if b < end] + [end]
         for a, b in pairwise(nodes):
             m = (a + b) / 2  # each piece is linear
             total += (b - a) * curve(m, method, extrapolation)
@@ -392,7 +392,7 @@ def test_the_kinks_and_steps_of_a_table(run: Run) -> None:
         close(result[f"integral {' '.join(case)}/y"], expected, 1e-10)
 
 
-def test_the_limits_of_a_drive(run: Run) -> None:
+def test_steps_end_where_the_limits_of_a_drive_become_active(run: Run) -> None:
     """Input 15, peak 10, limit 20 (1 - w/100), w = 20 t: 10 until t = 2.5, then falling, -10 after 7.5."""
     builder = DiagramBuilder("d")
     speed = builder.add("w", Gain(gain=20.0), builder.add("t", Clock()))
@@ -408,7 +408,7 @@ def test_the_limits_of_a_drive(run: Run) -> None:
     )
 
 
-def test_a_mass_between_stops(run: Run) -> None:
+def test_a_mass_between_elastic_stops_reverses_its_speed(run: Run) -> None:
     """An elastic stop without damping: contact for half a spring period, then the reversed speed."""
     builder = DiagramBuilder("d")
     stops = JointStops(lower=-1.0, upper=1.0, stiffness=100.0, damping=0.0)
@@ -455,8 +455,8 @@ def test_a_square_root_of_an_absolute_value_is_integrated_across_its_zero(run: R
 
 
 def test_without_zero_crossings_there_are_no_events() -> None:
-    plain = result_of(behind(Abs(zero_crossing=False), SineWave()), 10.0)
-    exact = result_of(behind(Abs(), SineWave(amplitude=2.0)), 10.0)
+    plain = result_of(with_integral(Abs(zero_crossing=False), SineWave()), 10.0)
+    exact = result_of(with_integral(Abs(), SineWave(amplitude=2.0)), 10.0)
     assert plain.run.events == 0
     assert exact.run.events == 3
     assert plain["integral/y"] == pytest.approx(exact["integral/y"] / 2.0, abs=1e-6)
@@ -487,7 +487,7 @@ def test_a_sample_at_an_event_has_the_new_value(run: Run) -> None:
 
 
 @pytest.mark.parametrize("run", [RUNS["adaptive"], RUNS["fixed"]], ids=["adaptive", "fixed"])
-def test_a_tank_that_empties_through_a_hole(run: Run) -> None:
+def test_a_tank_that_empties_through_a_hole_stays_empty(run: Run) -> None:
     """Torricelli: h' = -2 sqrt(h) with h(0) = 1 is (1 - t)^2 until t = 1; then the tank stays empty."""
     builder = DiagramBuilder("d")
     level = builder.add("level", Integrator(initial=1.0))
@@ -534,8 +534,10 @@ def test_modes_are_consistent_when_a_run_continues_with_other_parameters() -> No
 @pytest.mark.parametrize("solver", ["rk45", "rodas5p", "rk4"])
 @pytest.mark.parametrize("block", [HitCrossing(offset=-0.5), Relay(on_point=0.7)])
 def test_a_run_ends_if_rounding_decides_the_sign_of_a_guard(block: Block, solver: str) -> None:
-    """The dead zone has no width, so its output minus its input is -0.5 up to rounding. The search for an
-    event in a step of ten units in the last place never ended."""
+    """The dead zone has no width, so its output minus its input is -0.5 up to rounding.
+
+    The search for an event must end even in a step of ten units in the last place.
+    """
     builder = DiagramBuilder("d")
     sine = SineWave(amplitude=1.4424198862237227, frequency=math.pi, phase=0.09497253091345148, bias=-0.5)
     u = builder.add("u", sine)

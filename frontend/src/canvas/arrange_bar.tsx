@@ -13,7 +13,7 @@ import {
   IconRotateClockwise,
 } from '@tabler/icons-react'
 import { useStudio } from '../store'
-import { align, distribute, flip, ground, rotate } from './arranging'
+import { align, distribute, flip, ground, rotate, selectedBlocks } from './arranging'
 
 const BLOCK_COMMANDS = [
   { label: 'Rotate (Ctrl+R)', icon: IconRotateClockwise, run: rotate },
@@ -39,8 +39,7 @@ const DISTRIBUTIONS = [
 
 /** Commands for several selected blocks, at the top of the sheet. */
 export function ArrangeBar() {
-  const count = useStudio((s) => [...s.selection].filter((name) => s.document?.blocks[name]).length)
-  if (count < 2) return null
+  const count = useStudio(() => selectedBlocks().length)
   const buttons = [...BLOCK_COMMANDS, ...ALIGNMENTS, ...(count > 2 ? DISTRIBUTIONS : [])]
   return (
     <div className="arrange-bar" role="toolbar" aria-label="Arrange the selected blocks">

@@ -8,10 +8,10 @@ export function selectedBlocks(): SheetBlock[] {
   return [...selection].map((name) => document?.blocks[name]).filter((block) => block !== undefined)
 }
 
-function changePlaces(change_: (block: SheetBlock) => Partial<Place>): void {
+function changePlaces(changeOf: (block: SheetBlock) => Partial<Place>): void {
   const selected = selectedBlocks()
   const positions = Object.fromEntries(
-    selected.map((block) => [block.name, { ...block.place, ...change_(block) }]),
+    selected.map((block) => [block.name, { ...block.place, ...changeOf(block) }]),
   )
   const unchanged = selected.every(
     (block) => JSON.stringify(positions[block.name]) === JSON.stringify(block.place),
@@ -72,7 +72,7 @@ export function distribute(axis: 'x' | 'y'): void {
   changePlaces(({ name }) => ({ [axis]: positions.get(name) }))
 }
 
-/** Comment the selected blocks out or through; if all of them are so already, remove their comments. */
+/** Comment the selected blocks out or through. If all have this comment already, remove it. */
 export function comment(mode: 'out' | 'through'): void {
   const selected = selectedBlocks()
   if (!selected.length) return

@@ -13,6 +13,7 @@ import {
   type NodeChange,
 } from '@xyflow/react'
 import { useRef, useState } from 'react'
+import { deferred } from '../deferred'
 import { showDialog } from '../dialogs'
 import type { Edit } from '../messages'
 import type { Places } from '../model/wires'
@@ -20,7 +21,7 @@ import type { OuterComment } from '../protocol'
 import { WireValues } from '../run/wire_values'
 import { alteration, ask, change, openSheet, useStudio } from '../store'
 import { sheetKey } from '../documents/document_views'
-import { ArrangeBar } from './arrange_bar'
+import { selectedBlocks } from './arranging'
 import { BlockNode } from './block_node'
 import { endConnection } from './connecting'
 import { DragPreview, useDraggedCopies } from './drag_preview'
@@ -40,6 +41,7 @@ import { useStableHandlers } from './stable_handlers'
 import { Welcome } from './welcome'
 import { WireEdge, type WireEdgeType } from './wire_edge'
 
+const ArrangeBar = deferred(async () => (await import('./arrange_bar')).ArrangeBar)
 const nodeTypes = { block: BlockNode, note: NoteNode }
 const edgeTypes = { wire: WireEdge }
 const SNAP: [number, number] = [GRID, GRID]
@@ -94,7 +96,7 @@ function CommentNote({ path, comment }: OuterComment) {
   return (
     <div className="library-note comment-note">
       <span>
-        <b>{path.join(' › ')}</b> is commented {comment}: this sheet takes no part in the model.
+        <b>{path.join(' › ')}</b> is commented {comment}: this sheet is not part of the model.
       </span>
       <Anchor component="button" size="sm" onClick={() => void uncomment(path)}>
         Uncomment
@@ -130,6 +132,7 @@ function Sheet({ sheetKey }: { sheetKey: string }) {
   const wires = useStudio((s) => s.document!.wires)
   const notes = useStudio((s) => s.document!.notes)
   const scheme = useComputedColorScheme('light')
+  const severalSelected = useStudio(() => selectedBlocks().length > 1)
   const flow = useReactFlow<SheetNode, WireEdgeType>()
   const sheet = useRef<HTMLDivElement>(null)
   const [selectedWires, setSelectedWires] = useState<ReadonlySet<string>>(new Set())
@@ -137,7 +140,7 @@ function Sheet({ sheetKey }: { sheetKey: string }) {
   const { graph, nodes, edges, lines } = useSheetDrawing(sheetDrag, selectedWires)
   useCentredBlock(sheet, flow, blocks)
   useSheetKeys(sheet, selectedWires, setSelectedWires)
-  useSheetView(sheet, flow)
+  useSheetView(sheet, flow, sheetKey)
   useNameScale(sheet)
   useFitView(sheet, flow, sheetKey)
   const handlers = useStableHandlers({
@@ -199,7 +202,7 @@ function Sheet({ sheetKey }: { sheetKey: string }) {
         <SignalNames lines={lines} />
         {Object.keys(blocks).length > 40 && <Overview blocks={blocks} />}
       </ReactFlow>
-      <ArrangeBar />
+      {severalSelected && <ArrangeBar />}
       {empty && <EmptySheet />}
     </div>
   )
@@ -209,10 +212,10 @@ function Sheet({ sheetKey }: { sheetKey: string }) {
 function EmptySheet() {
   const level = useStudio((s) => s.document!.inside.length)
   if (level === 0) return <Welcome />
-  return <p className="empty over">Nothing is inside yet: type to add a block, such as In and Out.</p>
+  return <p className="empty over">The subsystem is empty: type to add a block, such as In or Out.</p>
 }
 
-/** Moving through the blocks with Tab selects the focused one. */
+/** Select the block that receives the focus by Tab. */
 function selectFocused({ target }: React.FocusEvent): void {
   const name =
     target.classList.contains('react-flow__node') && target.matches(':focus-visible')
@@ -227,7 +230,7 @@ function insertAt(event: React.MouseEvent): void {
     showDialog('insert', '', { x: event.clientX, y: event.clientY })
 }
 
-/** A click on one of several selected blocks selects it alone; whether it has changed the selection. */
+/** Select only the clicked one of several selected blocks; returns whether the selection has changed. */
 function selectOnly({ ctrlKey, metaKey, shiftKey }: React.MouseEvent, id: string): boolean {
   const { selection, select } = useStudio.getState()
   if (ctrlKey || metaKey || shiftKey || selection.size < 2) return false
@@ -243,7 +246,7 @@ function connect({ source, sourceHandle, target, targetHandle }: Connection): vo
     })
 }
 
-/** Show the copies of dragged blocks at their positions; the blocks themselves remain. */
+/** Show copies of the dragged blocks at the dragged positions; the blocks themselves are not moved. */
 function showCopies(places: Places): void {
   const { document } = useStudio.getState()
   const [first] = Object.keys(places)

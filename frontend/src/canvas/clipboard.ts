@@ -1,6 +1,7 @@
 import { ask, change, freeName, namesInUse, useStudio } from '../store'
 import { GRID } from './insert'
 
+/** Displacement of pasted blocks to the right and down, px. */
 const PASTE_OFFSET = 30
 
 /** Blocks and notes of the sheet as the text of a diagram file; undefined if there are none. */
@@ -20,7 +21,7 @@ async function copiedText(
   })
 }
 
-/** Paste the blocks of such a text under unused names, and select them. */
+/** Paste the blocks of a diagram text under unused names, and select them. */
 async function pasteText(text: string, offset: number | [number, number] = PASTE_OFFSET): Promise<void> {
   const { document, select } = useStudio.getState()
   if (!document) return
@@ -45,7 +46,7 @@ export async function duplicateAt(names: readonly string[], shift: [number, numb
   if (text) await pasteText(text, shift)
 }
 
-/** Blocks are copied as the text of a diagram file, which can be pasted into another window or a mail. */
+/** Copy the selection as the text of a diagram file, which can be pasted into another window or an e-mail. */
 export async function copy(): Promise<void> {
   const text = await copiedText()
   if (text) await navigator.clipboard.writeText(text)

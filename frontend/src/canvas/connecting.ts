@@ -3,7 +3,7 @@ import { showDialog } from '../dialogs'
 import { freePort } from '../model/free_port'
 import { change, useStudio } from '../store'
 
-/** The end of a drag from a port, unless it ends at another port. */
+/** Handle the end of a drag from a port, unless it ends at another port. */
 export function endConnection(event: MouseEvent | TouchEvent, state: FinalConnectionState): void {
   const { fromHandle, fromNode, toHandle, isValid } = state
   if (toHandle || isValid || !fromHandle?.id || !fromNode || !('clientX' in event)) return
@@ -15,8 +15,8 @@ export function endConnection(event: MouseEvent | TouchEvent, state: FinalConnec
 }
 
 /**
- * The end of a new line at a point of the window. On the body of a block the line takes its first free port.
- * On the empty sheet the list of blocks opens, and the chosen block is connected.
+ * End a new line at a point of the window. On the body of a block, connect the line to the first free port.
+ * On the empty sheet, the list of blocks opens and the chosen block is connected.
  */
 export function connectAt(at: { x: number; y: number }, port: string, isOutput: boolean): void {
   const { document } = useStudio.getState()

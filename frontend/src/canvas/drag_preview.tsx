@@ -13,7 +13,7 @@ export const useDraggedCopies = create<{ names: readonly string[]; shift: [numbe
 
 export const clearCopies = (): void => useDraggedCopies.setState({ names: [] })
 
-/** What a drag would create: copies of blocks, or a branch of a line; alignments of dragged blocks. */
+/** The preview of a drag: copies of blocks, or a branch of a line; and the alignment of dragged blocks. */
 export function DragPreview() {
   const { names, shift } = useDraggedCopies()
   const branch = useBranch((s) => s.branch)
@@ -61,7 +61,7 @@ export function DragPreview() {
   )
 }
 
-/** A path at right angles: along the longer distance last. */
+/** A path of a vertical and then a horizontal segment. */
 function rightAnglePath(
   [ax, ay]: readonly [number, number],
   [bx, by]: readonly [number, number],

@@ -9,7 +9,7 @@ const SUFFIXES = /\.(csv|npz|mat|parquet)$/i
 /** Whether a file contains a table of measurements, by its name. */
 export const isTable = (file: File): boolean => SUFFIXES.test(file.name)
 
-/** A dropped table that waits for a decision: another file has its name. */
+/** A dropped table whose file name is in use: the user decides whether to replace the file. */
 export interface DroppedTable {
   name: string
   content: string
@@ -31,7 +31,7 @@ export async function dropTable(name: string, content: string, position: Dropped
   showDialog('dropped_table')
 }
 
-/** Replace the file of the same name. */
+/** Replace the file of the same name, and add a block with the table. */
 export async function replaceTable({ name, content, at: position }: DroppedTable): Promise<void> {
   const stored = await ask({ kind: 'store_file', name, content, replace: true })
   if (stored) await addTableBlock(stored.path, position)

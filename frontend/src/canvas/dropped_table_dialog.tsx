@@ -2,7 +2,7 @@ import { Button, Group, Modal, Stack, Text } from '@mantine/core'
 import { showDialog, useDialogs } from '../dialogs'
 import { addTableBlock, replaceTable, useDroppedTable } from './dropped_table'
 
-/** Another file of the project has the name of a dropped table. */
+/** Asks whether a dropped table replaces a file of the same name. */
 export function DroppedTableDialog() {
   const opened = useDialogs((s) => s.open === 'dropped_table')
   const waiting = useDroppedTable((s) => s.waiting)
@@ -16,7 +16,7 @@ export function DroppedTableDialog() {
     <Modal opened={opened} onClose={close} title={`Replace ${waiting.name}?`} size="md">
       <Stack gap="sm">
         <Text size="sm">
-          The folder of the studio contains another file with this name. Blocks that use it would get the new
+          The project folder contains another file with this name. Blocks that use it would get the new
           values.
         </Text>
         <Group justify="flex-end" gap="xs">

@@ -13,14 +13,14 @@ const MAX_MOVED = 20
 
 const NOT_ALIGNED: Alignment = { dx: 0, dy: 0, guides: [] }
 
-interface Moved {
+interface MovedNode {
   id: string
   position: { x: number; y: number }
 }
 
 /** The alignment of dragged blocks with all others. */
 export function alignment(
-  moved: readonly Moved[],
+  moved: readonly MovedNode[],
   blocks: Record<string, SheetBlock>,
   zoom: number,
 ): Alignment {
@@ -34,7 +34,10 @@ export function alignment(
   return align(boundingShape(shapes), others, reach)
 }
 
-function shapeOf({ width, height, inputs, outputs }: SheetBlock, { x, y }: Moved['position']): GuideShape {
+function shapeOf(
+  { width, height, inputs, outputs }: SheetBlock,
+  { x, y }: MovedNode['position'],
+): GuideShape {
   const ports = [
     ...inputs.map((port) => ({ ...port, output: false })),
     ...outputs.map((port) => ({ ...port, output: true })),

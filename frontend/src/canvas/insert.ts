@@ -12,7 +12,7 @@ export const GRID = 5
 interface Insertion {
   /** The wire into which the block is inserted. */
   wire?: Wire
-  /** Height of the wire that enters the first input, which is then exactly straight. */
+  /** y of the wire that enters the first input, px; the block is placed so that this wire is straight. */
   wireY?: number
   /** A port to which the block is connected; the point is then at the edge of the block. */
   connectTo?: { port: string; isOutput: boolean }
@@ -20,7 +20,7 @@ interface Insertion {
   reveal?: boolean
   /** The values of its parameters that differ from the defaults. */
   parameters?: Record<string, unknown>
-  /** The wish for its name. */
+  /** The preferred name; a number is appended if it is in use. */
   name?: string
 }
 
@@ -76,7 +76,7 @@ export function sheetPointAt(clientPoint: { x: number; y: number }): { x: number
   }
 }
 
-/** Height of the first input, if it is at the left edge. */
+/** y of the first input from the top of the block, px, if it is at the left edge. */
 function leftInputY({ input_y, height }: BlockType): number | undefined {
   const [first] = input_y
   return first !== undefined && first > 0 && first < height ? first : undefined

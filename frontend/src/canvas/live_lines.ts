@@ -12,7 +12,7 @@ interface DraggedLayout {
   passed: string | null
 }
 
-/** Lines that differ from those of the document, which were `base`. */
+/** Routed lines that differ from `base`, the lines of the document at the time of the request. */
 interface Routed {
   base: Lines
   lines: Lines

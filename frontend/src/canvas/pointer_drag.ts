@@ -1,4 +1,4 @@
-/** What a drag does at each movement, when the button is released, and at its end for any reason. */
+/** The handlers of a drag: at each movement, at the release of the button, and at the end for any reason. */
 interface Drag {
   move: (event: PointerEvent) => void
   drop: (event: PointerEvent) => void

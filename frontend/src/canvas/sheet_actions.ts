@@ -14,14 +14,17 @@ export const sheetView: {
   zoom: ((factor: number | null) => void) | null
   /** Move the view so that a block is visible. */
   reveal: ((block: Rectangle) => void) | null
+  /** Show a part of the sheet. */
+  show: ((part: Rectangle) => void) | null
 } = {
   fit: null,
   zoom: null,
   visible: null,
   reveal: null,
+  show: null,
 }
 
-/** Factor of one zoom by key. */
+/** Zoom factor of one key press. */
 export const ZOOM_STEP = 1.25
 
 /** Start a note in the centre of the visible part. */
@@ -30,11 +33,11 @@ export function addNote(): void {
   if (view) createNote(view.x + view.width / 2, view.y + view.height / 2)
 }
 
-/** The kinds of views with a chart in the panel of the scopes. */
+/** The kinds of views that are charts in the panel of the scopes. */
 const CHARTS = new Set(['traces', 'path'])
 
 /** Whether the run has a chart of a block. */
-export const chartOf = (path: string): boolean =>
+export const hasChart = (path: string): boolean =>
   useStudio.getState().run?.views.some((view) => view.block === path && CHARTS.has(view.kind)) ?? false
 
 /**
@@ -44,7 +47,7 @@ export const chartOf = (path: string): boolean =>
 export function openBlock(block: SheetBlock): void {
   const { document, edit } = useStudio.getState()
   const path = [...(document?.inside ?? []), block.name].join('/')
-  if (chartOf(path)) showScope(path)
+  if (hasChart(path)) showScope(path)
   else if (block.opens && !block.mask.length && document) openSheet([...document.inside, block.name])
   else edit(block.name)
 }

@@ -70,12 +70,14 @@ export function dragHandlers(
     }
     const disconnected = event.shiftKey || event.altKey ? dragged.map(({ name }) => name) : []
     const [first] = dragged
-    const alone =
+    const canInsert =
       dragged.length === 1 &&
       first &&
       isInsertable(first, disconnected.length ? disconnectBlocks(dragged, wires) : wires)
-    if (disconnected.length || alone)
-      setEffect((effect.current = { disconnected, insertable: alone ? first.name : null, duplicates: false }))
+    if (disconnected.length || canInsert)
+      setEffect(
+        (effect.current = { disconnected, insertable: canInsert ? first.name : null, duplicates: false }),
+      )
   }
   /** Align the dragged blocks, unless Alt is pressed or the drag duplicates them. */
   const aligned = (event: MouseEvent | TouchEvent | React.MouseEvent, nodes: SheetNode[]) =>

@@ -18,7 +18,7 @@ const SCALAR: WireKind = { shape: [], unit: '' }
 
 /**
  * A cache of objects by name. An object is created again only if its inputs have changed, so that an edit
- * renders only what it affects.
+ * renders only the affected blocks and wires.
  */
 class ObjectCache<T> {
   private previous = new Map<string, { from: readonly unknown[]; object: T }>()

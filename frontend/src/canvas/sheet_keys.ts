@@ -19,7 +19,7 @@ function typeLetter(letter: string): void {
   else showDialog('insert', open === 'insert' ? typed + letter : letter)
 }
 
-/** Keys that press a button or leave it; all others are keys of the sheet also after a button was pressed. */
+/** Keys that a focused button handles; all other keys are handled by the sheet. */
 const BUTTON_KEYS = new Set(['Enter', ' ', 'Tab'])
 
 /** Whether an element is a button whose group does not use the arrow keys. */

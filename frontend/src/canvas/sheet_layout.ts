@@ -4,7 +4,7 @@ import type { SheetPort, SheetBlock } from '../protocol'
 
 const NAME_SIZE = 11
 const NAME_FONT = `${NAME_SIZE}px 'Inter Variable', sans-serif`
-/** Maximum width of a name, px; longer names are cut. */
+/** Maximum width of a name, px; longer names are truncated. */
 export const MAX_NAME_WIDTH = 168
 /** Width and height of a port, px. */
 export const PORT = 9
@@ -43,16 +43,16 @@ export function nameWidth(name: string): number {
 export function nameArea({ name, shown_name_side: side, place, width, height }: SheetBlock): Rectangle[] {
   const { x, y } = place
   if (side === 'hidden') return []
-  const wide = nameWidth(name)
-  const middle = { x: x + (width - wide) / 2, y: y + height / 2 - 7 }
+  const textWidth = nameWidth(name)
+  const middle = { x: x + (width - textWidth) / 2, y: y + height / 2 - 7 }
   const corner = {
     below: { x: middle.x, y: y + height + 2 },
     above: { x: middle.x, y: y - 16 },
-    left: { x: x - 5 - wide, y: middle.y },
+    left: { x: x - 5 - textWidth, y: middle.y },
     right: { x: x + width + 5, y: middle.y },
     corner: { x: x + 0.78 * width, y: y - 15 },
   }[side]
-  return [{ ...corner, width: wide, height: 14 }]
+  return [{ ...corner, width: textWidth, height: 14 }]
 }
 
 /**

@@ -11,7 +11,7 @@ import { pasteAt } from './clipboard'
 import { sheetPointAt } from './insert'
 import { editNote, createNote } from './note_node'
 import { nodeNameAt, wireKeyAt } from './right_button'
-import { chartOf } from './sheet_actions'
+import { hasChart } from './sheet_actions'
 import { removeSelected } from './sheet_keys'
 import { portSides } from './sheet_layout'
 import { nameSignal } from './signal_names'
@@ -59,9 +59,11 @@ function sheetEntries(document: OpenDocument, point: Point): Entries {
     commandEntry('Ground and terminate unconnected ports'),
     commandEntry('Fit the sheet into the window'),
     commandEntry('Show the sheet at 100 %'),
+    commandEntry('Bookmark this view'),
+    commandEntry('Bookmarks of views'),
     ...(document.inside.length ? [commandEntry('Leave the subsystem')] : []),
     null,
-    commandEntry('Find blocks, types and values'),
+    commandEntry('Find blocks, types, values and bookmarks'),
     commandEntry('Configuration parameters'),
     {
       title: 'Export the sheet',
@@ -76,7 +78,7 @@ function sheetEntries(document: OpenDocument, point: Point): Entries {
 function blockEntries(document: OpenDocument, block: SheetBlock): Entries {
   const path = [...document.inside, block.name]
   const several = selectedBlocks().length > 1
-  const chart = chartOf(path.join('/'))
+  const chart = hasChart(path.join('/'))
   const opens: Entries = [
     ...(chart ? [{ title: 'Show its chart', run: () => showScope(path.join('/')) }] : []),
     ...(block.opens ? [{ title: 'Open the sheet inside', run: () => openSheet(path) }] : []),

@@ -2,7 +2,7 @@ import { useStore, type ReactFlowInstance } from '@xyflow/react'
 import { useEffect, useState, type RefObject } from 'react'
 import type { Rectangle } from '../model/free_place'
 import type { SheetBlock } from '../protocol'
-import { viewports } from '../documents/document_views'
+import { partsToShow, viewports } from '../documents/document_views'
 import { useStudio } from '../store'
 import type { SheetNode } from './sheet_graph'
 import { sheetView } from './sheet_actions'
@@ -64,26 +64,28 @@ export function useFitView(sheet: Sheet, flow: Flow, key: string): void {
   useEffect(() => {
     const element = sheet.current
     if (!element) return
-    let moved = viewports.has(key)
-    const store = () => moved && viewports.set(key, flow.getViewport())
+    const isMoved = () => viewports.has(key)
+    const store = () => isMoved() && viewports.set(key, flow.getViewport())
     addEventListener('pagehide', store, true)
     const leave = () => {
       store()
       removeEventListener('pagehide', store, true)
     }
-    if (moved) return leave
+    if (isMoved()) return leave
     let timer = 0
     const observer = new ResizeObserver(() => {
       clearTimeout(timer)
       // React Flow would fit an empty sheet to the first block that is dropped on it, which would then jump.
-      timer = window.setTimeout(() => flow.getNodes().length && void flow.fitView(FIT), LAYOUT_DELAY_MS)
+      timer = window.setTimeout(() => {
+        if (!isMoved() && flow.getNodes().length) void flow.fitView(FIT)
+      }, LAYOUT_DELAY_MS)
     })
     const stop = () => {
       clearTimeout(timer)
       observer.disconnect()
     }
     const move = () => {
-      moved = true
+      viewports.set(key, flow.getViewport())
       stop()
     }
     observer.observe(element)
@@ -101,12 +103,12 @@ export function useInitialView(key: string, empty: boolean) {
   const [view] = useState(() => {
     const defaultViewport = viewports.get(key)
     // An empty sheet would be fitted to the first block that is dropped on it, which would then jump.
-    return defaultViewport ? { defaultViewport } : { fitView: !empty }
+    return defaultViewport ? { defaultViewport } : { fitView: !empty && !partsToShow.has(key) }
   })
   return view
 }
 
-/** Names are larger on a sheet that is zoomed out, as on a small screen: below the blocks they have room. */
+/** Scale of block names: larger on a sheet that is zoomed out, because there is room below the blocks. */
 export function nameScale(zoom: number): number {
   const scale = Math.min(Math.max(0.9 / zoom, 1), 1.25)
   return Math.round(20 * scale) / 20
@@ -119,10 +121,14 @@ export function useNameScale(sheet: Sheet): void {
 }
 
 /** The commands of the visible sheet act on this view. */
-export function useSheetView(sheet: Sheet, flow: Flow): void {
+export function useSheetView(sheet: Sheet, flow: Flow, key: string): void {
   useEffect(() => {
-    sheetView.zoom = (factor) =>
+    // After this the sheet is not fitted into its panel any more.
+    const keepView = () => viewports.set(key, flow.getViewport())
+    sheetView.zoom = (factor) => {
+      keepView()
       void flow.zoomTo(factor === null ? 1 : factor * flow.getZoom(), { duration: 120 })
+    }
     sheetView.fit = () => void flow.fitView({ ...FIT, duration: 150 })
     sheetView.visible = () => {
       const { clientWidth: width, clientHeight: height } = sheet.current!
@@ -133,11 +139,19 @@ export function useSheetView(sheet: Sheet, flow: Flow): void {
       const { clientWidth: width, clientHeight: height } = sheet.current!
       revealBlock(flow, { width, height }, block)
     }
+    const show = (part: Rectangle, duration?: number) => {
+      keepView()
+      void flow.fitBounds(part, { padding: 0, duration })
+    }
+    sheetView.show = (part) => show(part, 150)
+    const part = partsToShow.get(key)
+    if (part && partsToShow.delete(key)) show(part)
     return () => {
+      sheetView.show = null
       sheetView.fit = null
       sheetView.zoom = null
       sheetView.visible = null
       sheetView.reveal = null
     }
-  }, [flow, sheet])
+  }, [flow, sheet, key])
 }

@@ -8,7 +8,7 @@ import { useStudio } from '../store'
 
 /** Time that the pointer rests on a subsystem before its preview is shown. */
 const POINTER_DELAY_MS = 700
-/** The same for the keyboard focus, which passes over blocks on its way. */
+/** The same delay for the keyboard focus, which moves from block to block. */
 const FOCUS_DELAY_MS = 1000
 /** The maximum size of the picture in the present window. */
 const limit = () => ({ width: Math.max(360, 0.32 * innerWidth), height: Math.max(220, 0.38 * innerHeight) })
@@ -32,7 +32,7 @@ function watchSubsystems(show: (name: string | null) => void): () => void {
     waiting = null
     show(null)
   }
-  const rest = (target: EventTarget | null, delay: number) => {
+  const startTimer = (target: EventTarget | null, delay: number) => {
     const name = subsystemAt(target)
     if (name === waiting) return
     close()
@@ -48,10 +48,10 @@ function watchSubsystems(show: (name: string | null) => void): () => void {
     pointerover: (event) => {
       const { buttons, pointerType } = event as PointerEvent
       if (buttons || pointerType === 'touch') close()
-      else rest(event.target, POINTER_DELAY_MS)
+      else startTimer(event.target, POINTER_DELAY_MS)
     },
     focusin: ({ target }) => {
-      if (target instanceof Element && target.matches(':focus-visible')) rest(target, FOCUS_DELAY_MS)
+      if (target instanceof Element && target.matches(':focus-visible')) startTimer(target, FOCUS_DELAY_MS)
     },
     pointerout: (event) => {
       if ((event as PointerEvent).relatedTarget === null) close() // the pointer has left the window

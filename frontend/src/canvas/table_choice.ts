@@ -1,6 +1,6 @@
 import type { TablePreview } from '../protocol'
 
-/** A file of the project and its columns; empty names are chosen by the file. */
+/** A file of the project and its columns; for empty names, the server chooses the columns. */
 export interface TableChoice {
   file: string
   time: string
@@ -8,8 +8,8 @@ export interface TableChoice {
 }
 
 /**
- * The choice with the names of its columns, if the file has others that contain no numbers: without names,
- * all columns of the file would be values, and text an error.
+ * The choice with explicit column names, if another column of the file contains no numbers. Without names,
+ * all columns would be read as values, and text would be an error.
  */
 export function withColumnNames(choice: TableChoice, { columns, time, chosen }: TablePreview): TableChoice {
   const partial = !choice.columns.length && chosen.length > 0 && columns.some((column) => column.fault)

@@ -7,7 +7,7 @@ import { dragged } from '../model/bends'
 import { drawBranch } from './branching'
 import { GRID } from './insert'
 import { nameSignal } from './signal_names'
-import { isFlat, svgPath, type Point, type PortPosition } from '../model/wire_lines'
+import { isHorizontal, svgPath, type Point, type PortPosition } from '../model/wire_lines'
 
 export type WireEdgeType = Edge<
   {
@@ -36,6 +36,7 @@ export interface WireTag extends PortPosition {
 /** The wire whose route is being drawn, with its present bends. */
 export const useBending = create<{ wire: Required<Wire> | null }>(() => ({ wire: null }))
 
+/** Distance within which a dragged segment is aligned with a parallel one, px. */
 const SNAP_PX = 7
 
 /**
@@ -88,7 +89,7 @@ function Tag({ tag: { x, y, dx, dy, text }, selected }: { tag: WireTag; selected
   return (
     <>
       <line x1={x} y1={y} x2={tx} y2={ty} className="line rank0 stub" />
-      <line x1={x} y1={y} x2={tx} y2={ty} className="piece" />
+      <line x1={x} y1={y} x2={tx} y2={ty} className="segment" />
       <EdgeLabelRenderer>
         <span
           className={selected ? 'wire-tag selected' : 'wire-tag'}
@@ -115,7 +116,7 @@ function Segment({
 }) {
   const flow = useReactFlow()
   const [[x1, y1], [x2, y2]] = [path[segment]!, path[segment + 1]!]
-  const flat = isFlat(path, segment)
+  const horizontal = isHorizontal(path, segment)
   const startDrag = (event: React.PointerEvent<SVGLineElement>) => {
     if (event.button !== 0) return
     if (event.ctrlKey || event.metaKey) {
@@ -129,7 +130,7 @@ function Segment({
     const start = { x: event.clientX, y: event.clientY }
     const sheet = event.currentTarget.closest<HTMLElement>('.react-flow')!
     const move = (pointer: PointerEvent) => {
-      const distance = flat ? pointer.clientY - start.y : pointer.clientX - start.x
+      const distance = horizontal ? pointer.clientY - start.y : pointer.clientX - start.x
       if (Math.abs(distance) < 3 && !useBending.getState().wire) return
       // The sheet captures the pointer: this segment may disappear while the route is being drawn.
       sheet.setPointerCapture(event.pointerId)
@@ -141,7 +142,7 @@ function Segment({
         wire: {
           source,
           target,
-          bends: dragged(complete, index, snapped(complete, index, flat ? point.y : point.x)),
+          bends: dragged(complete, index, snapped(complete, index, horizontal ? point.y : point.x)),
         },
       })
     }
@@ -165,17 +166,17 @@ function Segment({
       y1={y1}
       x2={x2}
       y2={y2}
-      className={flat ? 'piece nopan flat' : 'piece nopan'}
+      className={horizontal ? 'segment nopan horizontal' : 'segment nopan'}
       onPointerDown={startDrag}
     />
   )
 }
 
 /**
- * The position of a dragged segment: aligned with near parallel segments, otherwise on the grid.
+ * The position of a dragged segment: aligned with a nearby parallel segment, otherwise on the grid.
  */
 function snapped(route: Point[], segment: number, coordinate: number): number {
-  const axis = isFlat(route, segment) ? 1 : 0
+  const axis = isHorizontal(route, segment) ? 1 : 0
   const others = route.filter((_, k) => k !== segment && k !== segment + 1).map((point) => point[axis])
   const aligned = others.find((other) => Math.abs(other - coordinate) < SNAP_PX)
   return aligned ?? GRID * Math.round(coordinate / GRID)

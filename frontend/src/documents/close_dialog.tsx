@@ -57,7 +57,7 @@ function Choice({ state, cancel }: { state: DocumentState; cancel: () => void })
         <Text size="sm">
           {state.path
             ? `The changes since the last save of ${state.path} are not saved.`
-            : 'It has no file yet.'}{' '}
+            : 'The document has no file yet.'}{' '}
           Discarded changes cannot be recovered.
         </Text>
         {!state.path && (

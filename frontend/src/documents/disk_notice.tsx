@@ -36,7 +36,7 @@ function FileNotice({ state, saveAs }: { state: DocumentState; saveAs: () => voi
       )}
       {disk === 'gone' && (
         <Alert color="yellow" icon={<IconFileAlert />} title={`${path} was deleted from the disk`}>
-          What it held is here and in the journal; saving writes the file again.
+          Its content is here and in the journal; saving writes the file again.
         </Alert>
       )}
       {!journaled && (
@@ -70,10 +70,10 @@ export function DiskNotice() {
               : `${otherRecoveries} other documents were not saved`
           }
         >
-          The studio ended before; its journal has kept what was edited.
+          The studio ended before the edits were saved; its journal contains them.
           <Group gap="xs" mt="xs">
             <Button size="compact-sm" variant="default" onClick={() => showDialog('recovery')}>
-              Look at {otherRecoveries === 1 ? 'it' : 'them'}
+              Show {otherRecoveries === 1 ? 'it' : 'them'}
             </Button>
           </Group>
         </Alert>

@@ -1,4 +1,5 @@
 import type { EventOf } from '../messages'
+import type { Rectangle } from '../model/free_place'
 import { RunSamples } from '../model/run_samples'
 import { useCursor } from '../run/cursor'
 import { useRuns } from '../run/runs'
@@ -6,7 +7,7 @@ import { showSamples } from '../samples'
 import { storedData } from '../stored_data'
 import { useStudio, type OpenDocument, type RunView } from '../store'
 
-/** What a page shows of a diagram besides its content; restored when the diagram is shown again. */
+/** The displayed state of a diagram besides its content; restored when the diagram is shown again. */
 interface DocumentView {
   inside: string[]
   selection: ReadonlySet<string>
@@ -30,9 +31,12 @@ const views = new Map<string, DocumentView>()
 /** The views of the sheets that the user has moved, by `sheetKey`. */
 export const viewports = new Map<string, Viewport>()
 
+/** Parts of sheets that are shown when the sheets are opened, by `sheetKey`. */
+export const partsToShow = new Map<string, Rectangle>()
+
 export const sheetKey = (document: string, inside: string[]): string => [document, ...inside].join('/')
 
-const EMPTY: DocumentView = {
+const EMPTY_VIEW: DocumentView = {
   inside: [],
   selection: new Set(),
   run: null,
@@ -46,7 +50,7 @@ loadViews()
 /** The view of a diagram that was shown before another one. */
 export const viewOf = (document: string): DocumentView | undefined => views.get(document)
 
-/** Forget the views of a closed document. */
+/** Delete the views of a closed document. */
 export function dropView(document: string): void {
   views.delete(document)
   for (const key of viewports.keys()) if (key.split('/')[0] === document) viewports.delete(key)
@@ -72,7 +76,7 @@ function loadViews(): void {
   const stored = storedData<StoredViews>(sessionStorage, STORAGE_KEY)
   try {
     for (const [document, inside, selection] of stored?.sheets ?? [])
-      views.set(document, { ...EMPTY, inside: [...inside], selection: new Set(selection) })
+      views.set(document, { ...EMPTY_VIEW, inside: [...inside], selection: new Set(selection) })
     for (const [key, { x, y, zoom }] of stored?.viewports ?? [])
       if ([x, y, zoom].every(Number.isFinite)) viewports.set(key, { x, y, zoom })
   } catch {
@@ -92,10 +96,10 @@ export function storeView(): void {
 
 /**
  * Restore the view of a diagram that is shown now. `run`: the key of its present run on the server. The
- * selection contains what still exists on the same sheet.
+ * selection contains the blocks and notes that still exist on the same sheet.
  */
 export function restoreView(shown: OpenDocument, serverRun: string | null): void {
-  const view = views.get(shown.state.document) ?? EMPTY
+  const view = views.get(shown.state.document) ?? EMPTY_VIEW
   const sameSheet = view.inside.join('/') === shown.inside.join('/')
   const stored = useRuns.getState().runs.find(({ key }) => key === view.run?.run)
   const isActive = view.run?.state === 'running' || view.run?.state === 'paused'
@@ -118,12 +122,12 @@ export function restoreView(shown: OpenDocument, serverRun: string | null): void
 
 /** Store the run of a diagram that is not shown. */
 export function storeRun(document: string, run: RunView): void {
-  views.set(document, { ...(views.get(document) ?? EMPTY), run, strict: false, time: null })
+  views.set(document, { ...(views.get(document) ?? EMPTY_VIEW), run, strict: false, time: null })
 }
 
-/** Update the run of a diagram that is not shown. A run that was refused has not started. */
+/** Update the run of a diagram that is not shown. A fault sets `strict`. */
 export function updateStoredRun({ document, run }: EventOf<'run_progress'>, change: Partial<RunView>): void {
-  const view = views.get(document) ?? EMPTY
+  const view = views.get(document) ?? EMPTY_VIEW
   views.set(document, {
     ...view,
     strict: view.strict || Boolean(change.fault),

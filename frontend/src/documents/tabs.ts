@@ -61,7 +61,20 @@ export async function showTab(tab: Tab): Promise<void> {
   leaveField()
   useTabs.setState({ requested: tab.document })
   await attach(tab, true)
+  // The diagram behind the robot editor is not opened again.
+  if (tab.document === useStudio.getState().document?.state.document) leaveEditor()
   useTabs.setState((s) => (s.requested === tab.document ? { requested: null } : {}))
+}
+
+/** Show the sheet at a path of subsystems of the document of a tab. */
+export async function showSheetInTab(tab: Tab, inside: string[]): Promise<void> {
+  const shown = useStudio.getState().document
+  if (tab.document !== shown?.state.document) {
+    leaveField()
+    await attach(tab, true, inside)
+  } else if (inside.join('/') !== shown.inside.join('/'))
+    await ask({ kind: 'show_sheet', document: tab.document, inside })
+  leaveEditor()
 }
 
 /** Show a block of the document of a tab, and select it. */

@@ -4,6 +4,7 @@ import { openTour, useTour } from '../dialogs'
 import { useStudio } from '../store'
 
 const SEEN_KEY = 'armblocks-tour-seen'
+/** Width of the text, and its distance from the highlighted element, px. */
 const WIDTH = 320
 const GAP = 14
 
@@ -25,7 +26,7 @@ const STOPS: Stop[] = [
   },
   {
     at: '.sheet',
-    title: 'A sheet that reads well',
+    title: 'A readable sheet',
     text:
       'A right click on a block chooses its colour and the side of its name; a double click on a wire ' +
       'names its signal. While you drag a block, thin lines show its alignment with others.',
@@ -66,7 +67,7 @@ const STOPS: Stop[] = [
     title: 'Next steps',
     text:
       'New diagrams, files and examples are in this menu; Alt+PageDown shows the next open document. ' +
-      'Ctrl+K finds every command, Ctrl+F every block, ? lists all keys.',
+      'Ctrl+K finds every command, Ctrl+F every block, Ctrl+B bookmarks a view, ? lists all keys.',
   },
 ]
 

@@ -15,8 +15,8 @@ interface Props {
 }
 
 const NO_FILES = {
-  table: 'No CSV, NPZ, MAT or Parquet file in the folder of the studio: drop one on the sheet.',
-  function: 'No Python file in the folder of the studio.',
+  table: 'No CSV, NPZ, MAT or Parquet file in the project folder: drop one on the sheet.',
+  function: 'No Python file in the project folder.',
 }
 
 /** Chooses a file of the project folder by typing a part of its path. */

@@ -34,7 +34,7 @@ export function FunctionField({ rule, block, text, initial, focus, onText }: Pro
     const newSource = await load()
     const inputs = newSource?.functions.find((entry) => entry.name === name)?.arguments.filter(isInput)
     const ports = block.inputs.map((port) => port.name)
-    // The ports of the block follow the arguments.
+    // The input ports of the block are derived from the arguments.
     if (inputs && text === initial && inputs.join() !== ports.join())
       await change({ kind: 'parameters', block: block.name, values: { [rule.name]: text } })
   }
@@ -179,7 +179,7 @@ interface SourceProps {
   line: number
 }
 
-/** The code, read-only, with the lines that errors name. */
+/** The source code, read-only; lines that errors name are marked. */
 function Source({ file, source, block, line: selectedLine }: SourceProps) {
   const findings = useStudio((s) => s.document?.findings)
   const inside = useStudio((s) => s.document?.inside)

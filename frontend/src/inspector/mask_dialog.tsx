@@ -71,7 +71,7 @@ function Mask({ onClose }: { onClose: () => void }) {
     })
   }, [inside, block, onClose])
   if (!rows) return null
-  const readable = rows.every(isReadable)
+  const valid = rows.every(hasValidRange)
   const apply = async () => {
     try {
       await attempt({ kind: 'mask', block, name: face.trim(), parameters: rows.map(declared) }, inside)
@@ -117,10 +117,10 @@ function Mask({ onClose }: { onClose: () => void }) {
           <Button variant="default" onClick={onClose}>
             Cancel
           </Button>
-          <Button variant="default" disabled={!readable} onClick={() => void apply()}>
+          <Button variant="default" disabled={!valid} onClick={() => void apply()}>
             Apply
           </Button>
-          <Button type="submit" disabled={!readable}>
+          <Button type="submit" disabled={!valid}>
             OK
           </Button>
         </Group>
@@ -166,7 +166,7 @@ function Rows({ rows, setRows }: { rows: Row[]; setRows: (rows: Row[]) => void }
         <RowFields
           key={row.key}
           row={row}
-          put={(change) => updateRow(row.key, change)}
+          update={(change) => updateRow(row.key, change)}
           first={k === 0}
           last={k === rows.length - 1}
           swap={(step) => swap(k, step)}
@@ -204,14 +204,14 @@ function AddRow({ rows, setRows }: { rows: Row[]; setRows: (rows: Row[]) => void
 
 interface RowProps {
   row: Row
-  put: (change: Partial<Row>) => void
+  update: (change: Partial<Row>) => void
   first: boolean
   last: boolean
   swap: (step: -1 | 1) => void
   remove: () => void
 }
 
-function RowFields({ row, put, first, last, swap, remove }: RowProps) {
+function RowFields({ row, update, first, last, swap, remove }: RowProps) {
   const robots = useStudio((s) => s.welcome?.robots) ?? []
   const field = (
     label: string,
@@ -225,8 +225,8 @@ function RowFields({ row, put, first, last, swap, remove }: RowProps) {
         aria-label={`${label} of ${row.name}`}
         value={row[key]}
         placeholder={placeholder}
-        error={key === 'range' && !isReadable(row)}
-        onChange={(event) => put({ [key]: event.currentTarget.value })}
+        error={key === 'range' && !hasValidRange(row)}
+        onChange={(event) => update({ [key]: event.currentTarget.value })}
         {...(mono ? { classNames: { input: 'typed' } } : {})}
         {...(key === 'name' && first ? { 'data-autofocus': true } : {})}
       />
@@ -236,7 +236,7 @@ function RowFields({ row, put, first, last, swap, remove }: RowProps) {
     label: string,
     data: string[] | typeof TYPES,
     value: string,
-    put: (value: string) => void,
+    update: (value: string) => void,
   ) => (
     <span role="cell">
       <NativeSelect
@@ -244,21 +244,21 @@ function RowFields({ row, put, first, last, swap, remove }: RowProps) {
         aria-label={`${label} of ${row.name}`}
         data={data}
         value={value}
-        onChange={(event) => put(event.currentTarget.value)}
+        onChange={(event) => update(event.currentTarget.value)}
       />
     </span>
   )
-  const value = (value: string) => put({ value })
+  const value = (value: string) => update({ value })
   const options = row.range
     .split(',')
     .map((word) => word.trim())
     .filter(Boolean)
-  const ranged = isRanged(row.kind)
+  const hasRange = typeHasRange(row.kind)
   return (
     <div role="row">
       {field('Name', 'name', true)}
       {choose('Kind', TYPES, row.kind, (kind) =>
-        put({ kind: kind as Row['kind'], ...initialValues(kind, robots) }),
+        update({ kind: kind as Row['kind'], ...initialValues(kind, robots) }),
       )}
       {row.kind === 'boolean'
         ? choose('Default', ['true', 'false'], row.value, value)
@@ -272,8 +272,8 @@ function RowFields({ row, put, first, last, swap, remove }: RowProps) {
                 value,
               )
             : field('Default', 'value', true)}
-      {ranged ? field('Unit', 'unit') : <span role="cell" />}
-      {ranged ? (
+      {hasRange ? field('Unit', 'unit') : <span role="cell" />}
+      {hasRange ? (
         field('Range', 'range', true, '0 … 10, > 0')
       ) : row.kind === 'choice' ? (
         field('Choices', 'range', false, 'one, another')
@@ -392,10 +392,11 @@ function bounds(range: string): Pick<MaskParameter, 'minimum' | 'above' | 'maxim
   return limits
 }
 
-/** Whether parameters of this type have bounds, and whether the bounds of a row are valid. */
-const isRanged = (kind: Row['kind']): boolean => kind === 'number' || kind === 'array' || kind === 'integer'
-const isReadable = ({ kind, range }: Row): boolean =>
-  !isRanged(kind) || !Object.values(bounds(range)).some(Number.isNaN)
+/** Whether parameters of a type have bounds. */
+const typeHasRange = (kind: Row['kind']): boolean =>
+  kind === 'number' || kind === 'array' || kind === 'integer'
+const hasValidRange = ({ kind, range }: Row): boolean =>
+  !typeHasRange(kind) || !Object.values(bounds(range)).some(Number.isNaN)
 
 function declared({ was, name, kind, value, unit, range, doc }: Row): MaskParameter {
   const typeFields =
@@ -406,7 +407,7 @@ function declared({ was, name, kind, value, unit, range, doc }: Row): MaskParame
             .map((word) => word.trim())
             .filter(Boolean),
         }
-      : isRanged(kind)
+      : typeHasRange(kind)
         ? { ...bounds(range), unit: unit.trim() }
         : {}
   return {

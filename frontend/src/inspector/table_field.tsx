@@ -11,7 +11,7 @@ interface Props {
   rule: ParameterRule
   /** The choice as JSON, or `''` for rows that the diagram contains. */
   text: string
-  /** The rows that the diagram contains, in words. */
+  /** Description of the rows that the diagram contains. */
   rows: string
   focus: boolean
   onText: (text: string) => void
@@ -24,7 +24,7 @@ export function tableText(value: unknown): string {
   return source ? JSON.stringify({ file: source, time, columns } satisfies TableChoice) : ''
 }
 
-/** The words for the rows of a value from the server. */
+/** The description of the rows of a value from the server. */
 export const tableRows = (value: unknown): string => (value as { table: string }).table
 
 /** A parameter that takes its values from the columns of a file of the project folder. */
@@ -70,7 +70,7 @@ export function TableField({ rule, text, rows, focus, onText, onFault }: Props) 
   )
 }
 
-/** The preview of a choice; the last one stays while the next one is read. */
+/** The preview of a choice; the previous preview is shown until the next one arrives. */
 function usePreview(text: string) {
   const [state, setState] = useState<{ of: string; preview: TablePreview | null; refusal: Refusal | null }>({
     of: '',
@@ -109,7 +109,7 @@ function Columns({ preview, choice, choose }: ColumnsProps) {
   const toggle = (name: string) => {
     const names = new Set(chosen)
     if (!names.delete(name)) names.add(name)
-    // In the order of the file.
+    // The columns have the order of the file.
     choose({ time, columns: values.filter((column) => names.has(column.name)).map((column) => column.name) })
   }
   return (
@@ -147,13 +147,13 @@ function Columns({ preview, choice, choose }: ColumnsProps) {
   )
 }
 
-/** The name with the unit, if the name does not contain it, and what the column contains if not numbers. */
+/** The name, with the unit if the name does not contain it, and the type of a column without numbers. */
 function titleOf({ name, unit, kind }: TableColumn): string {
   const title = unit && !name.includes(unit) ? `${name} [${unit}]` : name
   return kind === 'number' ? title : `${title} (${kind})`
 }
 
-/** First rows, plot, and how the file was interpreted. */
+/** Plot, first rows, and notes on the interpretation of the file. */
 function Preview({ preview }: { preview: TablePreview }) {
   const { time, chosen, rows, count, spacing, times, notes } = preview
   const columnCount = rows[0]?.length ?? 0

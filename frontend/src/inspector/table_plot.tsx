@@ -1,10 +1,11 @@
 import type { TablePreview } from '../protocol'
 
+/** Size of the plot, px. */
 const WIDTH = 560
 const HEIGHT = 96
 const COLOURS = 8
 
-/** A small plot of the values over time, each scaled to the same common range. */
+/** A small plot of all values over time, on one common scale. */
 export function TablePlot({ preview: { times, curves, chosen } }: { preview: TablePreview }) {
   const values = curves.flat()
   const [left, right] = [times[0] ?? 0, times.at(-1) ?? 1]

@@ -1,7 +1,8 @@
 import { useEffect, useState } from 'react'
 import { Refusal } from '../connection'
 import { showDialog, useDialogs } from '../dialogs'
-import { showInTab, useTabs } from '../documents/tabs'
+import { showPart } from '../documents/bookmarks'
+import { showInTab, showTab, useTabs } from '../documents/tabs'
 import { groupedResults, type SearchedDocument, type SearchResult } from '../model/search_results'
 import { tabLabels, type Tab } from '../model/tabs'
 import type { FoundBlock } from '../protocol'
@@ -11,7 +12,7 @@ import { PickList } from './pick_list'
 
 const DEBOUNCE_MS = 80
 
-/** Search of the blocks of all open diagrams by name, type or parameter value; Enter shows the block. */
+/** Search of the blocks and bookmarks of all open diagrams, and of open robots; Enter shows the result. */
 export function Find() {
   const opened = useDialogs((s) => s.open === 'find')
   const typed = useDialogs((s) => s.typed)
@@ -43,30 +44,37 @@ export function Find() {
       emptyText={
         typed.trim()
           ? `Nothing in ${where} matches “${typed}”.`
-          : `Names, types and values of all blocks of ${where}, in every subsystem.`
+          : `Names, types and values of all blocks, and bookmarks, of ${where}, in every subsystem.`
       }
-      items={results.map(({ key, group, found: { inside, name, title, match } }) => ({
+      items={results.map(({ key, group, found: { inside, name, title, match, part } }) => ({
         key,
         group,
         title: name,
-        note: [title, match, inside.length ? `in ${inside.join(' › ')}` : ''].filter(Boolean).join(' · '),
+        note: [part ? 'Bookmark' : title, match, inside.length ? `in ${inside.join(' › ')}` : '']
+          .filter(Boolean)
+          .join(' · '),
       }))}
       onPick={(index) => {
         const result = results[index]
-        if (result) void showInTab(result.document, result.found.inside, result.found.name)
+        if (!result) return
+        const { inside, name, part } = result.found
+        if (result.document.kind === 'robot') void showTab(result.document)
+        else void (part ? showPart(result.document, inside, part) : showInTab(result.document, inside, name))
       }}
     />
   )
 }
 
-/** Search all diagrams of the page. */
+/** Search all diagrams of the page, and its robots by name. */
 async function search(text: string): Promise<SearchResult<Tab>[]> {
   const { tabs } = useTabs.getState()
   const labels = tabLabels(tabs)
   const searched = await Promise.all(
     tabs.map(async (tab, index): Promise<SearchedDocument<Tab>> => {
-      const found = tab.kind === 'diagram' ? await foundIn(tab.document, text) : []
-      return { document: tab, label: labels[index]!, found }
+      const label = labels[index]!
+      const found =
+        tab.kind === 'diagram' ? await foundIn(tab.document, text) : robotNamed(label, tab.path ?? '', text)
+      return { document: tab, label, found }
     }),
   )
   const inFront = useRobotEditor.getState().current ?? useStudio.getState().document?.state.document
@@ -74,6 +82,13 @@ async function search(text: string): Promise<SearchResult<Tab>[]> {
     searched,
     tabs.findIndex(({ document }) => document === inFront),
   )
+}
+
+/** The robot of a tab, if its name and the path of its file contain every word. */
+function robotNamed(name: string, path: string, text: string): FoundBlock[] {
+  const words = text.toLowerCase().split(/\s+/).filter(Boolean)
+  const matches = words.every((word) => `${name} ${path}`.toLowerCase().includes(word))
+  return matches ? [{ inside: [], name, title: 'Robot', match: '' }] : []
 }
 
 /** The results in one diagram; none if it was closed meanwhile. */

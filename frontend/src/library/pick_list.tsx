@@ -42,10 +42,10 @@ export function PickList({
   const [activeIndex, setActiveIndex] = useState(0)
   const listElement = useRef<HTMLDivElement>(null)
   useEffect(() => setActiveIndex(0), [typed, opened])
-  useEffect(
-    () => listElement.current?.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: 'nearest' }),
-    [activeIndex],
-  )
+  useEffect(() => {
+    // A block: in new browsers the result is a promise, which is not a cleanup function of the effect.
+    listElement.current?.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: 'nearest' })
+  }, [activeIndex])
   const pick = (index: number) => {
     if (!items[index]) return
     onClose()

@@ -1,11 +1,12 @@
 import type { WireLines } from '../protocol'
-import { corners, isFlat, type Point } from './wire_lines'
+import { corners, isHorizontal, type Point } from './wire_lines'
 
 /**
  * User-drawn routes: the dragged segments of a wire are stored as `bends`, the alternating coordinates of
  * the segments (see `bent` in `armblocks.drawing.wires`).
  */
 
+/** Length of the part of a dragged segment that remains at its port, px. */
 const STUB = 15
 
 /** The complete route to a target: its own path, preceded by the part shared with another path. */
@@ -45,7 +46,7 @@ function isOnSegment(p: Point, a: Point, b: Point): boolean {
  */
 function innerCoordinates(route: readonly Point[]): number[] {
   const inner: number[] = []
-  for (let k = 1; k < route.length - 2; k++) inner.push(isFlat(route, k) ? route[k]![1] : route[k]![0])
+  for (let k = 1; k < route.length - 2; k++) inner.push(isHorizontal(route, k) ? route[k]![1] : route[k]![0])
   return inner
 }
 
@@ -60,7 +61,7 @@ export function dragged(route: readonly Point[], segment: number, level: number)
     inner[segment - 1] = level
     return straightened(inner)
   }
-  const axis = isFlat(route, segment) ? 0 : 1
+  const axis = isHorizontal(route, segment) ? 0 : 1
   const along = (from: Point, to: Point) => from[axis] + STUB * Math.sign(to[axis] - from[axis])
   const leaving = along(route[0]!, route[1]!)
   const arriving = along(route[last + 1]!, route[last]!)

@@ -58,7 +58,7 @@ function sampledDifference(a: Signal, b: Signal, element: number): Difference {
   return { time: Float64Array.from(times), values: Float64Array.from(values), largest, at: timeOfLargest }
 }
 
-/** The element of a signal with the largest difference. */
+/** The largest difference in all elements of a signal, and its time (s). */
 export function largestDifference(
   baseline: RunSamples,
   compared: RunSamples,

@@ -1,6 +1,6 @@
 import type { PlotColumns } from './trace'
 
-/** Line style of a trace: colour for the canvas, and width and dashes in CSS px. */
+/** Line style of a trace: colour for the canvas, and dashes, px. */
 export interface Stroke {
   colour: string
   dash: number[]
@@ -16,10 +16,11 @@ export interface DrawnPlot {
   valToPos: (value: number, scale: string, onCanvas: boolean) => number
 }
 
+/** Line width, CSS px. */
 const WIDTH = 1.5
 
 /**
- * Draws the new samples of a run onto an existing plot, so that a frame costs only its new samples. The
+ * Draws the new samples of a run onto an existing plot, which is not redrawn. The
  * lines equal those of uPlot, which redraws the whole plot when anything else changes.
  */
 export class IncrementalDrawing {

@@ -1,6 +1,6 @@
 const ARROWS: Record<string, string> = { '→': 'arrowright', '←': 'arrowleft' }
 
-/** Whether exactly these keys are pressed, all of them with Ctrl or Alt. */
+/** Whether exactly the keys of a combination are pressed; combinations without Ctrl or Alt never match. */
 export function arePressed(
   keys: string,
   event: Pick<KeyboardEvent, 'key' | 'code' | 'ctrlKey' | 'metaKey' | 'altKey' | 'shiftKey'>,

@@ -14,7 +14,11 @@ export interface Measures {
   overshoot: number
 }
 
-const SETTLED_PART = 0.05
+/**
+ * A trace has settled if it stays near its last value during the final fraction of the window. The allowed
+ * deviation is a fraction of the change from the first to the last value.
+ */
+const FINAL_FRACTION = 0.05
 const SETTLED_BAND = 0.02
 
 /**
@@ -62,7 +66,7 @@ export function measures(
   }
 }
 
-/** Rise time and overshoot, if the last value differs from the first. */
+/** Rise time and overshoot; NaN if the trace has not settled, or if its first and last values are equal. */
 function step(
   time: Float64Array,
   values: Float64Array,
@@ -74,7 +78,7 @@ function step(
   const last = values[count - 1]!
   const change = last - first
   const band = SETTLED_BAND * Math.abs(change)
-  const finalPart = time[count - 1]! - SETTLED_PART * (time[count - 1]! - time[0]!)
+  const finalPart = time[count - 1]! - FINAL_FRACTION * (time[count - 1]! - time[0]!)
   for (let k = count - 1; k >= 0 && time[k]! >= finalPart; k--)
     if (!(Math.abs(values[k]! - last) <= band)) return { riseTime: NaN, overshoot: NaN }
   if (!(Math.abs(change) > 1e-9 * Math.max(Math.abs(first), Math.abs(last))) || change === 0)

@@ -16,7 +16,7 @@ export function activeSet(table: ParameterSetTable, trialValues: Values): string
   return Object.keys(table.sets).find((name) => sameValues(table.sets[name]!, trialValues))
 }
 
-/** The names of the sets in the order in which people read them. */
+/** The names of the sets in alphabetical order, in which digits are compared as numbers. */
 export function setNames(table: ParameterSetTable): string[] {
   return Object.keys(table.sets).toSorted((a, b) => a.localeCompare(b, undefined, { numeric: true }))
 }
@@ -56,7 +56,7 @@ export function setRows(table: ParameterSetTable, names: string[]): Row[] {
   })
 }
 
-/** The first reason for which a set cannot be applied, as trial values or at all. */
+/** The first reason why a set cannot be applied to the model or, with `asTrial`, tried. */
 export function obstacle(table: ParameterSetTable, name: string, asTrial: boolean): string | undefined {
   const fault = Object.entries(table.faults[name] ?? {})[0]
   if (fault) return `${fault[0]}: ${fault[1]}`
@@ -68,8 +68,8 @@ export function obstacle(table: ParameterSetTable, name: string, asTrial: boolea
 }
 
 /**
- * The values that a run in progress must get so that exactly `next` is tried: those of `next`, and the
- * model's values of parameters that are no longer tried.
+ * The parameter changes of a run in progress that replace the trial values `before` by `next`. Parameters
+ * that are no longer tried return to the values of the model.
  */
 export function changedTrials(
   before: Values,

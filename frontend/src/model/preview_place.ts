@@ -5,7 +5,7 @@ const GAP = 10
 
 /**
  * Position of a preview beside a block: below it, else above it, else on the side with more room. It never
- * covers the block, so that the pointer reaches it.
+ * covers the block, so that the block can still be clicked.
  */
 export function previewPlace(
   block: Rectangle,

@@ -85,7 +85,7 @@ export function wireAt(
 ): WireSegment | undefined {
   const present = new Set(wires.map(wireKey))
   for (const { id, source, sourceHandle, target, targetHandle, data } of edges) {
-    // A wire that was closed when the block was disconnected does not take the block again.
+    // Skip the preview of a wire between the former neighbours of a disconnected block.
     if (!present.has(id)) continue
     const path = data?.path ?? []
     for (let k = 1; k < path.length; k++) {

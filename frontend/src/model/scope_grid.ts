@@ -5,7 +5,7 @@ export interface ScopeGrid {
   rowHeight: number
 }
 
-/** Ratio of width to height at which a chart is read best. */
+/** Preferred ratio of the width to the height of a chart. */
 const ASPECT_RATIO = 1.7
 /** Smallest size of a chart, px. */
 const MIN_WIDTH = 220
@@ -13,7 +13,7 @@ const MIN_HEIGHT = 150
 /** Height of the visible part of a row that is reached by scrolling: its titles, px. */
 const NEXT_ROW_HEIGHT = 26
 
-/** The grid with the largest charts that fills a panel; `leastWidth` is larger with tables of measures. */
+/** The grid with the largest charts that fills a panel; `minWidth` is larger with tables of measures. */
 export function scopeGrid(
   count: number,
   width: number,

@@ -33,7 +33,7 @@ export function groupedResults<Document>(
     found.map((one) => ({
       document,
       found: one,
-      key: [label, ...one.inside, one.name].join('/'),
+      key: [label, ...one.inside, one.part ? ' ' : '', one.name].join('/'),
       group: searched.length > 1 ? `${label} · ${countText(found.length)}` : '',
     })),
   )

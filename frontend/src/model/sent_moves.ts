@@ -24,7 +24,7 @@ interface Sheet {
 export const pathOf = (inside: readonly string[]): string => inside.join('/')
 
 /** The sent moves that a state of the document from the server does not contain yet, in order. */
-export function outstanding(sent: readonly SentMove[], sheet: Sheet): SentMove[] {
+export function outstandingMoves(sent: readonly SentMove[], sheet: Sheet): SentMove[] {
   const { document, version } = sheet.state
   const remaining = sent.filter(
     (sentMove) => sentMove.document !== document || sentMove.version === null || sentMove.version > version,

@@ -91,7 +91,7 @@ export interface Extremes {
 
 /**
  * Minimum and maximum of each trace in each of `width` equal intervals of a time window: no more points than
- * visible pixels, and no lost peak. Rows of the same window that `before` contains are not computed again.
+ * visible pixels, and every peak is visible. Rows of the same window in `previous` are not computed again.
  */
 export function extremes(
   traces: { time: Float64Array; values: Float64Array }[],
@@ -162,8 +162,8 @@ export function valueBefore(trace: { time: Float64Array; values: Float64Array },
 }
 
 /**
- * Traces with a common column of times. A time occurs as often as in the trace with most rows there: at a
- * jump twice. A trace with one row there has its value in both, a trace without one has none.
+ * Traces with a common column of times. Each time has as many rows as the trace with the most samples at this
+ * time: two at a jump. A trace with one sample has its value in both rows; a trace without one has no value.
  */
 export function withCommonTimes(traces: { time: Float64Array; values: Float64Array }[]): PlotColumns {
   const position = traces.map(() => 0)

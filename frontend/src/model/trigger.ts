@@ -2,10 +2,66 @@
 export type Edge = 'rising' | 'falling' | 'either'
 
 /**
- * What is shown: `normal` shows the window of the last trigger, `auto` also the last samples while there is
- * no trigger, and `single` the first trigger after the scope was armed.
+ * The displayed window: `normal` shows the window of the last trigger, `auto` also the last samples while
+ * there is no trigger, and `single` the first trigger after the scope was armed.
  */
 export type Mode = 'normal' | 'auto' | 'single'
+
+/** The settings of the trigger of a document; the signal is a channel of its runs and an element of it. */
+export interface TriggerSettings {
+  on: boolean
+  channel: string
+  element: number
+  edge: Edge
+  /** In the SI unit of the signal. */
+  level: number
+  mode: Mode
+  /** Width of the window, s, and the part of it before the trigger. */
+  span: number
+  position: number
+  /** Time after a trigger during which others are ignored, s. */
+  holdOff: number
+}
+
+export const INITIAL_TRIGGER: TriggerSettings = {
+  on: false,
+  channel: '',
+  element: 0,
+  edge: 'rising',
+  level: 0,
+  mode: 'normal',
+  span: 1,
+  position: 0.5,
+  holdOff: 0,
+}
+
+/** The settings of a trigger, without other properties of the object. */
+export function settingsOf(trigger: TriggerSettings): TriggerSettings {
+  const { on, channel, element, edge, level, mode, span, position, holdOff } = trigger
+  return { on, channel, element, edge, level, mode, span, position, holdOff }
+}
+
+const EDGES: unknown[] = ['rising', 'falling', 'either'] satisfies Edge[]
+const MODES: unknown[] = ['normal', 'auto', 'single'] satisfies Mode[]
+
+/** Whether data that the browser stored are valid settings of a trigger. */
+export function isTriggerSettings(stored: unknown): stored is TriggerSettings {
+  if (typeof stored !== 'object' || stored === null) return false
+  const { on, channel, element, edge, level, mode, span, position, holdOff } = stored as TriggerSettings
+  return (
+    typeof on === 'boolean' &&
+    typeof channel === 'string' &&
+    [element, level, span, position, holdOff].every(Number.isFinite) &&
+    Number.isInteger(element) &&
+    element >= 0 &&
+    EDGES.includes(edge) &&
+    MODES.includes(mode) &&
+    span > 0 &&
+    position >= 0 &&
+    position <= 1 &&
+    holdOff >= 0
+  )
+}
 
 interface Samples {
   time: Float64Array
@@ -16,7 +72,7 @@ interface Samples {
  * Times at which a trace crosses a level, found as its samples arrive.
  *
  * A rising crossing begins below the level and ends at or above it; a falling one begins above it and ends
- * at or below it. A trace that then rests at the level does not trigger again. Between samples the time is
+ * at or below it. A trace that then remains at the level does not trigger again. Between samples the time is
  * interpolated linearly, as the trace is drawn; a jump, which has two samples of the same time, triggers
  * once at this time. After a crossing, others are ignored for the hold-off time.
  */
@@ -52,7 +108,7 @@ export class TriggerDetector {
     const rises = this.armedToRise && value >= level
     if (crosses && (edge === 'either' || (edge === 'rising') === rises)) {
       const part = (level - lastValue) / (value - lastValue)
-      // The step between infinite values has no slope: it is a jump at its end.
+      // No time can be interpolated between infinite values: the crossing is at the second sample.
       const at = Number.isFinite(part) ? lastTime + part * (time - lastTime) : time
       if (!(at < (this.times.at(-1) ?? -Infinity) + this.holdOff)) this.times.push(at)
     }
@@ -83,8 +139,8 @@ interface Choice {
 }
 
 /**
- * The index of the displayed trigger: the last one whose window is complete, so that a live picture is calm.
- * The first one is shown at once.
+ * The index of the displayed trigger: the last one whose window is complete, so that the picture of a running
+ * simulation changes once for each trigger. The first one is shown at once.
  */
 export function shownTrigger(times: number[], choice: Choice): number | null {
   const { mode, span, position, armedAt, chosen, end } = choice

@@ -9,8 +9,8 @@ export interface LabelPosition {
 
 /** Distance of the label from the wire, px. */
 export const WIRE_DISTANCE = 4
-/** A label that is narrower is placed below the wire if there is more room. */
-const ENOUGH_WIDTH = 80
+/** Minimum free width above a wire, px; a label with less is placed below if there is more room. */
+const MIN_WIDTH_ABOVE = 80
 /** Width of a label in a free part of the sheet, px. */
 const MAX_WIDTH = 400
 
@@ -18,11 +18,11 @@ const MAX_WIDTH = 400
 export function labelPosition(
   { x, y }: { x: number; y: number },
   direction: 1 | -1,
-  { height, legible = 1 }: { height: number; legible?: number },
+  { height, scale = 1 }: { height: number; scale?: number },
   obstacles: readonly Rectangle[],
 ): LabelPosition {
   const above = freeWidth(x, y - WIRE_DISTANCE - height, height, direction, obstacles)
-  if (above >= ENOUGH_WIDTH * legible) return { below: false, width: above }
+  if (above >= MIN_WIDTH_ABOVE * scale) return { below: false, width: above }
   const below = freeWidth(x, y + WIRE_DISTANCE, height, direction, obstacles)
   return below > above ? { below: true, width: below } : { below: false, width: above }
 }

@@ -5,7 +5,7 @@ import { blockOf, portOf, type Places } from './wires'
 
 export type Point = readonly [x: number, y: number]
 
-/** The lines of the wires of a sheet, by output. */
+/** The lines of the wires of a sheet, by source port. */
 export type Lines = Readonly<Record<string, WireLines>>
 
 /** A port on the sheet; `dx`, `dy` is the direction away from its block. */
@@ -16,7 +16,8 @@ export interface PortPosition {
   dy: number
 }
 
-/** Allowed offset of a line from the centre of a port, if the offset makes the line straight, px. */
+/** Maximum distance between the end of a line and the centre of its port, px: the router shifts ends to make
+ * lines straight. */
 const PORT_TOLERANCE = 1.6
 
 /** The positions of both ports of a wire; undefined if one of them does not exist. */
@@ -68,12 +69,12 @@ export function stretchedToPorts(
 ): Point[] {
   if (path.length < 2) return [pointOf(ends[0]), pointOf(ends[1])]
   const points = [...path]
-  const flat = isFlat(points, 0)
+  const horizontal = isHorizontal(points, 0)
   if (points.length < 4) {
     const [[ax, ay], [bx, by]] = [isBranch ? points[0]! : pointOf(ends[0]), pointOf(ends[1])]
     const [mx, my] = [(ax + bx) / 2, (ay + by) / 2]
     return corners(
-      flat
+      horizontal
         ? [
             [ax, ay],
             [mx, ay],
@@ -94,14 +95,14 @@ export function stretchedToPorts(
 
 /** A path with another last point; the last segment keeps its direction. */
 function withLastPoint(path: Point[], end: Point): Point[] {
-  const flat = isFlat(path, path.length - 2)
+  const horizontal = isHorizontal(path, path.length - 2)
   const [x, y] = path.at(-2)!
-  return [...path.slice(0, -2), flat ? [x, end[1]] : [end[0], y], end]
+  return [...path.slice(0, -2), horizontal ? [x, end[1]] : [end[0], y], end]
 }
 
 const pointOf = ({ x, y }: PortPosition): Point => [x, y]
 
-export const isFlat = (path: readonly Point[], segment: number): boolean =>
+export const isHorizontal = (path: readonly Point[], segment: number): boolean =>
   path[segment]![1] === path[segment + 1]![1]
 
 /** The points without repetitions and without points on a straight line between their neighbours. */
@@ -122,9 +123,10 @@ export function corners(points: Point[]): Point[] {
   return result
 }
 
-const ROUNDING = 5
+/** Radius of the round corners, px. */
+const CORNER_RADIUS = 5
 
-/** The path as SVG: straight segments with small round corners, which are sharp at branches. */
+/** The path as SVG: straight segments with round corners, but sharp corners at branches (`dots`). */
 export function svgPath(points: readonly Point[], dots: readonly Point[] = []): string {
   const [first] = points
   if (!first) return ''
@@ -135,7 +137,7 @@ export function svgPath(points: readonly Point[], dots: readonly Point[] = []): 
       text += `L${corner[0]} ${corner[1]}`
       continue
     }
-    const radius = Math.min(ROUNDING, length(before, corner) / 2, length(corner, after) / 2)
+    const radius = Math.min(CORNER_RADIUS, length(before, corner) / 2, length(corner, after) / 2)
     const [ax, ay] = pointTowards(corner, before, radius)
     const [bx, by] = pointTowards(corner, after, radius)
     text += `L${ax} ${ay}Q${corner[0]} ${corner[1]} ${bx} ${by}`
@@ -144,6 +146,7 @@ export function svgPath(points: readonly Point[], dots: readonly Point[] = []): 
   return `${text}L${last[0]} ${last[1]}`
 }
 
+/** The distance of two points on a horizontal or vertical segment, px. */
 const length = (a: Point, b: Point) => Math.abs(a[0] - b[0]) + Math.abs(a[1] - b[1])
 
 function pointTowards(a: Point, b: Point, distance: number): Point {

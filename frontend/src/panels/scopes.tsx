@@ -2,11 +2,14 @@ import { deferred } from '../deferred'
 import type { Panel } from '../panel'
 import { useStudio } from '../store'
 
-const Scopes = deferred(async () => (await import('../scopes/scopes')).Scopes, 'Loading the scopes …')
+const Scopes = deferred(async () => {
+  await import('../scopes/stored_triggers')
+  return (await import('../scopes/scopes')).Scopes
+}, 'Loading the scopes …')
 
 function ScopesPanel() {
-  const ran = useStudio((s) => s.run !== null)
-  return ran ? <Scopes /> : <p className="empty">Run the model (Ctrl+Enter) to see its scopes here.</p>
+  const hasRun = useStudio((s) => s.run !== null)
+  return hasRun ? <Scopes /> : <p className="empty">Run the model (Ctrl+Enter) to see its scopes here.</p>
 }
 
 export const panel: Panel = {

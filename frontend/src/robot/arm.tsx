@@ -76,18 +76,18 @@ function SolidBody({ geometry, material }: Body) {
   )
 }
 
-/** A ghost is drawn slightly behind its depth, so that it never flickers through the arm itself. */
-const BEHIND = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 }
+/** Depth offset of a ghost, so that coincident surfaces of the arm hide it without flicker. */
+const GHOST_OFFSET = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 }
 
 /** Depth is drawn before colour, so that the transparent bodies of a ghost do not add up. */
 function GhostBody({ geometry, colour }: { geometry: BufferGeometry; colour: string }) {
   return (
     <>
       <mesh geometry={geometry} renderOrder={1}>
-        <meshBasicMaterial colorWrite={false} transparent {...BEHIND} />
+        <meshBasicMaterial colorWrite={false} transparent {...GHOST_OFFSET} />
       </mesh>
       <mesh geometry={geometry} renderOrder={2}>
-        <meshLambertMaterial color={colour} transparent opacity={0.22} depthWrite={false} {...BEHIND} />
+        <meshLambertMaterial color={colour} transparent opacity={0.22} depthWrite={false} {...GHOST_OFFSET} />
       </mesh>
     </>
   )

@@ -23,6 +23,7 @@ export interface CameraHandle {
   zoom: (factor: number) => void
 }
 
+/** Factor by which the view is larger than the visible items. */
 const MARGIN = 1.14
 
 /** The corners of the bounding boxes of the bodies, in the axes of their links. */
@@ -42,7 +43,7 @@ function cornersOf(arm: Object3D): Vector3[] {
   return corners
 }
 
-/** Corners of everything to be shown: the arm, the positions reached in a run, the floor below the base. */
+/** Corners of all visible items: the arm, the positions reached in a run, the floor below the base. */
 function visibleCorners(
   arm: Object3D,
   floor: number,
@@ -57,7 +58,7 @@ function visibleCorners(
 }
 
 /**
- * The position of a camera that looks at `centre` and sees all corners; its distance is at least `nearest`.
+ * The position of a camera that looks at `centre` and sees all corners, at least at `minDistance`.
  */
 function eyeOf(
   corners: Vector3[],

@@ -7,7 +7,7 @@ import './robot.css'
 
 const MAX_BYTES = 5 * 2 ** 20
 
-/** Files dropped anywhere on the page: robot scripts, robots, diagrams. */
+/** Opens the files that are dropped on the page: robot scripts, robots, diagrams, tables. */
 export function DropZone() {
   const [dragging, setDragging] = useState(false)
   useEffect(() => {
@@ -43,8 +43,8 @@ export function DropZone() {
   return (
     <div className="drop-zone">
       <IconFileImport size={34} />
-      <Text fw={600}>Drop it to open it</Text>
-      <Text size="sm">a robot script (.m), a robot or a diagram (.json)</Text>
+      <Text fw={600}>Drop the file to open it</Text>
+      <Text size="sm">a robot (.urdf), a robot script (.m), a robot or a diagram (.json)</Text>
       <Text size="sm">measurements (.csv, .parquet, .mat, .npz) become a block of the sheet</Text>
     </div>
   )
@@ -68,7 +68,7 @@ async function base64Of(file: File): Promise<string | null> {
     refuse({
       what: `the file has ${(file.size / 2 ** 20).toFixed(1)} MiB, and 5 MiB can be dropped`,
       where: file.name,
-      fix: 'put it into the folder of the studio and choose it there',
+      fix: 'put it into the project folder and choose it there',
     })
     return null
   }

@@ -5,7 +5,7 @@ export type { RobotScene, SceneJoint }
 
 export type Material = RobotScene['bodies'][number]['material']
 
-/** Poses of an arm: 16 numbers for each row, row by row; undefined while they are unknown. */
+/** Entry `k` (0 to 15, row by row) of the 4 × 4 pose matrix with the index `row`. */
 export type Poses = (row: number, k: number) => number
 
 /** Poses in the format of the server: (rows, 4, 4). */

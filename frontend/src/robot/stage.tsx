@@ -14,7 +14,7 @@ import { ToolPath, type ToolPathPoints } from './tool_path'
 import { toggle, useViewOptions } from './view_options'
 import { armEntries, ViewTools } from './view_tools'
 
-const KEYS_IN_WORDS =
+const KEY_HELP =
   'Arrow keys turn the view, plus and minus bring it nearer or farther, space shows all of the arm.'
 
 const COLOURS = {
@@ -46,7 +46,8 @@ interface StageProps {
   scene: RobotScene
   poses: () => Poses | undefined
   /**
-   * Changes with the poses, with a call of `scheduleFrame`; an unchanged scene is not redrawn.
+   * A text that changes with the poses; the caller then calls `scheduleFrame`. An unchanged scene is not
+   * redrawn.
    */
   state: () => string
   path?: () => ToolPathPoints | undefined
@@ -69,6 +70,7 @@ interface StageProps {
   children?: React.ReactNode
 }
 
+/** Rotation of the view by one key press, rad. */
 const TURN = Math.PI / 24
 const noState = () => ''
 
@@ -77,10 +79,10 @@ export function Stage(props: StageProps) {
   const { scene, poses, state, drawing, drawn, playForVideo, children, entries } = props
   const scheme = useComputedColorScheme('light')
   const camera = useRef<CameraHandle>(null)
-  const shot = useRef<Rendering | null>(null)
+  const rendering = useRef<Rendering | null>(null)
   const [hasWebGlSupport] = useState(hasWebGl)
   const tools = {
-    onPicture: () => savePicture(shot, scene.name),
+    onPicture: () => savePicture(rendering, scene.name),
     hasPath: Boolean(props.path),
     hasGhosts: Boolean(props.ghosts),
     onToggle: toggle,
@@ -118,7 +120,7 @@ export function Stage(props: StageProps) {
       <div
         className="stage"
         role="application"
-        aria-label={`The robot ${scene.name}. ${KEYS_IN_WORDS}`}
+        aria-label={`The robot ${scene.name}. ${KEY_HELP}`}
         tabIndex={0}
         onKeyDown={onKeyDown}
         {...menus}
@@ -136,13 +138,13 @@ export function Stage(props: StageProps) {
           }}
           aria-hidden
         >
-          <StageContents {...props} scheme={scheme} camera={camera} shot={shot} />
+          <StageContents {...props} scheme={scheme} camera={camera} rendering={rendering} />
         </Canvas>
       </div>
       <ViewTools
         camera={camera}
         playForVideo={playForVideo && (() => playForVideo())}
-        rendering={shot}
+        rendering={rendering}
         name={scene.name}
         {...tools}
       >
@@ -156,7 +158,7 @@ export function Stage(props: StageProps) {
 interface StageContentsProps extends StageProps {
   scheme: 'light' | 'dark'
   camera: React.RefObject<CameraHandle | null>
-  shot: React.RefObject<Rendering | null>
+  rendering: React.RefObject<Rendering | null>
 }
 
 function StageContents({
@@ -169,7 +171,7 @@ function StageContents({
   extentKey,
   scheme,
   camera,
-  shot,
+  rendering,
 }: StageContentsProps) {
   const options = useViewOptions()
   const bodies = useBodies(scene)
@@ -185,9 +187,9 @@ function StageContents({
   const world = useThree((s) => s.scene)
   const eye = useThree((s) => s.camera)
   useEffect(() => {
-    shot.current = { gl, draw: () => gl.render(world, eye) }
-    return () => void (shot.current = null)
-  }, [gl, world, eye, shot])
+    rendering.current = { gl, draw: () => gl.render(world, eye) }
+    return () => void (rendering.current = null)
+  }, [gl, world, eye, rendering])
   const overlay = { scene, poses, dark }
   return (
     <>
@@ -237,7 +239,7 @@ function StageContents({
   )
 }
 
-/** The environment map of reflections: created once for each colour scheme, because it costs many frames. */
+/** The environment map of reflections: created once for each colour scheme, because its rendering is slow. */
 const Surroundings = memo(function Surroundings({ dark }: { dark: boolean }) {
   return (
     <Environment resolution={64} environmentIntensity={dark ? 0.42 : 0.6}>
@@ -285,15 +287,15 @@ function useFloor(
     name: scene.name,
     floor: Infinity,
   })
-  const countedExtent = useRef('')
+  const lastExtentKey = useRef('')
   const step = (scene.reach > 1 ? 0.5 : 0.1) * Math.max(1, Math.round(0.12 * scene.reach))
   useFrame(() => {
     const now = poses()
     if (!now) return
     let low = Infinity
     for (let row = 1; row < scene.rows; row++) low = Math.min(low, now(row, 11))
-    if (extentKey && extentKey !== countedExtent.current) {
-      countedExtent.current = extentKey
+    if (extentKey && extentKey !== lastExtentKey.current) {
+      lastExtentKey.current = extentKey
       for (const [, , z] of extent?.() ?? []) low = Math.min(low, z)
     }
     low -= 0.06 * scene.reach

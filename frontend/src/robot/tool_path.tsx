@@ -9,7 +9,8 @@ const MAX_POINTS = 600
 const OLDEST_FRACTION = 0.22
 
 /**
- * The path of the tool up to now: number of points, a version that changes with the path, and each point.
+ * The path of the tool up to the displayed time: a key that changes with the path, the index of the last
+ * point, and the position of each point, m.
  */
 export interface ToolPathPoints {
   key: string

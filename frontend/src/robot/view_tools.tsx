@@ -54,7 +54,7 @@ export function armEntries(
 ): Entries {
   const options = useViewOptions.getState()
   return [
-    { title: 'Show all of the arm', keys: 'Space', run: () => camera?.fit() },
+    { title: 'Show the whole arm', keys: 'Space', run: () => camera?.fit() },
     {
       title: 'Camera',
       submenu: PRESET_LABELS.map(([preset, title]) => ({ title, run: () => camera?.look(preset) })),

@@ -1,7 +1,6 @@
 import { create } from 'zustand'
 import { scheduleFrame, onFrame } from '../frames'
 import { samples } from '../samples'
-import { useStudio } from '../store'
 
 interface Cursor {
   /** The time (s) that all views show; null is the end of the run. */
@@ -56,10 +55,4 @@ export function stepCursor(steps: number): void {
   let index = Math.min(Math.max(samples.indexAt(time) + steps, 0), samples.count - 1)
   while (steps < 0 && index > 0 && samples.time[index] === time) index-- // the other side of a jump
   if (index >= 0) useCursor.setState({ time: samples.time[index]!, playing: false })
-}
-
-/** Whether the run has ended. */
-export function ended(): boolean {
-  const { run } = useStudio.getState()
-  return run !== null && run.state !== 'running' && run.state !== 'paused'
 }

@@ -3,7 +3,7 @@ import { IconChevronDown } from '@tabler/icons-react'
 import { openParameterSets } from '../dialogs'
 import { activeSet, obstacle, setNames } from '../model/parameter_sets'
 import { useRuns } from './runs'
-import { tryExactly } from './trial_values'
+import { setTrialValues } from './trial_values'
 import { useParameterSets } from './use_parameter_sets'
 
 /** Tries the values of a parameter set, or those of the model. */
@@ -31,7 +31,7 @@ export function ParameterSetMenu() {
           </Button>
         </Menu.Target>
         <Menu.Dropdown className="context-menu" aria-label="Parameter sets">
-          <Menu.CheckboxItem checked={!tried} closeMenuOnClick onChange={() => void tryExactly({})}>
+          <Menu.CheckboxItem checked={!tried} closeMenuOnClick onChange={() => void setTrialValues({})}>
             Values of the model
           </Menu.CheckboxItem>
           {table &&
@@ -42,7 +42,7 @@ export function ParameterSetMenu() {
                 closeMenuOnClick
                 disabled={obstacle(table, name, true) !== undefined}
                 title={obstacle(table, name, true) ?? ''}
-                onChange={() => void tryExactly(table.sets[name]!)}
+                onChange={() => void setTrialValues(table.sets[name]!)}
               >
                 {name}
               </Menu.CheckboxItem>

@@ -1,3 +1,4 @@
+import './parameter_sets_dialog.css'
 import { ActionIcon, Button, Checkbox, Group, Menu, Modal, Text, TextInput, Tooltip } from '@mantine/core'
 import { IconAlertTriangle, IconDots, IconTrash } from '@tabler/icons-react'
 import { useState } from 'react'
@@ -9,7 +10,7 @@ import { activeSet, obstacle, setNames, setRows, type Cell, type Row } from '../
 import type { ParameterSetTable } from '../protocol'
 import { ask, useStudio } from '../store'
 import { useRuns } from './runs'
-import { tryExactly } from './trial_values'
+import { setTrialValues } from './trial_values'
 import { useParameterSets } from './use_parameter_sets'
 
 /** Named values of parameters that are saved with the model: save, try, apply, compare, rename, remove. */
@@ -29,7 +30,7 @@ export function ParameterSets() {
 }
 
 /** An edit of the whole model; a refusal is shown as a notice. */
-async function edited(edit: Edit): Promise<boolean> {
+async function applyToModel(edit: Edit): Promise<boolean> {
   const document = useStudio.getState().document?.state.document
   if (document === undefined) return false
   return (await ask({ kind: 'change', document, key: newKey(), inside: [], edit })) !== undefined
@@ -37,8 +38,8 @@ async function edited(edit: Edit): Promise<boolean> {
 
 /** Write a set into the model, as one undo step; a run in progress gets its values as well. */
 async function putIntoModel(table: ParameterSetTable, name: string): Promise<void> {
-  if (obstacle(table, name, true) === undefined) await tryExactly(table.sets[name]!)
-  if (await edited({ kind: 'apply_parameter_set', name })) useRuns.setState({ trialValues: {} })
+  if (obstacle(table, name, true) === undefined) await setTrialValues(table.sets[name]!)
+  if (await applyToModel({ kind: 'apply_parameter_set', name })) useRuns.setState({ trialValues: {} })
 }
 
 function Content() {
@@ -68,7 +69,7 @@ function SaveForm({ table }: { table: ParameterSetTable }) {
         event.preventDefault()
         if (!name.trim() || !count) return
         const edit = { kind: 'save_parameter_set' as const, name: name.trim(), values: trialValues }
-        void edited({ ...edit, of_others: complete }).then((done) => done && setName(''))
+        void applyToModel({ ...edit, all_parameters: complete }).then((done) => done && setName(''))
       }}
     >
       <Group gap="xs" align="end" wrap="nowrap">
@@ -171,7 +172,7 @@ function SetHead({ table, name, active, rename }: HeadProps) {
   const trialValues = useRuns((s) => s.trialValues)
   const noTrial = obstacle(table, name, true)
   const invalid = obstacle(table, name, false)
-  const apply = () => void tryExactly(active ? {} : table.sets[name]!)
+  const apply = () => void setTrialValues(active ? {} : table.sets[name]!)
   return (
     <div className="set-head">
       <span className="set-name" title={name}>
@@ -209,7 +210,7 @@ function SetHead({ table, name, active, rename }: HeadProps) {
             <Menu.Item
               disabled={!Object.keys(trialValues).length || active}
               onClick={() =>
-                void edited({
+                void applyToModel({
                   kind: 'save_parameter_set',
                   name,
                   values: { ...table.sets[name], ...trialValues },
@@ -221,7 +222,9 @@ function SetHead({ table, name, active, rename }: HeadProps) {
             </Menu.Item>
             <Menu.Item onClick={() => rename(name)}>Rename</Menu.Item>
             <Menu.Divider />
-            <Menu.Item onClick={() => void edited({ kind: 'remove_parameter_set', name })}>Remove</Menu.Item>
+            <Menu.Item onClick={() => void applyToModel({ kind: 'remove_parameter_set', name })}>
+              Remove
+            </Menu.Item>
           </Menu.Dropdown>
         </Menu>
       </Group>
@@ -234,7 +237,7 @@ function NewName({ name, onClose }: { name: string; onClose: () => void }) {
   const accept = () => {
     const to = typed.trim()
     if (!to || to === name) onClose()
-    else void edited({ kind: 'rename_parameter_set', name, to }).then((done) => done && onClose())
+    else void applyToModel({ kind: 'rename_parameter_set', name, to }).then((done) => done && onClose())
   }
   return (
     <form
@@ -249,6 +252,7 @@ function NewName({ name, onClose }: { name: string; onClose: () => void }) {
         autoFocus
         maxLength={200}
         aria-label={`New name of ${name}`}
+        data-mantine-stop-propagation // Escape closes the field, not the dialog
         value={typed}
         onChange={(event) => setTyped(event.currentTarget.value)}
         onBlur={onClose}
@@ -280,7 +284,7 @@ function ValueRow({ row, names }: { row: Row; names: string[] }) {
             variant="subtle"
             color="gray"
             aria-label={`Remove ${row.path} from all sets`}
-            onClick={() => void edited({ kind: 'remove_set_parameter', path: row.path })}
+            onClick={() => void applyToModel({ kind: 'remove_set_parameter', path: row.path })}
           >
             <IconTrash size={13} />
           </ActionIcon>

@@ -55,7 +55,7 @@ export function TopBar() {
           onClick={() => void save()}
         />
         <Tool
-          label="Add a block (type on the canvas)"
+          label="Add a block (type on the sheet)"
           icon={IconPlus}
           disabled={!hasDocument}
           onClick={() => showDialog('insert')}

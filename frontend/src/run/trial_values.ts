@@ -31,7 +31,7 @@ export function tryValue(path: string, value: unknown): void {
   unsentValues.set(path, value)
 }
 
-/** The parameter sets of the model, with its values of their parameters and of other ones: the tried ones. */
+/** The parameter sets, with the model's values of their parameters and of the parameters in `also`. */
 export async function parameterSets(
   also = Object.keys(useRuns.getState().trialValues),
 ): Promise<ParameterSetTable | undefined> {
@@ -46,10 +46,10 @@ export async function parameterSets(
 }
 
 /**
- * Try exactly these values: a run that begins now has them. A run in progress gets the model's values of all
- * others from the server.
+ * Replace all trial values: the next run starts with them. In a run in progress, parameters that are no
+ * longer tried return to the values of the model.
  */
-export async function tryExactly(next: Values): Promise<void> {
+export async function setTrialValues(next: Values): Promise<void> {
   const before = useRuns.getState().trialValues
   const document = useStudio.getState().document?.state.document
   unsentValues.clear()
@@ -63,7 +63,9 @@ export async function tryExactly(next: Values): Promise<void> {
 
 export async function dropTrialValues(paths: string[]): Promise<void> {
   const { trialValues } = useRuns.getState()
-  await tryExactly(Object.fromEntries(Object.entries(trialValues).filter(([path]) => !paths.includes(path))))
+  await setTrialValues(
+    Object.fromEntries(Object.entries(trialValues).filter(([path]) => !paths.includes(path))),
+  )
 }
 
 /** Keep all trial values in the model, as one undo step. */

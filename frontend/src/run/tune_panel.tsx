@@ -76,8 +76,8 @@ export function TunePanel() {
         ))}
         {!listed.length && (
           <p className="empty">
-            Select a block to see the parameters that can be changed while the model runs. Pin those to keep
-            at hand.
+            Select a block to see the parameters that can be changed while the model runs. Pinned parameters
+            stay in this list.
           </p>
         )}
       </div>
@@ -191,7 +191,7 @@ function ValueSlider({ tunable, value }: { tunable: Tunable; value: number }) {
     <input
       key={`${from} ${to}`}
       className="bound numbers"
-      aria-label={`${index ? 'Greatest' : 'Least'} value of the slider of ${path}`}
+      aria-label={`${index ? 'Maximum' : 'Minimum'} value of the slider of ${path}`}
       defaultValue={index ? to : from}
       onBlur={(event) => {
         const number = Number(event.currentTarget.value)

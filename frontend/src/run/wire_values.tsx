@@ -79,7 +79,7 @@ export function WireValues({ selectedEdge }: { selectedEdge: WireEdgeType | unde
   const scale = Math.min(Math.max(1 / zoom, 1), 2.5)
   if (!portal) return null
   return createPortal(
-    <div ref={layer} className="wire-values" style={{ '--legible': scale } as React.CSSProperties}>
+    <div ref={layer} className="wire-values" style={{ '--label-scale': scale } as React.CSSProperties}>
       {shown.map((output) => (
         <span
           key={output.ref}
@@ -112,7 +112,7 @@ export function WireValues({ selectedEdge }: { selectedEdge: WireEdgeType | unde
             className="logged-badge"
             title={`${ref} is logged`}
             style={{
-              transform: readable(
+              transform: labelTransform(
                 block.place.x + port.x + (port.dx < 0 ? -16 : 4),
                 block.place.y + port.y + 3,
               ),
@@ -131,7 +131,8 @@ export function WireValues({ selectedEdge }: { selectedEdge: WireEdgeType | unde
 
 /** Height of a label, px. */
 const LABEL_HEIGHT = 14
-const SMALLEST_LABEL = 24
+/** Minimum width of a label, px. */
+const MIN_LABEL_WIDTH = 24
 
 /** Position and maximum width of the value at an output. */
 function labelStyle(
@@ -144,13 +145,13 @@ function labelStyle(
   const { below, width } = labelPosition(
     { x, y },
     direction,
-    { height: LABEL_HEIGHT * scale, legible: scale },
+    { height: LABEL_HEIGHT * scale, scale },
     obstacles,
   )
   const shift = `translate(${direction < 0 ? '-100%' : '0'}, ${below ? '0' : '-100%'})`
   return {
-    maxWidth: Math.max(width / scale, SMALLEST_LABEL),
-    transform: `${readable(x, below ? y + WIRE_DISTANCE : y - WIRE_DISTANCE)} ${shift}`,
+    maxWidth: Math.max(width / scale, MIN_LABEL_WIDTH),
+    transform: `${labelTransform(x, below ? y + WIRE_DISTANCE : y - WIRE_DISTANCE)} ${shift}`,
   }
 }
 
@@ -204,7 +205,8 @@ function WireTools({
       role="toolbar"
       aria-label={`Wire from ${ref}`}
       style={{
-        transform: readable((from[0] + to[0]) / 2, (from[1] + to[1]) / 2 - 6) + ' translate(-50%, -100%)',
+        transform:
+          labelTransform((from[0] + to[0]) / 2, (from[1] + to[1]) / 2 - 6) + ' translate(-50%, -100%)',
       }}
     >
       <Tooltip label={isLogged ? 'Do not log this signal' : 'Log this signal in a separate scope'}>
@@ -294,7 +296,7 @@ function useHovered(flow: HTMLElement | null): string {
   return hovered
 }
 
-/** A label at a position of the sheet (px), in readable size at every zoom. */
-function readable(x: number, y: number): string {
-  return `translate(${x}px, ${y}px) scale(var(--legible))`
+/** The CSS transform of a label at a position of the sheet (px), with a readable size at every zoom. */
+function labelTransform(x: number, y: number): string {
+  return `translate(${x}px, ${y}px) scale(var(--label-scale))`
 }

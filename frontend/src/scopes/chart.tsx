@@ -16,7 +16,7 @@ import { toggleCursors, useWindow, visibleTimes } from './window'
 import { equalAxes, XyPlot } from './xy_plot'
 
 /** Number of letters of a name that the legend always shows. */
-const SHORT_NAME = 8
+const SHORT_NAME_LENGTH = 8
 
 /** Hidden traces and the visible range of values, which two charts may share. */
 export interface ChartState {
@@ -131,9 +131,9 @@ function ShowAllValues({ title, show }: { title: string; show: () => void }) {
 
 /** Whether both axes of an XY graph have the same scale: initially, if the signals have the same unit. */
 function useEqualAxes(traces: Trace[]) {
-  const { possible, usual } = equalAxes(traces)
+  const { possible, initial } = equalAxes(traces)
   const [chosen, setEqual] = useState<boolean | null>(null)
-  return { axesMayBeEqual: possible, equal: possible && (chosen ?? usual), setEqual }
+  return { axesMayBeEqual: possible, equal: possible && (chosen ?? initial), setEqual }
 }
 
 interface LegendProps {
@@ -144,7 +144,7 @@ interface LegendProps {
 
 /** The names of the traces, after that of their common signal. */
 function Legend({ traces, hidden, toggle }: LegendProps) {
-  const { stem, names } = shortened(traces)
+  const { stem, names } = legendNames(traces)
   return (
     <>
       {stem && <span className="stem">{stem}</span>}
@@ -173,7 +173,7 @@ function LegendEntry({ trace: { label, tone, dash }, name, hidden, toggle }: Leg
   return (
     <button
       type="button"
-      className={name.length > SHORT_NAME ? 'long' : undefined}
+      className={name.length > SHORT_NAME_LENGTH ? 'long' : undefined}
       aria-label={label}
       aria-pressed={!hidden}
       title={hidden ? `Show ${label}` : `Hide ${label}`}
@@ -251,14 +251,15 @@ function exportEntries(
     const now = figure()
     if (now) save(now)
   }
-  const rows = stride > 1 ? `xtremes of every ${stride} samples` : ''
+  const samplesText = stride > 1 ? `extremes of every ${stride} samples` : 'samples'
+  const capitalised = samplesText.charAt(0).toUpperCase() + samplesText.slice(1)
   const isPart = !isXy && (useWindow.getState().range !== null || shown.length < traces.length)
   return [
-    { title: `${rows ? `E${rows}` : 'Samples'} as CSV`, run: () => saveCsv(title, traces) },
+    { title: `${capitalised} as CSV`, run: () => saveCsv(title, traces) },
     ...(isPart
       ? [
           {
-            title: `Shown ${rows ? `e${rows}` : 'samples'} as CSV`,
+            title: `Shown ${samplesText} as CSV`,
             run: () => saveCsv(title, shown, visibleTimes()),
           },
         ]
@@ -314,7 +315,7 @@ function blockEntry(path: string): Entries {
 }
 
 /** The names of entries without the name of their common signal. */
-function shortened(traces: Trace[]): { stem: string; names: string[] } {
+function legendNames(traces: Trace[]): { stem: string; names: string[] } {
   const stem = traces[0]?.stem
   if (!stem || traces.length < 2 || !traces.every((one) => one.entry && one.label === `${stem} ${one.entry}`))
     return { stem: '', names: traces.map(({ label }) => label) }

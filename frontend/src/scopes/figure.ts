@@ -35,7 +35,7 @@ interface Painter {
     tone: string,
     anchor: 'start' | 'middle' | 'end',
     bold?: boolean,
-    upright?: boolean,
+    vertical?: boolean,
   ) => void
   disc: (x: number, y: number, radius: number, tone: string) => void
   inside: (box: Box, paint: () => void) => void
@@ -48,9 +48,10 @@ interface Box {
   height: number
 }
 
-const FONT = 11
+/** Font size, px. */
+const FONT_SIZE = 11
 
-/** Round numbers in a range, at most a given number. */
+/** Round values in a range, at most `maxCount`. */
 export function ticks(min: number, max: number, maxCount: number): number[] {
   const minStep = (max - min) / Math.max(maxCount, 1)
   const magnitude = 10 ** Math.floor(Math.log10(minStep))
@@ -175,11 +176,11 @@ export function paint(figure: Figure, canvas: HTMLCanvasElement, scale: number):
       context.setLineDash(dash)
       context.stroke()
     },
-    text: (x, y, text, tone, anchor, bold, upright) => {
+    text: (x, y, text, tone, anchor, bold, vertical) => {
       context.save()
       context.translate(x, y)
-      if (upright) context.rotate(-Math.PI / 2)
-      context.font = `${bold ? '600 ' : ''}${bold ? FONT + 1 : FONT}px ${fontOf()}`
+      if (vertical) context.rotate(-Math.PI / 2)
+      context.font = `${bold ? '600 ' : ''}${bold ? FONT_SIZE + 1 : FONT_SIZE}px ${fontOf()}`
       context.fillStyle = colour(tone)
       context.textAlign = anchor === 'middle' ? 'center' : anchor
       context.fillText(text, 0, 0)
@@ -217,12 +218,12 @@ export function svgOf(figure: Figure): string {
             `stroke-linejoin="round"${dashed}/>`,
         )
     },
-    text: (x, y, text, tone, anchor, bold, upright) => {
+    text: (x, y, text, tone, anchor, bold, vertical) => {
       const weight = bold ? ' font-weight="600"' : ''
-      const rotation = upright ? ` transform="rotate(-90 ${x.toFixed(1)} ${y.toFixed(1)})"` : ''
+      const rotation = vertical ? ` transform="rotate(-90 ${x.toFixed(1)} ${y.toFixed(1)})"` : ''
       parts.push(
         `<text x="${x.toFixed(1)}" y="${y.toFixed(1)}" fill="${colour(tone)}" text-anchor="${anchor}" ` +
-          `font-size="${bold ? FONT + 1 : FONT}"${weight}${rotation}>${escaped(text)}</text>`,
+          `font-size="${bold ? FONT_SIZE + 1 : FONT_SIZE}"${weight}${rotation}>${escaped(text)}</text>`,
       )
     },
     disc: (x, y, radius, tone) =>

@@ -103,7 +103,7 @@ function RunList({ runs }: { runs: StoredRun[] }) {
       </header>
       {view !== 'overlay' && runs.length > 1 && <Comparison runs={runs} />}
       {[...runs].reverse().map((run) => (
-        <div key={run.key} className="kept-run">
+        <div key={run.key} className="stored-run">
           <Checkbox
             size="xs"
             aria-label={`Show ${run.name}`}
@@ -127,7 +127,7 @@ function RunList({ runs }: { runs: StoredRun[] }) {
                 size="xs"
                 variant="subtle"
                 color="gray"
-                aria-label={`Forget ${run.name}`}
+                aria-label={`Delete ${run.name}`}
                 onClick={() => remove(run.key)}
               >
                 <IconTrash size={13} />
@@ -236,7 +236,11 @@ function SignalList({ runs }: { runs: StoredRun[] }) {
               />
               <span className="listed-signal">{runs.at(-1)!.samples.title(name)}</span>
               {difference && (
-                <span className={difference.largest <= tolerance ? 'apart numbers' : 'apart beyond numbers'}>
+                <span
+                  className={
+                    difference.largest <= tolerance ? 'deviation numbers' : 'deviation exceeded numbers'
+                  }
+                >
                   {difference.largest <= tolerance ? '✓' : '✗'} {withUnit(difference.largest, unit, 3)}
                   {' at '}
                   {withUnit(difference.at, 's', 3)}
@@ -278,7 +282,7 @@ function InspectorPlot({ runs }: { runs: StoredRun[] }) {
       })
     }
     const visibleRuns = runs.filter(({ key }) => !hidden.has(key))
-    const areSingle =
+    const hasOneTraceEach =
       visibleRuns.length > 1 && visibleRuns.every(({ samples }) => tracesOf(samples, paths).length === 1)
     return visibleRuns
       .flatMap((run, k) =>
@@ -286,16 +290,16 @@ function InspectorPlot({ runs }: { runs: StoredRun[] }) {
           ...trace,
           key: `${run.key} ${trace.key}`,
           label: visibleRuns.length > 1 ? `${trace.label}, ${run.name}` : trace.label,
-          tone: areSingle ? `trace-${k % 8}` : trace.tone,
+          tone: hasOneTraceEach ? `trace-${k % 8}` : trace.tone,
           dash:
-            visibleRuns.length > 1 && !areSingle
+            visibleRuns.length > 1 && !hasOneTraceEach
               ? DASHES[(visibleRuns.length - 1 - k) % DASHES.length]!
               : trace.dash,
         })),
       )
       .slice(0, MAX_TRACES)
   }, [runs, hidden, paths, comparing, baseline, compared])
-  if (!signals.size) return <p className="empty">Tick the signals to be shown.</p>
+  if (!signals.size) return <p className="empty">Select the signals to be shown.</p>
   if (view === 'side by side' && runs.length > 1)
     return <SideBySide runs={comparedRuns(runs, baseline, compared)} paths={paths} />
   return (
@@ -310,7 +314,7 @@ function InspectorPlot({ runs }: { runs: StoredRun[] }) {
 }
 
 /** Smallest width of one of two charts with measures beside each other, px. */
-const MIN_MEASURED = 280
+const MIN_MEASURED_WIDTH = 280
 
 /** Two runs in two charts with the same axes, hidden traces, cursors and colours. */
 function SideBySide({
@@ -343,7 +347,7 @@ function SideBySide({
       </figure>
     )
   return (
-    <Grid count={2} measuredWidth={MIN_MEASURED}>
+    <Grid count={2} measuredWidth={MIN_MEASURED_WIDTH}>
       {chart(a, left, right)}
       {chart(b, right, left)}
     </Grid>

@@ -49,9 +49,9 @@ export class LivePlot {
   private dashes: number[][] = []
   private range: [number, number] = [0, 1]
   /** The last examined version of the samples, and the version of the last complete drawing. */
-  private seenVersion = 0
+  private examinedVersion = 0
   private drawnVersion = 0
-  /** Other data of the drawing: those that require a complete drawing, and the lines above it. */
+  /** Other drawn data: a new `shapeKey` requires a complete drawing, a new `lineKey` only new lines. */
   private shapeKey = ''
   private lineKey = ''
 
@@ -149,7 +149,7 @@ export class LivePlot {
     ].join(' ')
     const sameShape = shapeKey === this.shapeKey
     const sameLines = lineKey === this.lineKey
-    if (sameShape && sameLines && version === this.seenVersion) return
+    if (sameShape && sameLines && version === this.examinedVersion) return
     if (sameShape && version === this.drawnVersion) {
       this.lineKey = lineKey
       this.plot.redraw(false, false)
@@ -160,7 +160,7 @@ export class LivePlot {
       const data = plotData(this.traces, from, to, width, previousExtremes)
       this.columns = data.columns
       this.extremes = data.extremes
-      this.seenVersion = version
+      this.examinedVersion = version
       if (this.draw(data, previousExtremes, live && sameShape, sameLines, [from, to])) return
       this.drawnVersion = version
       this.shapeKey = shapeKey

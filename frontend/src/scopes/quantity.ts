@@ -49,7 +49,7 @@ export function displayUnit(
   return { factor: 10 ** -exponent, unit: prefix + symbols }
 }
 
-/** A number with `significant` digits, without exponent if possible, and with a true minus sign. */
+/** A number with `significant` digits, without exponent if possible, and with a typographic minus sign. */
 export function formatNumber(value: number, significant = 4): string {
   if (!Number.isFinite(value)) return Number.isNaN(value) ? '–' : value > 0 ? '∞' : '−∞'
   if (value === 0) return '0'

@@ -56,12 +56,12 @@ export function Scopes() {
 }
 
 /** Width of a chart with a table of measures, px. */
-const MEASURED = 560
+const MEASURED_WIDTH = 560
 
 /** The charts in rows that fill the panel; the charts of an incomplete last row are wider. */
 export function Grid({
   count,
-  measuredWidth = MEASURED,
+  measuredWidth = MEASURED_WIDTH,
   children,
 }: {
   count: number

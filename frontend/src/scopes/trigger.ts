@@ -1,24 +1,17 @@
 import { create } from 'zustand'
 import { onFrame, scheduleFrame } from '../frames'
-import { shownTimes, shownTrigger, TriggerDetector, type Edge, type Mode } from '../model/trigger'
+import {
+  INITIAL_TRIGGER,
+  shownTimes,
+  shownTrigger,
+  TriggerDetector,
+  type TriggerSettings,
+} from '../model/trigger'
 import { samples } from '../samples'
 import { useStudio } from '../store'
 import { useWindow, wholeRun } from './window'
 
-interface Trigger {
-  on: boolean
-  /** The signal and its element. */
-  channel: string
-  element: number
-  edge: Edge
-  /** In the SI unit of the signal. */
-  level: number
-  mode: Mode
-  /** Width of the window, s, and the part of it before the trigger. */
-  span: number
-  position: number
-  /** Time after a trigger during which others are ignored, s. */
-  holdOff: number
+interface Trigger extends TriggerSettings {
   /** The trigger that the user has chosen; null: the last one. */
   chosen: number | null
   /** The time from which on a single trigger is accepted, s. */
@@ -31,15 +24,7 @@ interface Trigger {
 
 /** The trigger of all time plots: they show the window about a crossing of a level. */
 export const useTrigger = create<Trigger>(() => ({
-  on: false,
-  channel: '',
-  element: 0,
-  edge: 'rising',
-  level: 0,
-  mode: 'normal',
-  span: 1,
-  position: 0.5,
-  holdOff: 0,
+  ...INITIAL_TRIGGER,
   chosen: null,
   armedAt: -Infinity,
   count: 0,
@@ -47,17 +32,20 @@ export const useTrigger = create<Trigger>(() => ({
   at: null,
 }))
 useTrigger.subscribe(scheduleFrame)
-useStudio.subscribe(({ document }, before) => {
-  if (document?.state.document !== before.document?.state.document) useTrigger.setState({ on: false })
-})
 
 let detector: TriggerDetector | null = null
 let detectorKey = ''
 let runOfTrigger = ''
 let lastWindow = ''
 
+/** Use other settings, without a chosen trigger. */
+export function applySettings(settings: TriggerSettings): void {
+  lastWindow = ''
+  useTrigger.setState({ ...settings, chosen: null, armedAt: -Infinity, count: 0, index: null, at: null })
+}
+
 /** Find the triggers of new samples, and show the window about the chosen one. */
-function follow(): void {
+function updateTrigger(): void {
   const state = useTrigger.getState()
   if (!state.on) return
   const { channel, element, edge, level, holdOff } = state
@@ -88,7 +76,7 @@ function follow(): void {
   if (range && String(range) !== lastWindow) useWindow.setState({ range })
   lastWindow = String(range)
 }
-onFrame(follow)
+onFrame(updateTrigger)
 
 /** The signal of the first trace, its mean level, and a tenth of the run as the window. */
 function initialSettings(): Partial<Trigger> {

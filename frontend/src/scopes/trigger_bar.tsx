@@ -1,3 +1,4 @@
+import './trigger_bar.css'
 import { ActionIcon, Button, NativeSelect, TextInput } from '@mantine/core'
 import { IconChevronLeft, IconChevronRight } from '@tabler/icons-react'
 import { useEffect, useState } from 'react'
@@ -30,53 +31,73 @@ function Bar() {
   const signal = samples.signal(channel)
   const { factor, unit } = displayUnit(signal?.channel.unit ?? '', 0)
   return (
-    <div className="trigger-bar" role="group" aria-label="Trigger">
-      <SignalSelect channel={channel} element={element} />
-      <NativeSelect
-        size="xs"
-        aria-label="Edge"
-        w={92}
-        data={EDGES}
-        value={edge}
-        onChange={(event) => useTrigger.setState({ edge: event.currentTarget.value as Edge, chosen: null })}
-      />
-      <NumberField
-        label="Level"
-        unit={unit}
-        value={level * factor}
-        setValue={(value) => useTrigger.setState({ level: value / factor, chosen: null })}
-      />
-      <NativeSelect
-        size="xs"
-        aria-label="Mode"
-        w={88}
-        data={MODES}
-        value={mode}
-        onChange={(event) => useTrigger.setState({ mode: event.currentTarget.value as Mode, chosen: null })}
-      />
-      <NumberField
-        label="Window"
-        unit="s"
-        value={span}
-        isValid={(value) => value > 0}
-        setValue={(value) => useTrigger.setState({ span: value })}
-      />
-      <NumberField
-        label="Trigger at"
-        unit="%"
-        value={100 * position}
-        isValid={(value) => value >= 0 && value <= 100}
-        setValue={(value) => useTrigger.setState({ position: value / 100 })}
-      />
-      <NumberField
-        label="Hold-off"
-        unit="s"
-        value={holdOff}
-        isValid={(value) => value >= 0}
-        setValue={(value) => useTrigger.setState({ holdOff: value, chosen: null })}
-      />
-      <Shown missing={!signal} />
+    <div className="trigger-frame">
+      <div className="trigger-bar" role="group" aria-label="Trigger">
+        <SignalSelect channel={channel} element={element} />
+        <Choice
+          label="Edge"
+          options={EDGES}
+          value={edge}
+          setValue={(value) => useTrigger.setState({ edge: value as Edge, chosen: null })}
+        />
+        <NumberField
+          label="Level"
+          unit={unit}
+          value={level * factor}
+          setValue={(value) => useTrigger.setState({ level: value / factor, chosen: null })}
+        />
+        <Choice
+          label="Mode"
+          options={MODES}
+          value={mode}
+          setValue={(value) => useTrigger.setState({ mode: value as Mode, chosen: null })}
+        />
+        <NumberField
+          label="Window"
+          unit="s"
+          value={span}
+          isValid={(value) => value > 0}
+          setValue={(value) => useTrigger.setState({ span: value })}
+        />
+        <NumberField
+          label="Trigger at"
+          unit="%"
+          value={100 * position}
+          isValid={(value) => value >= 0 && value <= 100}
+          setValue={(value) => useTrigger.setState({ position: value / 100 })}
+        />
+        <NumberField
+          label="Hold-off"
+          unit="s"
+          value={holdOff}
+          isValid={(value) => value >= 0}
+          setValue={(value) => useTrigger.setState({ holdOff: value, chosen: null })}
+        />
+        <DisplayedTrigger missing={!signal} />
+      </div>
     </div>
+  )
+}
+
+interface ChoiceProps {
+  label: string
+  options: { value: string; label: string }[]
+  value: string
+  setValue: (value: string) => void
+}
+
+/** One of a few named options. */
+function Choice({ label, options, value, setValue }: ChoiceProps) {
+  return (
+    <NativeSelect
+      size="xs"
+      label={label}
+      aria-label={label}
+      className="choice"
+      data={options}
+      value={value}
+      onChange={(event) => setValue(event.currentTarget.value)}
+    />
   )
 }
 
@@ -99,6 +120,7 @@ function SignalSelect({ channel, element }: { channel: string; element: number }
       size="xs"
       label="Trigger on"
       className="signal"
+      title={options.find((option) => option.value === value)?.label ?? channel}
       data={isKnown ? options : [{ value, label: channel }, ...options]}
       value={value}
       onChange={(event) => {
@@ -155,7 +177,7 @@ function NumberField({ label, unit, value, isValid = () => true, setValue }: Num
 }
 
 /** The number and time of the displayed trigger, and buttons for the others. */
-function Shown({ missing }: { missing: boolean }) {
+function DisplayedTrigger({ missing }: { missing: boolean }) {
   const { mode, count, index, at } = useTrigger()
   const isRunning = useStudio((s) => s.run?.state === 'running' || s.run?.state === 'paused')
   const single = mode === 'single'

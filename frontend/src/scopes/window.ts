@@ -33,6 +33,7 @@ export function visibleTimes(): [number, number] {
   return useWindow.getState().range ?? wholeRun()
 }
 
+/** Minimum visible range, relative to its end; absolute (s) below 1 s. */
 const MIN_SPAN = 1e-9
 
 export function zoomTo(from: number, to: number): void {

@@ -26,8 +26,8 @@ function figureOf(
     values.reduce((greatest, value) => Math.max(greatest, Math.abs(value)), 0)
   // Signals of the same unit have the same prefix, so that equal axes have equal scales.
   const commonLargest = xTrace?.unit === yTrace?.unit ? Math.max(largest(x), largest(y)) : undefined
-  const readX = displayUnit(xTrace?.unit ?? '', commonLargest ?? largest(x))
-  const readY = displayUnit(yTrace?.unit ?? '', commonLargest ?? largest(y))
+  const xUnit = displayUnit(xTrace?.unit ?? '', commonLargest ?? largest(x))
+  const yUnit = displayUnit(yTrace?.unit ?? '', commonLargest ?? largest(y))
   // For a long run every k-th point and the last one are drawn.
   const stride = Math.max(1, Math.ceil(x.length / MAX_POINTS))
   const count = Math.ceil(x.length / stride)
@@ -36,7 +36,7 @@ function figureOf(
       { length: count },
       (_, k) => values[k === count - 1 ? values.length - 1 : k * stride]! * factor,
     )
-  const [xs, ys] = [pick(x, readX.factor), pick(y, readY.factor)]
+  const [xs, ys] = [pick(x, xUnit.factor), pick(y, yUnit.factor)]
   const range = (values: Float64Array) =>
     withMargin(
       values.reduce((a, b) => Math.min(a, b), Infinity),
@@ -52,20 +52,20 @@ function figureOf(
     width,
     height,
     equal,
-    x: axis(xs, xTrace, readX.unit),
-    y: axis(ys, yTrace, readY.unit),
+    x: axis(xs, xTrace, xUnit.unit),
+    y: axis(ys, yTrace, yUnit.unit),
     lines: [{ tone: 'trace-0', dash: [], label: title, x: xs, y: ys }],
     mark:
       sampleIndex >= 0 && sampleIndex < x.length
-        ? [x[sampleIndex]! * readX.factor, y[sampleIndex]! * readY.factor]
+        ? [x[sampleIndex]! * xUnit.factor, y[sampleIndex]! * yUnit.factor]
         : undefined,
   }
 }
 
 /** Whether the axes of two signals can have the same scale, and whether they initially have it. */
-export function equalAxes([x, y]: Trace[]): { possible: boolean; usual: boolean } {
+export function equalAxes([x, y]: Trace[]): { possible: boolean; initial: boolean } {
   const possible = x?.unit === y?.unit
-  return { possible, usual: possible && Boolean(x?.unit) }
+  return { possible, initial: possible && Boolean(x?.unit) }
 }
 
 export function XyPlot({

@@ -3,20 +3,20 @@ import { freeBelow, freeInView, type Rectangle } from '../../src/model/free_plac
 
 const view = { x: -100, y: 50, width: 600, height: 400 }
 const size = { width: 60, height: 40 }
-const apart = (a: Rectangle, b: Rectangle) =>
+const areDisjoint = (a: Rectangle, b: Rectangle) =>
   a.x + a.width <= b.x || b.x + b.width <= a.x || a.y + a.height <= b.y || b.y + b.height <= a.y
-const within = (a: Rectangle) =>
+const isInView = (a: Rectangle) =>
   a.x >= view.x &&
   a.y >= view.y &&
   a.x + a.width <= view.x + view.width &&
   a.y + a.height <= view.y + view.height
 
-test('blocks that are added by name one after another are apart, and in view while there is room', () => {
+test('blocks that are added by name do not overlap, and are in view while there is room', () => {
   const blocks: Rectangle[] = []
   for (let k = 0; k < 40; k++) {
     const place = freeInView(size, view, blocks)
-    for (const other of blocks) expect(apart(place, other)).toBe(true)
-    if (k < 12) expect(within(place), `block ${k}`).toBe(true)
+    for (const other of blocks) expect(areDisjoint(place, other)).toBe(true)
+    if (k < 12) expect(isInView(place), `block ${k}`).toBe(true)
     blocks.push(place)
   }
   expect(blocks[0], 'the first is in the middle').toEqual({ ...size, x: 170, y: 230 })

@@ -69,7 +69,7 @@ test('a straight line to a port comes before nearer edges, and inputs are not al
   expect(align(guided, [{ ...other, ports: [{ ...port, output: false }] }], REACH).dy).toBe(-3)
 })
 
-test('nothing within reach leaves a shape where it is', () => {
+test('a shape without other shapes within reach is not displaced', () => {
   const guided = { x: 0, y: 0, width: 10, height: 10, ports: [] }
   expect(align(guided, [{ ...guided, x: 50, y: 50 }], REACH)).toEqual({ dx: 0, dy: 0, guides: [] })
 })

@@ -67,15 +67,15 @@ test('a line drawn in parts equals the line drawn at once, dashes included', () 
     grown = extremes([until(count)], 0, 5, 300, grown)
     growing.append(grown.columns, 1, grown.finalRows, 1)
   }
-  const pieces = parts.drawn()
-  expect(pieces.length).toBeGreaterThan(1)
-  pieces.slice(1).forEach(({ points }, k) => expect(points[0]).toEqual(pieces[k]!.points.at(-1)))
-  const joined = pieces.flatMap(({ points }, k) => (k ? points.slice(1) : points))
+  const drawnParts = parts.drawn()
+  expect(drawnParts.length).toBeGreaterThan(1)
+  drawnParts.slice(1).forEach(({ points }, k) => expect(points[0]).toEqual(drawnParts[k]!.points.at(-1)))
+  const joined = drawnParts.flatMap(({ points }, k) => (k ? points.slice(1) : points))
   expect(joined).toEqual(whole.drawn()[0]!.points)
   const length = (points: [number, number][]) =>
     points.slice(1).reduce((sum, [x, y], k) => sum + Math.hypot(x - points[k]![0], y - points[k]![1]), 0)
   let before = 0
-  for (const { points, offset } of pieces) {
+  for (const { points, offset } of drawnParts) {
     expect(offset, 'the dashes continue without a jump').toBeCloseTo(before, 9)
     before += length(points)
   }

@@ -26,7 +26,7 @@ test('traces with jumps at different times share their rows', () => {
   expect([...second!]).toEqual([1, 1, 2, 2, 2, undefined, 2])
 })
 
-test('runs that jump at the same time do not differ there, whatever their other rows are', () => {
+test('runs that jump at the same time do not differ there, independently of their other rows', () => {
   const run = (key: string, { time, values }: ReturnType<typeof trace>) => {
     const samples = new RunSamples(key, [{ name: 'a/y', shape: [], unit: '', entries: [] }], {})
     const header = JSON.stringify({ run: key, first: 0, count: time.length }).padEnd(60)

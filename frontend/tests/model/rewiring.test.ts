@@ -122,6 +122,6 @@ test('a dropped block is inserted into the horizontal segment below it and align
     x: 120,
   })
   expect(wireAt({ x: 200, y: 60 }, [drawn], wires), 'too far away').toBeUndefined()
-  expect(wireAt({ x: 100, y: 70 }, [drawn], wires), 'an upright piece').toBeUndefined()
-  expect(wireAt({ x: 200, y: 85 }, [drawn], []), 'a wire that was just closed').toBeUndefined()
+  expect(wireAt({ x: 100, y: 70 }, [drawn], wires), 'a vertical segment').toBeUndefined()
+  expect(wireAt({ x: 200, y: 85 }, [drawn], []), 'the preview of a new wire').toBeUndefined()
 })

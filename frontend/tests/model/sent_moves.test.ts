@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest'
-import { outstanding, withMoves, type SentMove } from '../../src/model/sent_moves'
+import { outstandingMoves, withMoves, type SentMove } from '../../src/model/sent_moves'
 import type { SheetBlock } from '../../src/protocol'
 
 const block = (x: number) => ({ name: 'a', place: { x, y: 0 } }) as SheetBlock
@@ -18,7 +18,7 @@ const move = (key: number, x: number, version: number | null = null): SentMove =
   notes: {},
 })
 
-test('ten quick moves are shown at once and end at the tenth, in whatever order the answers arrive', () => {
+test('ten quick moves are shown immediately; the tenth position remains for any order of the replies', () => {
   const moves = Array.from({ length: 10 }, (_, k) => move(k, 5 * (k + 1)))
   for (const repliesFirst of [true, false]) {
     let sent = moves
@@ -27,21 +27,21 @@ test('ten quick moves are shown at once and end at the tenth, in whatever order 
       const version = k + 2
       if (repliesFirst) sent = sent.map((one) => (one.key === String(k) ? { ...one, version } : one))
       const state = sheet(version, 5 * (k + 1))
-      sent = outstanding(sent, state)
+      sent = outstandingMoves(sent, state)
       expect(withMoves(state, sent).blocks.a.place.x, `after the change ${k}`).toBe(50)
     }
     expect(sent).toEqual([])
   }
 })
 
-test('moves of other sheets and documents, and of removed blocks, leave the sheet as it is', () => {
+test('moves of other sheets and documents, and of removed blocks, do not change the sheet', () => {
   const state = sheet(3, 0)
   const elsewhere = [
     { ...move(1, 9), inside: 'b' },
     { ...move(2, 9), document: 'e' },
   ]
   expect(withMoves(state, elsewhere)).toBe(state)
-  expect(outstanding(elsewhere, state)).toEqual(elsewhere)
+  expect(outstandingMoves(elsewhere, state)).toEqual(elsewhere)
   const removed = { ...move(3, 9), places: { removed: { x: 1, y: 1 } } }
   expect(withMoves(state, [removed]).blocks).toEqual(state.blocks)
 })

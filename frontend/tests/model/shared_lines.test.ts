@@ -10,7 +10,7 @@ function draws(dash: number[], at: number): boolean {
   return dash.findIndex((part) => (rest -= part) < 0) % 2 === 0
 }
 
-test('traces that lie on each other take turns: exactly one of them is seen at each place', () => {
+test('of coincident traces, exactly one is drawn at each position', () => {
   const dashes = sharedDashes([time, wave(0), wave(1), wave(0), wave(0).map((v) => v + 1e-9)], 2)
   expect(dashes[1]).toBeNull()
   const shared = dashes.filter((dash) => dash !== null)
@@ -18,7 +18,7 @@ test('traces that lie on each other take turns: exactly one of them is seen at e
   for (let at = 0.5; at < 100; at++) expect(shared.filter((dash) => draws(dash, at))).toHaveLength(1)
 })
 
-test('different traces, and traces without values, keep their own lines', () => {
+test('different traces, and traces without values, have solid lines', () => {
   expect(sharedDashes([time, wave(0), wave(0.01)], 2)).toEqual([null, null])
   const empty = time.map(() => NaN)
   const none = Array.from(time, () => null)

@@ -1,5 +1,14 @@
 import { describe, expect, it } from 'vitest'
-import { shownTimes, shownTrigger, TriggerDetector, type Edge, type Mode } from '../../src/model/trigger'
+import {
+  INITIAL_TRIGGER,
+  isTriggerSettings,
+  settingsOf,
+  shownTimes,
+  shownTrigger,
+  TriggerDetector,
+  type Edge,
+  type Mode,
+} from '../../src/model/trigger'
 import { seeded } from './random'
 
 const trace = (...rows: [time: number, value: number][]) => ({
@@ -55,7 +64,7 @@ describe('the trigger of a scope', () => {
 })
 
 describe('a crossing of the trigger level', () => {
-  it('triggers once where a trace touches the level or rests there', () => {
+  it('triggers once where a trace touches the level or remains there', () => {
     expect(triggers(sampled(-1, 0, -1), 'either')).toEqual([1])
     expect(triggers(sampled(-1, 0, 0, 1), 'either')).toEqual([1])
     expect(triggers(sampled(-1, 0, 0, -1, 1), 'rising')).toEqual([1, 3.5])
@@ -124,5 +133,34 @@ describe('the window of a triggered scope', () => {
     expect(shownTimes([2, 5, 9], choice('single'))).toEqual([1.75, 2.75])
     expect(shownTimes([2, 5, 9], choice('single', { armedAt: 4 }))).toEqual([4.75, 5.75])
     expect(shownTimes([2, 5, 9], choice('single', { armedAt: 9.5 }))).toBeNull()
+  })
+})
+
+describe('stored settings', () => {
+  it('are read as they were written, without the displayed trigger', () => {
+    const settings = { ...INITIAL_TRIGGER, on: true, channel: 'rne/tau', element: 2, level: -1.5, span: 0.1 }
+    const trigger = { ...settings, chosen: 3, armedAt: 1, count: 5, index: 3, at: 0.2 }
+    const written: unknown = JSON.parse(JSON.stringify(settingsOf(trigger)))
+    expect(written).toEqual(settings)
+    expect(isTriggerSettings(written)).toBe(true)
+  })
+
+  it.each([
+    null,
+    'on',
+    [],
+    {},
+    { ...INITIAL_TRIGGER, on: 1 },
+    { ...INITIAL_TRIGGER, channel: null },
+    { ...INITIAL_TRIGGER, element: 0.5 },
+    { ...INITIAL_TRIGGER, element: -1 },
+    { ...INITIAL_TRIGGER, edge: 'up' },
+    { ...INITIAL_TRIGGER, mode: '' },
+    { ...INITIAL_TRIGGER, level: NaN },
+    { ...INITIAL_TRIGGER, span: 0 },
+    { ...INITIAL_TRIGGER, position: 1.1 },
+    { ...INITIAL_TRIGGER, holdOff: -1 },
+  ])('are ignored if they are invalid: %j', (stored) => {
+    expect(isTriggerSettings(stored)).toBe(false)
   })
 })

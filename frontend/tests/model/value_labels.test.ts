@@ -3,9 +3,9 @@ import type { Rectangle } from '../../src/model/free_place'
 import { labelPosition, WIRE_DISTANCE } from '../../src/model/value_labels'
 
 let seed = 7
-const random = (most: number) => ((seed = (seed * 48271) % 2147483647) / 2147483647) * most
+const random = (limit: number) => ((seed = (seed * 48271) % 2147483647) / 2147483647) * limit
 
-test('a label never covers a block or a name, wherever they are', () => {
+test('a label covers no block and no name, for random positions', () => {
   for (let round = 0; round < 300; round++) {
     const obstacles: Rectangle[] = Array.from({ length: 12 }, () => ({
       x: random(600),

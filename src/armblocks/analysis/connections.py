@@ -10,7 +10,8 @@ from armblocks.analysis.state_space import StateSpaceModel, SystemT
 from armblocks.errors import InputError
 
 
-def _together(first: StateSpaceModel, second: StateSpaceModel) -> float:
+def _common_sample_time(first: StateSpaceModel, second: StateSpaceModel) -> float:
+    """The sample time (s) of both systems. Raises ``InputError`` if it differs."""
     if first.dt != second.dt:
         raise InputError(
             f"systems with the sample times {first.dt:g} s and {second.dt:g} s are connected",
@@ -21,31 +22,38 @@ def _together(first: StateSpaceModel, second: StateSpaceModel) -> float:
     return first.dt
 
 
-def _refuse_sizes(subject: str, sizes: object, allowed: object) -> InputError:
+def _size_error(message: str, allowed: str) -> InputError:
+    """The error for systems whose numbers of inputs and outputs cannot be connected."""
     return InputError(
-        f"{subject} does not fit: {sizes}",
-        allowed=f"{allowed}",
+        message,
+        allowed=allowed,
         fix="choose inputs and outputs with select()",
         where="linear systems",
     )
 
 
 def _states(first: StateSpaceModel, second: StateSpaceModel) -> dict[str, tuple[str, ...]]:
-    """The names of all states, if they are unique."""
+    """The names of all states, if they are unique, and their units."""
     names = (*first.states, *second.states)
     units = (*first.state_units, *second.state_units)
     return {"states": names if len(set(names)) == len(names) else (), "state_units": units}
 
 
 def series(second: SystemT, first: StateSpaceModel) -> SystemT:
-    """``second`` after ``first``. Raises ``InputError`` if the numbers of signals differ."""
-    dt = _together(first, second)
+    """The series connection: the outputs of ``first`` are the inputs of ``second``.
+
+    Raises ``InputError`` if the numbers of signals or the sample times differ.
+    """
+    dt = _common_sample_time(first, second)
     if second.D.shape[1] != first.D.shape[0]:
-        raise _refuse_sizes("a series", f"{first.D.shape[0]} into {second.D.shape[1]}", "equal widths")
-    corner = np.zeros((first.order, second.order))
+        raise _size_error(
+            f"{first.D.shape[0]} outputs are connected to {second.D.shape[1]} inputs",
+            "equal numbers of signals",
+        )
+    zero = np.zeros((first.order, second.order))
     return dataclasses.replace(
         second,
-        A=np.block([[first.A, corner], [second.B @ first.C, second.A]]),
+        A=np.block([[first.A, zero], [second.B @ first.C, second.A]]),
         B=np.vstack([first.B, second.B @ first.D]),
         C=np.hstack([second.D @ first.C, second.C]),
         D=second.D @ first.D,
@@ -58,14 +66,19 @@ def series(second: SystemT, first: StateSpaceModel) -> SystemT:
 
 
 def parallel(first: SystemT, second: StateSpaceModel) -> SystemT:
-    """The sum of the outputs for the same inputs. Raises ``InputError`` if the numbers of signals differ."""
-    dt = _together(first, second)
+    """The parallel connection: the sum of the outputs for the same inputs.
+
+    Raises ``InputError`` if the numbers of signals or the sample times differ.
+    """
+    dt = _common_sample_time(first, second)
     if first.D.shape != second.D.shape:
-        raise _refuse_sizes("a sum", f"shapes {first.D.shape} and {second.D.shape}", "equal shapes")
-    corner = np.zeros((first.order, second.order))
+        raise _size_error(
+            f"systems of the shapes {first.D.shape} and {second.D.shape} are added", "equal shapes"
+        )
+    zero = np.zeros((first.order, second.order))
     return dataclasses.replace(
         first,
-        A=np.block([[first.A, corner], [corner.T, second.A]]),
+        A=np.block([[first.A, zero], [zero.T, second.A]]),
         B=np.vstack([first.B, second.B]),
         C=np.hstack([first.C, second.C]),
         D=first.D + second.D,
@@ -76,14 +89,15 @@ def parallel(first: SystemT, second: StateSpaceModel) -> SystemT:
 
 
 def feedback(forward: SystemT, back: StateSpaceModel | float, sign: int) -> SystemT:
-    """``forward`` with ``back`` (a system, or a gain for each output) in the feedback path.
+    """The closed loop of ``forward`` with ``back`` (a system, or one gain for all outputs) in the feedback.
 
-    Raises ``InputError`` if the numbers of signals differ or the loop is singular (``I - sign D D``).
+    Raises ``InputError`` if the numbers of signals or the sample times differ, or if the matrix
+    ``I - sign D_back D_forward`` is singular.
     """
     ny, nu = forward.D.shape
     if isinstance(back, int | float):
         if ny != nu:
-            raise _refuse_sizes("a loop", f"{ny} outputs to {nu} inputs", "as many outputs as inputs")
+            raise _size_error(f"{ny} outputs are fed back to {nu} inputs", "as many outputs as inputs")
         empty = np.zeros((0, 0))
         back = dataclasses.replace(
             forward,
@@ -98,14 +112,14 @@ def feedback(forward: SystemT, back: StateSpaceModel | float, sign: int) -> Syst
             input_units=(),
             output_units=(),
         )
-    dt = _together(forward, back)
+    dt = _common_sample_time(forward, back)
     if back.D.shape != (nu, ny):
-        raise _refuse_sizes("a loop", f"the feedback path has shape {back.D.shape}", f"shape {(nu, ny)}")
+        raise _size_error(f"the feedback path has the shape {back.D.shape}", f"shape {(nu, ny)}")
     loop = np.eye(nu) - sign * back.D @ forward.D
     if np.linalg.cond(loop) > 1e14:
         raise InputError(
             "the direct-feedthrough loop is singular",
-            allowed="1 + D not 0",
+            allowed="a regular matrix I - sign D_back D_forward",
             fix="change a gain in the loop",
             where="linear systems",
         )

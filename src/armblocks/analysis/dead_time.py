@@ -6,8 +6,9 @@ additional outputs ``d``::
     dx' = A dx + B du + E dv    dy = C dx + D du + F dv    dd = G dx + H du + K dv    dv(t) = dd(t - T)
 
 The delay is replaced by the Padé approximation of order n/n, ``Q(-s T) / Q(s T)`` with the coefficients ``(2n
-- k)! n! / ((2n)! k! (n - k)!)`` (Golub, Van Loan, Matrix Computations, 4th ed., 9.3.1): its gain is 1, and
-its phase is accurate up to about n / T rad/s. A variable delay has its value at the operating point.
+- k)! n! / ((2n)! k! (n - k)!)`` (Golub, Van Loan, Matrix Computations, 4th ed., 9.3.1). The gain of this
+approximation is 1, and its phase is accurate up to about n / T rad/s. A variable delay has its value at the
+operating point.
 """
 
 from __future__ import annotations
@@ -25,27 +26,27 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Realisation = tuple[Array, Array, Array, float]
 
-HIGHEST_ORDER = 10
-"""Highest order of an approximation. Above it, rounding errors of the coefficients dominate."""
+MAX_ORDER = 10
+"""Maximum order of an approximation. At higher orders, rounding errors of the coefficients dominate."""
 
 
 def pade(order: int, delay: float) -> Realisation:
-    """``A (n, n), B (n, 1), C (1, n), D`` of the approximation of a delay (s)."""
+    """The matrices ``A (n, n), B (n, 1), C (1, n), D`` of the approximation of a delay (s)."""
     n = order
     weights = [
         math.factorial(2 * n - k) * math.factorial(n) / (math.factorial(k) * math.factorial(n - k))
         for k in range(n + 1)
     ]
-    # In units of time in which the product of all poles is 1, the companion matrix is well scaled.
+    # The companion matrix is well scaled in the unit of time in which the product of all poles is 1.
     unit = (weights[0] / weights[n]) ** (1.0 / n)
-    below = np.array([weights[k] * unit**k for k in range(n + 1)]) / weights[0]
-    above = below * (-1.0) ** np.arange(n + 1)
-    direct = float(above[n] / below[n])
+    denominator = np.array([weights[k] * unit**k for k in range(n + 1)]) / weights[0]
+    numerator = denominator * (-1.0) ** np.arange(n + 1)
+    direct = float(numerator[n] / denominator[n])
     A = np.diag(np.ones(n - 1), 1)
-    A[-1] = -below[:n] / below[n]
+    A[-1] = -denominator[:n] / denominator[n]
     B = np.zeros((n, 1))
     B[-1, 0] = 1.0
-    C = ((above[:n] - direct * below[:n]) / below[n])[None]
+    C = ((numerator[:n] - direct * denominator[:n]) / denominator[n])[None]
     return A * (unit / delay), B * (unit / delay), C, direct
 
 
@@ -67,16 +68,18 @@ class DeadTime:
         return self.indices.size
 
     @cached_property
-    def through(self) -> Array:
-        """``K``: direct feedthrough from the output of a delay to the input of another one."""
+    def feedthrough(self) -> Array:
+        """``K``: the direct feedthrough from the outputs of the delays to their inputs."""
         return self.inputs.z[:, self.indices]
 
 
 def dead_time(
     evaluated: EvaluatedSystem, point: Point, inputs: Jacobians, readers: list[Jacobians]
 ) -> DeadTime:
-    """The delays that ``readers`` depend on, directly or through other delays; ``inputs``: derivatives of
-    their inputs."""
+    """The delays that the equations ``readers`` depend on, directly or through other delays.
+
+    ``inputs`` are the derivatives of the inputs of all delays, ``readers`` those of the equations.
+    """
     system = evaluated.system
     assert system.delays is not None
     indices = np.array([*system.delays.values, *system.delays.derivatives], dtype=np.intp)
@@ -99,8 +102,10 @@ def dead_time(
 
 
 class PadeApproximation:
-    """Derivatives with respect to ``[x; q]`` in place of ``x``, with ``q' = P q + R d`` and ``v = S q + W
-    d``."""
+    """Replaces delays by approximations: derivatives with respect to ``[x; q]`` in place of ``x``.
+
+    The states ``q`` of the approximations obey ``q' = P q + R d`` and ``v = S q + W d``.
+    """
 
     def __init__(self, dead: DeadTime, order: int) -> None:
         self.dead = dead
@@ -108,14 +113,14 @@ class PadeApproximation:
         P, R, S = np.zeros((size, size)), np.zeros((size, dead.count)), np.zeros((dead.count, size))
         W = np.zeros((dead.count, dead.count))
         for k, delay in enumerate(dead.delays.tolist()):
-            own = slice(k * order, (k + 1) * order)
-            P[own, own], R[own, k : k + 1], S[k : k + 1, own], W[k, k] = pade(order, delay)
+            block = slice(k * order, (k + 1) * order)
+            P[block, block], R[block, k : k + 1], S[k : k + 1, block], W[k, k] = pade(order, delay)
         inputs = dead.inputs
         # v = S q + W (G x + H u + K v); d follows from v.
-        inside = np.linalg.inv(np.eye(dead.count) - W @ dead.through)
-        self.by_x = inside @ np.hstack([W @ inputs.x, S])
-        self.by_z = inside @ (W @ self._others(inputs.z))
-        self.by_p = inside @ (W @ inputs.p)
+        closed_loop = np.linalg.inv(np.eye(dead.count) - W @ dead.feedthrough)
+        self.by_x = closed_loop @ np.hstack([W @ inputs.x, S])
+        self.by_z = closed_loop @ (W @ self._others(inputs.z))
+        self.by_p = closed_loop @ (W @ inputs.p)
         self.names = tuple(f"{name} pade[{k}]" for name in dead.names for k in range(order))
         input_derivatives = self(inputs)
         rate = np.hstack([np.zeros((size, inputs.x.shape[1])), P]) + R @ input_derivatives.x
@@ -136,10 +141,10 @@ class PadeApproximation:
     def __call__(self, j: Jacobians) -> Jacobians:
         """The derivatives with the approximations in place of delayed values."""
         by_delayed = j.z[:, self.dead.indices]
-        wider = np.hstack([j.x, np.zeros((j.x.shape[0], self.by_x.shape[1] - j.x.shape[1]))])
+        padded = np.hstack([j.x, np.zeros((j.x.shape[0], self.by_x.shape[1] - j.x.shape[1]))])
         return Jacobians(
             t=j.t,
-            x=wider + by_delayed @ self.by_x,
+            x=padded + by_delayed @ self.by_x,
             z=self._others(j.z) + by_delayed @ self.by_z,
             w=j.w,
             p=j.p + by_delayed @ self.by_p,
@@ -147,11 +152,11 @@ class PadeApproximation:
 
     def flow(self, j: Jacobians) -> Jacobians:
         """The derivatives of ``[x'; q']``."""
-        own, rates = self(j), self.rates
+        block, rates = self(j), self.rates
         return Jacobians(
-            t=np.vstack([own.t, rates.t]),
-            x=np.vstack([own.x, rates.x]),
-            z=np.vstack([own.z, rates.z]),
-            w=own.w,
-            p=np.vstack([own.p, rates.p]),
+            t=np.vstack([block.t, rates.t]),
+            x=np.vstack([block.x, rates.x]),
+            z=np.vstack([block.z, rates.z]),
+            w=block.w,
+            p=np.vstack([block.p, rates.p]),
         )

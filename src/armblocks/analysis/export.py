@@ -1,4 +1,4 @@
-"""Export of linear systems: files, and python-control."""
+"""Export of linear systems to files and to python-control."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def to_control(system: StateSpaceModel) -> Any:
             fix="pip install control",
         ) from None
 
-    def plain(names: tuple[str, ...]) -> list[str]:
+    def without_separators(names: tuple[str, ...]) -> list[str]:
         # In python-control, dots and brackets in names have a special meaning.
         return [name.replace(".", "_").replace("[", "_").replace("]", "").replace(",", "_") for name in names]
 
@@ -43,16 +43,18 @@ def to_control(system: StateSpaceModel) -> Any:
         system.C,
         system.D,
         system.dt,
-        states=plain(system.states),
-        inputs=plain(system.inputs),
-        outputs=plain(system.outputs),
+        states=without_separators(system.states),
+        inputs=without_separators(system.inputs),
+        outputs=without_separators(system.outputs),
         remove_useless_states=False,
     )
 
 
 def save(system: StateSpaceModel, path: str | PathLike[str]) -> None:
-    """Write a file by its suffix. Raises ``UnknownNameError`` for another suffix, ``FormatError`` if the file
-    cannot be written."""
+    """Write a linear system to a file. The suffix is its format: ``.json``, ``.npz`` or ``.mat``.
+
+    Raises ``UnknownNameError`` for another suffix, and ``FormatError`` if the file cannot be written.
+    """
     target = Path(path)
     writers = {".json": _json, ".npz": _npz, ".mat": _mat}
     if target.suffix not in writers:
@@ -91,7 +93,7 @@ def _npz(system: StateSpaceModel) -> bytes:
 
 
 def _mat(system: StateSpaceModel) -> bytes:
-    """The arguments of MATLAB's ``ss(A, B, C, D, Ts)``."""
+    """A MAT file with the arguments of MATLAB's ``ss(A, B, C, D, Ts)`` and the names of the signals."""
     import numpy as np
 
     with from_extra("analysis", "MAT files"):

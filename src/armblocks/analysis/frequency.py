@@ -16,7 +16,7 @@ from armblocks.analysis.zeros import zeros
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_CHUNK = 4_000_000
+_MAX_BATCH_ENTRIES = 4_000_000
 """Maximum number of entries of one batch of linear equations."""
 
 
@@ -27,13 +27,13 @@ def evaluate(system: StateSpaceModel, points: Complex) -> Complex:
     if not n or not system.B.size or not system.C.size:
         return result
     a, b, c = balanced(system.A, system.B, system.C)
-    chunk = max(1, _CHUNK // (n * n))
-    for start in range(0, len(points), chunk):
-        piece = points[start : start + chunk]
-        matrices = piece[:, None, None] * np.eye(n) - a
+    batch_size = max(1, _MAX_BATCH_ENTRIES // (n * n))
+    for start in range(0, len(points), batch_size):
+        batch = points[start : start + batch_size]
+        matrices = batch[:, None, None] * np.eye(n) - a
         try:
-            states = np.linalg.solve(matrices, np.broadcast_to(b, (len(piece), *b.shape)))
-            result[start : start + chunk] += c @ states
+            states = np.linalg.solve(matrices, np.broadcast_to(b, (len(batch), *b.shape)))
+            result[start : start + batch_size] += c @ states
         except np.linalg.LinAlgError:
             for k, matrix in enumerate(matrices):
                 try:
@@ -44,9 +44,9 @@ def evaluate(system: StateSpaceModel, points: Complex) -> Complex:
 
 
 def boundary_points(system: StateSpaceModel, frequencies: Array) -> Complex:
-    """Points on the stability boundary: ``j w``, or ``exp(j w dt)``."""
-    along = (1j * frequencies).astype(np.complex128)
-    return np.exp(along * system.dt) if system.is_discrete else along
+    """Points on the stability boundary: ``j w``, or ``exp(j w dt)`` for a sampled system."""
+    points = (1j * frequencies).astype(np.complex128)
+    return np.exp(points * system.dt) if system.is_discrete else points
 
 
 def frequency_response(system: StateSpaceModel, frequencies: Array) -> Complex:
@@ -57,32 +57,32 @@ def frequency_response(system: StateSpaceModel, frequencies: Array) -> Complex:
 def gain_and_phase(system: StateSpaceModel, frequencies: Array) -> tuple[Array, Array]:
     """Magnitude and continuous phase in degrees, (N, ny, nu) each, at ascending frequencies (rad/s).
 
-    Of the phases that differ by multiples of 360 degrees, the first one is nearest to -90 degrees times the
-    number of integrators. An undamped pole changes the phase by -180 degrees, an undamped zero by +180, as in
-    the limit of small damping.
+    The first phase is determined up to multiples of 360 degrees. The value nearest to -90 degrees times the
+    number of integrators is used. An undamped pole changes the phase by -180 degrees, an undamped zero by
+    +180, as in the limit of small damping.
     """
     response = frequency_response(system, frequencies)
     phase = np.degrees(np.unwrap(np.angle(response), axis=0))
     for row in range(phase.shape[1]):
         for column in range(phase.shape[2]):
-            part = minimal(system.select([system.outputs[row]], [system.inputs[column]]))
-            _correct_phase(part, frequencies, phase[:, row, column])
+            path = minimal(system.select([system.outputs[row]], [system.inputs[column]]))
+            _correct_phase(path, frequencies, phase[:, row, column])
     return np.abs(response), phase
 
 
-def _correct_phase(part: StateSpaceModel, frequencies: Array, phase: Array) -> None:
+def _correct_phase(path: StateSpaceModel, frequencies: Array, phase: Array) -> None:
     """Correct the phase, in place, at points where unwrapping is ambiguous."""
     integrators = 0
-    for roots, direction in ((poles(part), -1.0), (zeros(part), 1.0)):
-        s = as_continuous(part, roots)
-        size = max(float(np.abs(s).max(initial=0.0)), 1e-300)
-        integrators -= int(direction) * sum(abs(root) <= 1e-7 * size for root in s.tolist())
-        undamped = (np.abs(s.real) <= 1e-9 * np.abs(s)) & (s.imag > 1e-7 * size)
+    for roots, direction in ((poles(path), -1.0), (zeros(path), 1.0)):
+        s = as_continuous(path, roots)
+        scale = max(float(np.abs(s).max(initial=0.0)), 1e-300)
+        integrators -= int(direction) * sum(abs(root) <= 1e-7 * scale for root in s.tolist())
+        undamped = (np.abs(s.real) <= 1e-9 * np.abs(s)) & (s.imag > 1e-7 * scale)
         for frequency in s.imag[undamped].tolist():
             k = int(np.searchsorted(frequencies, float(frequency)))
             if 0 < k < len(phase) and direction * (phase[k] - phase[k - 1]) < -90.0:
                 phase[k:] += direction * 360.0
-    expected = -90.0 * integrators - 1e-6  # of +180 and -180 degrees the lower one
+    expected = -90.0 * integrators - 1e-6  # selects -180 degrees rather than +180 degrees
     phase += 360.0 * round((expected - float(phase[0])) / 360.0)
 
 
@@ -94,23 +94,25 @@ def as_continuous(system: StateSpaceModel, roots: Complex) -> Complex:
 
 
 def dcgain(system: StateSpaceModel) -> Array:
-    """The steady-state response of the part between each input and each output."""
+    """The steady-state gain (ny, nu) from each input to each output; infinite with an integrator."""
     steady_state = np.array([1.0 if system.is_discrete else 0.0], dtype=np.complex128)
     result = np.empty(system.D.shape)
     for row in range(system.D.shape[0]):
         for column in range(system.D.shape[1]):
             # An integrator on another path must not affect this path.
-            part = minimal(system.select([system.outputs[row]], [system.inputs[column]]))
-            value = float(evaluate(part, steady_state)[0, 0, 0].real)
-            if part.order and np.linalg.cond(steady_state[0].real * np.eye(part.order) - part.A) > 1e14:
+            path = minimal(system.select([system.outputs[row]], [system.inputs[column]]))
+            value = float(evaluate(path, steady_state)[0, 0, 0].real)
+            if path.order and np.linalg.cond(steady_state[0].real * np.eye(path.order) - path.A) > 1e14:
                 value = math.inf
             result[row, column] = value
     return result
 
 
 def frequency_range(system: StateSpaceModel) -> tuple[float, float]:
-    """From a decade below the slowest to a decade above the fastest corner frequency, rad/s; at most the
-    Nyquist frequency of a sampled system."""
+    """The range from a decade below the lowest to a decade above the highest corner frequency, rad/s.
+
+    For a sampled system it ends at the Nyquist frequency at most.
+    """
     roots = np.concatenate([poles(system), zeros(system)])
     if system.is_discrete:
         roots = roots[np.abs(roots) > 1e-8]
@@ -135,7 +137,7 @@ def frequency_grid(system: StateSpaceModel, low: float, high: float, points: int
     for root in roots[roots.imag > 0.0]:
         width = max(abs(root.real), 1e-6 * abs(root))
         if width < 0.3 * abs(root):
-            spread = width * np.sinh(np.linspace(-8.0, 8.0, 81)) / 10.0
-            extra.append(root.imag + spread)
-    whole = np.unique(np.concatenate([grid, *extra]))
-    return whole[(whole >= low) & (whole <= high)]
+            offsets = width * np.sinh(np.linspace(-8.0, 8.0, 81)) / 10.0
+            extra.append(root.imag + offsets)
+    all_frequencies = np.unique(np.concatenate([grid, *extra]))
+    return all_frequencies[(all_frequencies >= low) & (all_frequencies <= high)]

@@ -14,7 +14,10 @@ Array = NDArray[np.float64]
 
 
 def gramians(system: StateSpaceModel) -> tuple[Array, Array]:
-    """Solutions of the Lyapunov equations of a stable system."""
+    """The controllability and the observability Gramian (nx, nx), by the Lyapunov equations.
+
+    Raises ``InputError`` for a system that is not stable.
+    """
     with from_extra("analysis", "Gramians"):
         from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
 
@@ -22,7 +25,7 @@ def gramians(system: StateSpaceModel) -> tuple[Array, Array]:
         raise InputError(
             "the system is not stable and has no gramians",
             where=system.name,
-            allowed="stable systems: otherwise the integrals diverge",
+            allowed="a stable system, because the integrals diverge for others",
             fix="use controllability() and observability()",
         )
     inputs, outputs = system.B @ system.B.T, system.C.T @ system.C

@@ -1,4 +1,4 @@
-"""The user class ``LinearSystem``: matrices and names, with methods for analysis."""
+"""The public class ``LinearSystem``: matrices and names, with methods for analysis."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Complex = NDArray[np.complex128]
 
 @final
 class LinearSystem(StateSpaceModel):
-    """``x' = A x + B u, y = C x + D u`` where ``dt`` is 0, else ``x[k+1] = A x[k] + B u[k]`` every ``dt`` s.
+    """The system ``x' = A x + B u, y = C x + D u``, or ``x[k+1] = A x[k] + B u[k]`` for ``dt > 0`` (s).
 
     ``A (nx, nx)``, ``B (nx, nu)``, ``C (ny, nx)``, ``D (ny, nu)``. All quantities are deviations from the
     operating ``point``. ``states``, ``inputs`` and ``outputs`` name the scalars, with their SI units; without
@@ -39,10 +39,10 @@ class LinearSystem(StateSpaceModel):
 
     @property
     def is_stable(self) -> bool:
-        """Whether the system is asymptotically stable: poles left of the imaginary axis, or inside the unit
-        circle.
+        """Whether the system is asymptotically stable.
 
-        A pole on the stability boundary, within the accuracy of the computation, counts as unstable.
+        All poles are left of the imaginary axis, or inside the unit circle for a sampled system. A pole on
+        the stability boundary, within the accuracy of the computation, counts as unstable.
         """
         return is_stable(self)
 
@@ -53,8 +53,10 @@ class LinearSystem(StateSpaceModel):
         return poles(self)
 
     def zeros(self) -> Complex:
-        """Invariant zeros: where the system matrix loses rank. They include uncontrollable and unobservable
-        modes."""
+        """Invariant zeros: the numbers at which the system matrix loses rank.
+
+        They include uncontrollable and unobservable modes.
+        """
         return zeros(self)
 
     def damp(self) -> tuple[Mode, ...]:
@@ -62,8 +64,10 @@ class LinearSystem(StateSpaceModel):
         return modes(self)
 
     def transfer_function(self) -> TransferFunction:
-        """Zeros, poles and gain of a system with one input and one output. Raises ``InputError`` for
-        others."""
+        """Zeros, poles and gain of a system with one input and one output.
+
+        Raises ``InputError`` for other systems.
+        """
         return transfer_function(self)
 
     # Frequency domain.
@@ -103,8 +107,10 @@ class LinearSystem(StateSpaceModel):
     def response(
         self, time: ArrayLike, inputs: ArrayLike, start: ArrayLike | None = None
     ) -> TimeResponse[LinearSystem]:
-        """Outputs for ``inputs`` (N, nu) at ``time`` (N,) s, interpolated linearly, from state
-        ``start`` (nx,)."""
+        """Outputs for ``inputs`` (N, nu) at the times ``time`` (N,), s, interpolated linearly.
+
+        The initial state is ``start`` (nx,), by default zero.
+        """
         return forced_response(self, time, inputs, start)
 
     # Structure.
@@ -118,16 +124,21 @@ class LinearSystem(StateSpaceModel):
         return reachable_dimensions(self.A.T, self.C.T)
 
     def gramians(self) -> tuple[Array, Array]:
-        """Controllability and observability gramian (nx, nx). Raises ``InputError`` if it is not stable."""
+        """Controllability and observability Gramian (nx, nx).
+
+        Raises ``InputError`` if the system is not stable.
+        """
         return gramians(self)
 
     def minimal(self) -> LinearSystem:
-        """A system with the same transfer function and as few states as possible, named ``x1`` …"""
+        """A system with the same transfer function and the minimum number of states, named ``x1`` …"""
         return minimal(self)
 
     def on_path(self) -> LinearSystem:
-        """The system without states that no input affects or that affect no output; the others keep their
-        names."""
+        """The system without the states that no input affects or that affect no output.
+
+        The remaining states keep their names.
+        """
         return on_path(self)
 
     # Connections.

@@ -20,7 +20,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.analysis.dead_time import HIGHEST_ORDER, PadeApproximation, dead_time
+from armblocks.analysis.dead_time import MAX_ORDER, PadeApproximation, dead_time
 from armblocks.analysis.linear_system import LinearSystem
 from armblocks.analysis.operating_point import OperatingPoint
 from armblocks.equations import HybridSystem, Signature
@@ -37,7 +37,7 @@ MAX_TICKS = 100_000
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ends:
+class SystemPorts:
     """Inputs and outputs of a linear system: names and units of the scalars."""
 
     inputs: tuple[str, ...]
@@ -49,12 +49,12 @@ class Ends:
 def linearise(
     evaluated: EvaluatedSystem,
     point: Point,
-    ends: Ends,
+    ports: SystemPorts,
     known: OperatingPoint | None = None,
     *,
     delay_order: int | None = None,
 ) -> LinearSystem:
-    """The linear system about a point, whose implicit equations are solved there.
+    """The linear system about a point at which the implicit equations are solved.
 
     ``evaluated`` selects the parameters that are the inputs and the signals that are the outputs. ``known``
     is stored with the result. ``delay_order`` is the order of the approximation of every dead time
@@ -64,16 +64,16 @@ def linearise(
     """
     system = evaluated.system
     unknowns = _unknowns(evaluated, point)
-    flow, outputs = _jacobians(evaluated, point, unknowns, ends)
+    flow, outputs = _jacobians(evaluated, point, unknowns, ports)
     names, units = _elements(system.states)
 
-    def ticked(ticking: tuple[int, ...]) -> Jacobians:
+    def tick_jacobians(ticking: tuple[int, ...]) -> Jacobians:
         """The derivatives of ``z`` after a tick with respect to the values before the tick."""
         jacobians = _without(evaluated.update_jacobians(point, np.array(ticking, dtype=np.float64)), unknowns)
         _check_finite(system, _elements(system.discrete)[0], jacobians, "the discrete variable")
         return approximation(jacobians) if approximation else jacobians
 
-    approximation = _approximated(evaluated, point, unknowns, [flow, outputs], delay_order)
+    approximation = _pade_approximation(evaluated, point, unknowns, [flow, outputs], delay_order)
     if approximation:
         flow, outputs = approximation.flow(flow), approximation(outputs)
         names += approximation.names
@@ -83,7 +83,7 @@ def linearise(
         dt = 0.0
     else:
         updated = np.flatnonzero(evaluated.sampled)
-        matrices, dt = _over_a_period(system, ticked, flow, outputs, updated)
+        matrices, dt = _period_map(system, tick_jacobians, flow, outputs, updated)
         discrete_names, discrete_units = _elements(system.discrete)
         names += tuple(discrete_names[k] for k in updated.tolist())
         units += tuple(discrete_units[k] for k in updated.tolist())
@@ -96,24 +96,26 @@ def linearise(
         *matrices,
         dt=dt,
         states=names,
-        inputs=ends.inputs,
-        outputs=ends.outputs,
+        inputs=ports.inputs,
+        outputs=ports.outputs,
         state_units=units,
-        input_units=ends.input_units,
-        output_units=ends.output_units,
+        input_units=ports.input_units,
+        output_units=ports.output_units,
         name=system.name,
         point=known,
     )
 
 
-def exact_response(evaluated: EvaluatedSystem, point: Point, ends: Ends, frequencies: Array) -> Complex:
+def exact_response(
+    evaluated: EvaluatedSystem, point: Point, ports: SystemPorts, frequencies: Array
+) -> Complex:
     """The response (N, ny, nu) about a point at angular frequencies (N,) in rad/s; dead time is exact.
 
     Raises the errors of :func:`linearise`, and ``InputError`` for dead time in a diagram with clocks.
     """
     system = evaluated.system
     if system.delays is None:
-        return linearise(evaluated, point, ends).frequency_response(frequencies)
+        return linearise(evaluated, point, ports).frequency_response(frequencies)
     if system.clocks:
         raise InputError(
             f"the dead time of {_delayed_blocks(system)} is in one diagram with the clock of "
@@ -123,40 +125,40 @@ def exact_response(evaluated: EvaluatedSystem, point: Point, ends: Ends, frequen
             fix="linearize with a delay_order, and use the frequency_response of the result",
         )
     unknowns = _unknowns(evaluated, point)
-    flow, outputs = _jacobians(evaluated, point, unknowns, ends)
+    flow, outputs = _jacobians(evaluated, point, unknowns, ports)
     inputs = _without(evaluated.delay_input_jacobians(point), unknowns)
     dead = dead_time(evaluated, point, inputs, [flow, outputs])
-    opened = LinearSystem(
+    open_loop = LinearSystem(
         flow.x,
         np.hstack([flow.p, flow.z[:, dead.indices]]),
         np.vstack([outputs.x, dead.inputs.x]),
         np.vstack(
             [
                 np.hstack([outputs.p, outputs.z[:, dead.indices]]),
-                np.hstack([dead.inputs.p, dead.through]),
+                np.hstack([dead.inputs.p, dead.feedthrough]),
             ]
         ),
     ).frequency_response(frequencies)
     ny, nu = outputs.p.shape
     delay_factors = np.exp(-1j * np.multiply.outer(frequencies, dead.delays))
     # v = delay_factors (H u + K v), y = D u + F v
-    closed = np.eye(dead.count) - delay_factors[:, :, None] * opened[:, ny:, nu:]
-    v = np.linalg.solve(closed, delay_factors[:, :, None] * opened[:, ny:, :nu])
-    return np.asarray(opened[:, :ny, :nu] + opened[:, :ny, nu:] @ v, dtype=np.complex128)
+    closed = np.eye(dead.count) - delay_factors[:, :, None] * open_loop[:, ny:, nu:]
+    v = np.linalg.solve(closed, delay_factors[:, :, None] * open_loop[:, ny:, :nu])
+    return np.asarray(open_loop[:, :ny, :nu] + open_loop[:, :ny, nu:] @ v, dtype=np.complex128)
 
 
 def _jacobians(
-    evaluated: EvaluatedSystem, point: Point, unknowns: Jacobians | None, ends: Ends
+    evaluated: EvaluatedSystem, point: Point, unknowns: Jacobians | None, ports: SystemPorts
 ) -> tuple[Jacobians, Jacobians]:
     """The derivatives of the flow and of the outputs. Raises an error if one is not finite."""
     flow = _without(evaluated.derivative_jacobians(point), unknowns)
     outputs = _without(evaluated.signal_jacobians(point), unknowns)
     _check_finite(evaluated.system, _elements(evaluated.system.states)[0], flow, "the rate of state")
-    _check_finite(evaluated.system, ends.outputs, outputs, "the output")
+    _check_finite(evaluated.system, ports.outputs, outputs, "the output")
     return flow, outputs
 
 
-def _approximated(
+def _pade_approximation(
     evaluated: EvaluatedSystem,
     point: Point,
     unknowns: Jacobians | None,
@@ -171,15 +173,15 @@ def _approximated(
         raise InputError(
             f"the dead time of {_delayed_blocks(system)} has no finite linear system",
             where=system.name,
-            allowed="dead time with the order of its approximation",
+            allowed="dead time with `delay_order`, the order of its approximation",
             fix="give delay_order=3, which is accurate up to about 3 / delay in rad/s",
         )
     if not _is_order(order):
         raise InputError(
             f"the delay_order is {order!r}",
             where=system.name,
-            allowed=f"an integer from 1 to {HIGHEST_ORDER}",
-            fix="3 is a good start",
+            allowed=f"an integer from 1 to {MAX_ORDER}",
+            fix="begin with delay_order=3",
         )
     all_readers = [*readers]
     if system.clocks:
@@ -189,10 +191,11 @@ def _approximated(
 
 
 def _is_order(order: object) -> bool:
-    return isinstance(order, int) and not isinstance(order, bool) and 1 <= order <= HIGHEST_ORDER
+    return isinstance(order, int) and not isinstance(order, bool) and 1 <= order <= MAX_ORDER
 
 
 def _delayed_blocks(system: HybridSystem) -> str:
+    """The paths of all blocks with dead time, as text."""
     names, _ = _elements(system.discrete)
     indices = system.delays.values if system.delays else ()
     return ", ".join(sorted({names[k].rpartition("/")[0] for k in indices}))
@@ -205,8 +208,10 @@ def _elements(layout: Signature) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def _unknowns(evaluated: EvaluatedSystem, point: Point) -> Jacobians | None:
-    """The derivatives of the unknowns of the implicit equations with respect to all other variables; ``None``
-    without unknowns."""
+    """The derivatives of the unknowns of the implicit equations with respect to all other variables.
+
+    ``None`` without unknowns.
+    """
     system = evaluated.system
     if not system.algebraic.size:
         return None
@@ -220,10 +225,10 @@ def _unknowns(evaluated: EvaluatedSystem, point: Point) -> Jacobians | None:
             fix="linearize at another point, or change the loop",
         )
 
-    def follow(right: Array) -> Array:
+    def sensitivity(right: Array) -> Array:
         return np.asarray(-np.linalg.solve(matrix, right), dtype=np.float64)
 
-    return Jacobians(t=follow(j.t), x=follow(j.x), z=follow(j.z), w=matrix, p=follow(j.p))
+    return Jacobians(t=sensitivity(j.t), x=sensitivity(j.x), z=sensitivity(j.z), w=matrix, p=sensitivity(j.p))
 
 
 def _without(j: Jacobians, unknowns: Jacobians | None) -> Jacobians:
@@ -240,6 +245,7 @@ def _without(j: Jacobians, unknowns: Jacobians | None) -> Jacobians:
 
 
 def _check_finite(system: HybridSystem, names: Sequence[str], j: Jacobians, subject: str) -> None:
+    """Raise ``SimulationError`` if a derivative is not finite; ``names`` are the names of the rows."""
     for row, name in enumerate(names):
         if not all(np.isfinite(part[row]).all() for part in (j.x, j.z, j.p)):
             raise SimulationError(
@@ -250,9 +256,9 @@ def _check_finite(system: HybridSystem, names: Sequence[str], j: Jacobians, subj
             )
 
 
-def _over_a_period(
+def _period_map(
     system: HybridSystem,
-    ticked: Callable[[tuple[int, ...]], Jacobians],
+    tick_jacobians: Callable[[tuple[int, ...]], Jacobians],
     flow: Jacobians,
     outputs: Jacobians,
     updated: NDArray[np.intp],
@@ -267,40 +273,40 @@ def _over_a_period(
     generator[:n] = np.hstack([flow.x, flow.z[:, updated], flow.p])
     flows: dict[Fraction, Array] = {}
     ticks: dict[tuple[int, ...], Array] = {}
-    whole = np.eye(n + m + k)
+    transition = np.eye(n + m + k)
     output = np.hstack([outputs.x, outputs.z[:, updated], outputs.p])
     times = [time for time, _ in instants]
     for index, (time, ticking) in enumerate(instants):
         if ticking not in ticks:
-            j = ticked(ticking)
+            j = tick_jacobians(ticking)
             jump = np.eye(n + m + k)
             jump[n : n + m] = np.hstack([j.x[updated], j.z[np.ix_(updated, updated)], j.p[updated]])
             ticks[ticking] = jump
-        whole = ticks[ticking] @ whole
+        transition = ticks[ticking] @ transition
         if index == 0:
-            output = output @ whole
-        gap = (times[index + 1] if index + 1 < len(times) else times[0] + period) - time
-        if gap not in flows:
-            flows[gap] = expm(generator * float(gap))
-        whole = flows[gap] @ whole
+            output = output @ transition
+        interval = (times[index + 1] if index + 1 < len(times) else times[0] + period) - time
+        if interval not in flows:
+            flows[interval] = expm(generator * float(interval))
+        transition = flows[interval] @ transition
     size = n + m
-    a, b = whole[:size, :size], whole[:size, size:]
+    a, b = transition[:size, :size], transition[:size, size:]
     return (a, b, output[:, :size], output[:, size:]), float(period)
 
 
 def ticks_of_a_period(system: HybridSystem) -> tuple[Fraction, list[tuple[Fraction, tuple[int, ...]]]]:
-    """The least common multiple of all periods (s), and every tick time of one period with the ticking
-    clocks.
+    """The least common multiple of all periods (s), and the ticks of one period.
 
-    Sample times have the same ratios as in a run (:mod:`armblocks.equations.clock_ratios`). Raises
-    ``InputError`` if one period has more than ``MAX_TICKS`` ticks.
+    Each tick is a time and one mark (1 or 0) for every clock. Sample times have the same ratios as in a run
+    (:mod:`armblocks.equations.clock_ratios`). Raises ``InputError`` if one period has more than ``MAX_TICKS``
+    ticks.
     """
     clocks = exact_clocks(system.clocks)
-    periods = [own for own, _ in clocks]
+    periods = [clock_period for clock_period, _ in clocks]
     period = common_period(clocks)
-    count = sum(int(period / own) for own in periods)
+    count = sum(int(period / clock_period) for clock_period in periods)
     if count > MAX_TICKS:
-        listed = ", ".join(f"{float(own):g} s" for own in periods)
+        listed = ", ".join(f"{float(clock_period):g} s" for clock_period in periods)
         raise InputError(
             f"the clocks ({listed}) have the common period {float(period):g} s with {count} ticks",
             where=system.name,
@@ -308,9 +314,9 @@ def ticks_of_a_period(system: HybridSystem) -> tuple[Fraction, list[tuple[Fracti
             fix="choose sample times that are multiples of one another",
         )
     ticking: dict[Fraction, list[int]] = {}
-    for clock, (own, offset) in enumerate(clocks):
-        for tick in range(int(period / own)):
-            ticking.setdefault(offset + tick * own, [0] * len(periods))[clock] = 1
+    for clock, (clock_period, offset) in enumerate(clocks):
+        for tick in range(int(period / clock_period)):
+            ticking.setdefault(offset + tick * clock_period, [0] * len(periods))[clock] = 1
     return period, [(time, tuple(clock_flags)) for time, clock_flags in sorted(ticking.items())]
 
 
@@ -323,13 +329,15 @@ def _needed_states(
     held = np.zeros(n + updated.size, dtype=np.bool_)
     names = [slot.name for slot in system.discrete for _ in range(slot.size)]
     held[n:] = [names[k] in system.signals_layout.ranges for k in updated]
-    idle = ~(a.any(axis=0) | c.any(axis=0))
-    return np.flatnonzero(~(held & idle))
+    unread = ~(a.any(axis=0) | c.any(axis=0))
+    return np.flatnonzero(~(held & unread))
 
 
-def input_ends(system: HybridSystem, paths: Mapping[str, str]) -> tuple[list[int], tuple[str, ...]]:
-    """Indices in ``p`` and names of the scalars of some parameters, given as a map from display names to
-    paths."""
+def input_scalars(system: HybridSystem, paths: Mapping[str, str]) -> tuple[list[int], tuple[str, ...]]:
+    """Indices in ``p`` and names of the scalars of some parameters.
+
+    ``paths`` maps the displayed names of the parameters to their paths.
+    """
     indices: list[int] = []
     names: list[str] = []
     for name, path in paths.items():
@@ -339,17 +347,17 @@ def input_ends(system: HybridSystem, paths: Mapping[str, str]) -> tuple[list[int
     return indices, tuple(names)
 
 
-def output_ends(system: HybridSystem, paths: Mapping[str, str]) -> tuple[list[int], Ends]:
-    """Rows of ``y``, names and units of the scalars of some signals, given as a map from display names to
-    paths. The inputs of the result are empty.
+def output_scalars(system: HybridSystem, paths: Mapping[str, str]) -> tuple[list[int], SystemPorts]:
+    """Rows of ``y``, names and units of the scalars of some signals.
 
-    Raises ``UnknownNameError``.
+    ``paths`` maps the displayed names of the signals to their paths. The inputs of the result are empty.
+    Raises ``UnknownNameError`` for an unknown signal.
     """
     rows: list[int] = []
     names: list[str] = []
     units: list[str] = []
-    for name, own in paths.items():
-        path = system.aliases.get(own, own)
+    for name, alias in paths.items():
+        path = system.aliases.get(alias, alias)
         if path not in system.signals_layout.ranges:
             known = [*system.signals_layout.names, *system.aliases]
             raise UnknownNameError("signal", name, known, where=system.name)
@@ -357,4 +365,4 @@ def output_ends(system: HybridSystem, paths: Mapping[str, str]) -> tuple[list[in
         rows += range(*system.signals_layout.ranges[path].indices(system.signals_layout.size))
         names += [name + element.removeprefix(path) for element in slot.elements]
         units += [slot.unit] * slot.size
-    return rows, Ends(inputs=(), input_units=(), outputs=tuple(names), output_units=tuple(units))
+    return rows, SystemPorts(inputs=(), input_units=(), outputs=tuple(names), output_units=tuple(units))

@@ -60,7 +60,7 @@ class Margins:
         return 20.0 * math.log10(self.gain) if math.isfinite(self.gain) else math.inf
 
 
-def _located(function: Callable[[float], float], low: float, high: float) -> float:
+def _bisected(function: Callable[[float], float], low: float, high: float) -> float:
     """The zero between two frequencies with values of opposite sign, by bisection to the last digits."""
     below = function(low)
     for _ in range(_BISECTIONS):
@@ -76,6 +76,7 @@ def _located(function: Callable[[float], float], low: float, high: float) -> flo
 
 
 def _response_at(system: StateSpaceModel, frequency: float) -> complex:
+    """The response of a system with one input and one output at a frequency (rad/s)."""
     return complex(frequency_response(system, np.array([frequency]))[0, 0, 0])
 
 
@@ -100,20 +101,20 @@ def margins(system: StateSpaceModel) -> Margins:
     phase_crossings: list[tuple[float, float]] = []
     gain_crossings: list[tuple[float, float]] = []
 
-    def size(frequency: float) -> float:
+    def gain_excess(frequency: float) -> float:
         return abs(_response_at(loop, frequency)) - 1.0
 
-    def side(frequency: float) -> float:
+    def imaginary_part(frequency: float) -> float:
         return _response_at(loop, frequency).imag
 
     above = np.abs(response) > 1.0
     for k in np.flatnonzero(above[1:] != above[:-1]).tolist():
-        frequency = _located(size, float(grid[k]), float(grid[k + 1]))
+        frequency = _bisected(gain_excess, float(grid[k]), float(grid[k + 1]))
         angle = math.degrees(math.atan2(*(lambda v: (v.imag, v.real))(-_response_at(loop, frequency))))
         phase_crossings.append((frequency, angle))
     upper = response.imag > 0.0
     for k in np.flatnonzero((upper[1:] != upper[:-1]) & (response.real[1:] < 0.0)).tolist():
-        frequency = _located(side, float(grid[k]), float(grid[k + 1]))
+        frequency = _bisected(imaginary_part, float(grid[k]), float(grid[k + 1]))
         value = _response_at(loop, frequency)
         if value.real < 0.0 and abs(value.imag) <= 1e-6 * abs(value):
             gain_crossings.append((frequency, -1.0 / value.real))
@@ -121,10 +122,10 @@ def margins(system: StateSpaceModel) -> Margins:
         value = complex(loop.D[0, 0]) if math.isinf(frequency) else _response_at(loop, frequency)
         if math.isfinite(value.real) and value.real < 0.0:
             gain_crossings.append((frequency, -1.0 / value.real))
-    return _gathered(loop, grid, response, gain_crossings, phase_crossings)
+    return _collected_margins(loop, grid, response, gain_crossings, phase_crossings)
 
 
-def _gathered(
+def _collected_margins(
     loop: StateSpaceModel,
     grid: Array,
     response: Complex,
@@ -152,8 +153,10 @@ def _gathered(
 
 
 def _nearest_to_minus_one(loop: StateSpaceModel, grid: Array, response: Complex) -> tuple[float, float]:
-    """The minimum of ``|1 + L|``, by golden-section search between the neighbours of the nearest grid
-    point."""
+    """The frequency of the minimum of ``|1 + L|``, and the minimum.
+
+    Golden-section search is used between the neighbours of the nearest grid point.
+    """
     k = int(np.nanargmin(np.abs(1.0 + response)))
     low, high = float(grid[max(k - 1, 0)]), float(grid[min(k + 1, len(grid) - 1)])
     ratio = (math.sqrt(5.0) - 1.0) / 2.0
@@ -176,15 +179,15 @@ def bandwidth(system: StateSpaceModel, drop: float) -> float:
             allowed="one of each",
             fix="choose with system.select(output, input)",
         )
-    rest = abs(float(shown_dcgain(system)[0, 0]))
-    if not math.isfinite(rest) or rest == 0.0:
+    steady_state_gain = abs(float(shown_dcgain(system)[0, 0]))
+    if not math.isfinite(steady_state_gain) or steady_state_gain == 0.0:
         raise InputError(
-            f"the gain at rest is {rest:g}",
+            f"the steady-state gain is {steady_state_gain:g}",
             where=system.name,
-            allowed="a finite gain at rest that is not 0",
+            allowed="a finite steady-state gain that is not 0",
             fix="compute the bandwidth of the closed loop",
         )
-    level = rest * 10.0 ** (-drop / 20.0)
+    level = steady_state_gain * 10.0 ** (-drop / 20.0)
     low, high = frequency_range(system)
     grid = frequency_grid(system, 1e-3 * low, high if system.is_discrete else 1e3 * high, 2000)
     below = np.abs(frequency_response(system, grid)[:, 0, 0]) < level
@@ -193,14 +196,17 @@ def bandwidth(system: StateSpaceModel, drop: float) -> float:
     k = int(np.argmax(below))
     if k == 0:
         return float(grid[0])
-    return _located(
+    return _bisected(
         lambda frequency: abs(_response_at(system, frequency)) - level, float(grid[k - 1]), float(grid[k])
     )
 
 
 def shown_margins(system: StateSpaceModel) -> Margins:
-    """:meth:`LinearSystem.margins`; 0 dB, 0 deg, 0 s and a distance of 0 where the loop goes through -1 to
-    the accuracy of the computation."""
+    """The displayed margins: :meth:`LinearSystem.margins` without rounding errors.
+
+    They are 0 dB, 0 deg, 0 s and a distance of 0 if the loop passes through -1 within the accuracy of the
+    computation.
+    """
     computed = margins(system)
     loop = minimal(system)
 
@@ -223,7 +229,7 @@ def shown_margins(system: StateSpaceModel) -> Margins:
     phase = min(phases, key=lambda pair: abs(pair[1]), default=(math.nan, math.inf))
     delays = [(f, math.radians(angle % 360.0) / f) for f, angle in phases]
     delay = min(delays, key=lambda pair: pair[1], default=(math.nan, math.inf))
-    touching = computed.modulus <= math.prod(accuracy(computed.modulus_frequency))
+    passes_through = computed.modulus <= math.prod(accuracy(computed.modulus_frequency))
     return dataclasses.replace(
         computed,
         gain=gain[1],
@@ -232,7 +238,7 @@ def shown_margins(system: StateSpaceModel) -> Margins:
         phase_frequency=phase[0],
         delay=delay[1],
         delay_frequency=delay[0],
-        modulus=0.0 if touching else computed.modulus,
+        modulus=0.0 if passes_through else computed.modulus,
         gain_crossings=tuple(gains),
         phase_crossings=tuple(phases),
     )

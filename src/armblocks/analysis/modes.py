@@ -17,9 +17,12 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True, kw_only=True)
 class Mode:
-    """One pole. ``frequency``: the natural frequency ``|s|``, rad/s. ``damping``: the ratio ``-Re s / |s|``,
-    1 by convention for ``s = 0``. ``time_constant``: ``-1 / Re s``, s; infinite on the imaginary axis,
-    negative for an unstable pole. For a discrete system ``s = log(z) / dt``."""
+    """A pole and the properties of its mode.
+
+    ``frequency``: the natural frequency ``|s|``, rad/s. ``damping``: the ratio ``-Re s / |s|``, 1 by
+    convention for ``s = 0``. ``time_constant``: ``-1 / Re s``, s; infinite on the imaginary axis, negative
+    for an unstable pole. For a discrete system ``s = log(z) / dt``.
+    """
 
     pole: complex
     frequency: float
@@ -28,7 +31,7 @@ class Mode:
 
 
 def poles(system: StateSpaceModel) -> Complex:
-    """Eigenvalues of A, slowest first; of two conjugates the one with positive imaginary part is first.
+    """Eigenvalues of A, slowest first; the conjugate with positive imaginary part comes first.
 
     They are computed for each irreducible diagonal block of A. The eigenvalue of a state that is in no loop
     is then exact, and a fast part of a system does not reduce the accuracy of a slow part.
@@ -43,7 +46,10 @@ def poles(system: StateSpaceModel) -> Complex:
 
 
 def irreducible_parts(A: Array) -> list[list[int]]:
-    """Groups of states that act on each other, directly or through others. A is block triangular in them."""
+    """Groups of states that affect each other, directly or through other states.
+
+    The groups can be ordered such that A is block triangular.
+    """
     with from_extra("analysis", "poles of a linear system"):
         from scipy.sparse.csgraph import connected_components
 

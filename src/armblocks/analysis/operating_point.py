@@ -15,12 +15,16 @@ from armblocks.errors import SimulationError
 Array = NDArray[np.float64]
 
 MAX_ITERATIONS = 60
+"""Maximum number of Newton steps."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OperatingPoint:
-    """The values of a system at ``time`` (s): states, discrete variables with modes, unknowns of implicit
-    equations, tunable parameters and signals, each by its path and in its shape."""
+    """The values of all variables of a system at ``time`` (s), each by its path and in its shape.
+
+    They are states, discrete variables with modes, unknowns of implicit equations, tunable parameters and
+    signals.
+    """
 
     name: str
     time: float
@@ -76,7 +80,7 @@ def transferred_point(
     """The same operating point in a system with more parameters, and possibly other unknowns.
 
     ``parameters`` are the values of the parameters that ``known`` does not have. Every unknown is the value
-    of a signal, so it is known too, up to the last Newton step.
+    of a signal of ``known``, so Newton's method starts close to the solution.
     """
     system = evaluated.system
     guess = system.initial_algebraic(system.parameter_values)[0].copy()
@@ -109,10 +113,9 @@ def _signal_entry(signals: Mapping[str, Array], unknown: str) -> Array | None:
 
 
 def solved(evaluated: EvaluatedSystem, point: Point) -> Point:
-    """The point with ``w`` that solves the implicit equations (Newton's method with halved steps where
-    needed).
+    """The point whose ``w`` solves the implicit equations, by Newton's method with step halving.
 
-    Raises ``SimulationError``.
+    Raises ``SimulationError`` if there is no solution near ``point.w``.
     """
     system = evaluated.system
     if not system.algebraic.size:
@@ -129,14 +132,14 @@ def solved(evaluated: EvaluatedSystem, point: Point) -> Point:
         if np.isfinite(step).all() and np.abs(step).max() <= 1e-14 * max(1.0, float(np.abs(w).max())):
             w = w + step
             break
-        share = 1.0
+        fraction = 1.0
         trial = evaluated.residual(at(w + step))
-        while not np.linalg.norm(trial) < np.linalg.norm(residual) and share > 1e-6:
-            share /= 2.0
-            trial = evaluated.residual(at(w + share * step))
-        if share <= 1e-6:
+        while not np.linalg.norm(trial) < np.linalg.norm(residual) and fraction > 1e-6:
+            fraction /= 2.0
+            trial = evaluated.residual(at(w + fraction * step))
+        if fraction <= 1e-6:
             break
-        w, residual = w + share * step, trial
+        w, residual = w + fraction * step, trial
     if np.abs(residual).max() <= 1e-9 * max(1.0, float(np.abs(w).max())):
         return at(w)
     worst = system.algebraic.names[int(np.argmax(np.abs(residual)))]

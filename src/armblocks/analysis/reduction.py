@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 def staircase(A: Array, B: Array) -> tuple[Array, int]:
     """An orthogonal basis (n, n) whose first ``k`` columns span the controllable subspace, and ``k``.
 
-    The staircase algorithm (Van Dooren, IEEE Trans. Automatic Control 26, 1981, 111-129): rank decisions on
-    blocks instead of on the powers of the controllability matrix.
+    The staircase algorithm (Van Dooren, IEEE Trans. Automatic Control 26, 1981, 111-129) determines
+    ranks of blocks, not of powers of A as the controllability matrix.
     """
     n = A.shape[0]
     basis = np.eye(n)
@@ -27,8 +27,8 @@ def staircase(A: Array, B: Array) -> tuple[Array, int]:
     tolerance = 10.0 * n * np.finfo(np.float64).eps * scale
     dimension, block = 0, B
     while True:
-        left, sizes, _ = np.linalg.svd(block)
-        rank = int((sizes > tolerance).sum())
+        left, singular_values, _ = np.linalg.svd(block)
+        rank = int((singular_values > tolerance).sum())
         if not rank:
             return basis, dimension
         basis[:, dimension:] = basis[:, dimension:] @ left
@@ -66,7 +66,10 @@ def minimal(system: SystemT) -> SystemT:
 
 
 def on_path(system: SystemT) -> SystemT:
-    """Keep the states on a path from an input to an output in the graph of the nonzero matrix entries."""
+    """The system with only the states on a path from an input to an output.
+
+    The paths are those of the graph of the nonzero matrix entries.
+    """
     links = system.A != 0.0
 
     def connected(begin: NDArray[np.bool_], matrix: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 MAX_GAINS = 3000
-FINEST = 1e-7
+"""Maximum number of gains that are chosen automatically."""
+MIN_GAIN_SPACING = 1e-7
 """Minimum relative distance of neighbouring gains."""
 
 
@@ -33,11 +34,11 @@ class RootLocus:
 
 
 def root_locus(system: LinearSystem, gains: Array | None = None) -> RootLocus:
-    """The branches of a loop with negative feedback. ``gains=None``: from 0 until the roots are near their
-    limits.
+    """The branches of a loop with negative feedback; by default the gains are chosen automatically.
 
-    Gains are denser where the roots move fast, so that branches can be distinguished where they meet. Raises
-    ``InputError`` for more than one input or output, and for a system without states.
+    They then range from 0 to a gain at which the roots are near their limits, and are denser where the roots
+    move fast, so that branches can be distinguished where they meet. Raises ``InputError`` for more than one
+    input or output, and for a system without states.
     """
     if not system.is_siso or not system.order:
         raise InputError(
@@ -53,7 +54,7 @@ def root_locus(system: LinearSystem, gains: Array | None = None) -> RootLocus:
         chosen = np.asarray(gains, dtype=np.float64)
         rows = [_roots(loop, float(gain)) for gain in chosen]
     else:
-        chosen, rows = _adapted(loop, zeros)
+        chosen, rows = _adaptive_gains(loop, zeros)
     return RootLocus(system=loop, gains=chosen, roots=_tracked(rows), zeros=zeros)
 
 
@@ -70,51 +71,52 @@ def _roots(loop: LinearSystem, gain: float) -> Complex:
 
     direct = 1.0 + gain * float(loop.D[0, 0])
     if direct == 0.0:  # only at this gain a root is infinite
-        return _roots(loop, gain * (1.0 + FINEST))
+        return _roots(loop, gain * (1.0 + MIN_GAIN_SPACING))
     return eigvals(loop.A - (gain / direct) * (loop.B @ loop.C))
 
 
-def _adapted(loop: LinearSystem, zeros: Complex) -> tuple[Array, list[Complex]]:
+def _adaptive_gains(loop: LinearSystem, zeros: Complex) -> tuple[Array, list[Complex]]:
     """Gains up to the one at which every root is next to a zero or outside the figure."""
-    reach = extent(loop, zeros)
+    radius = extent(loop, zeros)
     last = 1e-6 / max(float(np.abs(loop.B).max() * np.abs(loop.C).max()), 1e-12)
     for _ in range(120):
         roots = _roots(loop, last)
-        near = np.abs(roots[:, None] - zeros[None, :]).min(axis=1, initial=np.inf) < 0.01 * reach
-        if bool((near | (np.abs(roots) > 1.3 * reach)).all()):
+        is_near_zero = np.abs(roots[:, None] - zeros[None, :]).min(axis=1, initial=np.inf) < 0.01 * radius
+        if bool((is_near_zero | (np.abs(roots) > 1.3 * radius)).all()):
             break
         last *= 2.0
     gains = [0.0, *np.geomspace(last * 1e-6, last, 80).tolist()]
     rows = [_roots(loop, gain) for gain in gains]
     k = 0
     while k + 1 < len(gains) and len(gains) < MAX_GAINS:
-        apart = gains[k + 1] - gains[k] > FINEST * gains[k + 1]
-        if apart and _largest_movement(rows[k], rows[k + 1], reach) > 0.02 * reach:
-            between = (gains[k] + gains[k + 1]) / 2.0
-            gains.insert(k + 1, between)
-            rows.insert(k + 1, _roots(loop, between))
+        can_be_divided = gains[k + 1] - gains[k] > MIN_GAIN_SPACING * gains[k + 1]
+        if can_be_divided and _largest_movement(rows[k], rows[k + 1], radius) > 0.02 * radius:
+            middle = (gains[k] + gains[k + 1]) / 2.0
+            gains.insert(k + 1, middle)
+            rows.insert(k + 1, _roots(loop, middle))
         else:
             k += 1
     return np.array(gains), rows
 
 
-def _pairs(before: Complex, after: Complex) -> NDArray[np.intp]:
+def _partners(before: Complex, after: Complex) -> NDArray[np.intp]:
+    """For each root in ``before``, the index of the root in ``after`` on the same branch."""
     with from_extra("analysis", "root loci"):
         from scipy.optimize import linear_sum_assignment
 
     return linear_sum_assignment(np.abs(before[:, None] - after[None, :]))[1]
 
 
-def _largest_movement(before: Complex, after: Complex, reach: float) -> float:
+def _largest_movement(before: Complex, after: Complex, radius: float) -> float:
     """The largest movement of a root that is inside the figure."""
-    partners = after[_pairs(before, after)]
-    visible = (np.abs(before) < 1.3 * reach) | (np.abs(partners) < 1.3 * reach)
+    partners = after[_partners(before, after)]
+    visible = (np.abs(before) < 1.3 * radius) | (np.abs(partners) < 1.3 * radius)
     return float((np.abs(partners - before) * visible).max(initial=0.0))
 
 
 def _tracked(rows: list[Complex]) -> Complex:
-    """Assign the roots to columns so that the distances to the previous roots are smallest in total."""
+    """Assign the roots to columns such that the sum of the distances to the previous roots is minimal."""
     tracked = [rows[0]]
     for row in rows[1:]:
-        tracked.append(row[_pairs(tracked[-1], row)])
+        tracked.append(row[_partners(tracked[-1], row)])
     return np.array(tracked)

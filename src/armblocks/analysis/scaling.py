@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 MAX_SWEEPS = 30
+"""Maximum number of passes over all states."""
 
 
 def balanced(A: Array, B: Array, C: Array) -> tuple[Array, Array, Array]:

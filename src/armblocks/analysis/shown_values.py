@@ -36,10 +36,10 @@ Complex = NDArray[np.complex128]
 ROUNDOFFS = 10.0
 """Rounding errors that each of n rows may contribute, in units of the roundoff."""
 EPSILON = float(np.finfo(np.float64).eps)
-SHARES = (1.0, 0.75, 0.5, 0.25)
+LINE_POSITIONS = (1.0, 0.75, 0.5, 0.25)
 """Positions on the line from a root to its candidate at which the pseudospectrum is checked."""
-FAR = 100.0
-"""Candidates farther from a root than this many times its first-order error are not checked."""
+MAX_ERROR_RATIO = 100.0
+"""A candidate is checked if its distance is at most this many times the first-order error of the root."""
 
 
 class _Pencil:
@@ -50,24 +50,27 @@ class _Pencil:
             from scipy.linalg import eig
 
         self.M, self.N, self.tolerance = M, N, tolerance
-        self.known, left, right = eig(M, N, left=True, right=True)
+        self.roots, left, right = eig(M, N, left=True, right=True)
         cosines = np.abs(np.einsum("ik,ij,jk->k", left.conj(), N, right))
         lengths = np.linalg.norm(left, axis=0) * np.linalg.norm(right, axis=0)
         with np.errstate(divide="ignore"):
-            self.reaches = FAR * tolerance * lengths / cosines
+            self.reaches = MAX_ERROR_RATIO * tolerance * lengths / cosines
 
     def shown(self, root: complex, candidates: Sequence[complex]) -> complex:
         """The first candidate that cannot be distinguished from the root, else the root."""
-        reach = float(self.reaches[int(np.argmin(np.abs(self.known - root)))])
+        reach = float(self.reaches[int(np.argmin(np.abs(self.roots - root)))])
         for candidate in candidates:
             if candidate == root or (
                 abs(candidate - root) <= reach
-                and all(self._holds(root + share * (candidate - root)) for share in SHARES)
+                and all(
+                    self._is_in_pseudospectrum(root + position * (candidate - root))
+                    for position in LINE_POSITIONS
+                )
             ):
                 return candidate
         return root
 
-    def _holds(self, s: complex) -> bool:
+    def _is_in_pseudospectrum(self, s: complex) -> bool:
         """Whether this number is in the pseudospectrum, so that rounding alone can make it a root."""
         sizes = np.linalg.svd(self.M - s * self.N, compute_uv=False)
         return bool(sizes[-1] <= self.tolerance)
@@ -92,10 +95,10 @@ def shown_poles(system: StateSpaceModel) -> Complex:
         if len(part) == 1:
             shown.append(complex(block[0, 0]))  # exact
             continue
-        nothing = np.empty((0, len(part)))
-        matrix, _, _ = balanced(block, nothing.T, nothing)
-        unit = float(np.linalg.norm(matrix))
-        pencil = _Pencil(matrix, np.eye(len(part)), ROUNDOFFS * len(part) * EPSILON * unit)
+        no_ports = np.empty((0, len(part)))
+        matrix, _, _ = balanced(block, no_ports.T, no_ports)
+        norm = float(np.linalg.norm(matrix))
+        pencil = _Pencil(matrix, np.eye(len(part)), ROUNDOFFS * len(part) * EPSILON * norm)
         roots = eigvals(block).tolist()
         shown += [pencil.shown(root, _candidates(root, system.is_discrete)) for root in roots]
     return in_order(np.array(shown, dtype=np.complex128), discrete=system.is_discrete)
@@ -112,41 +115,47 @@ def shown_zeros(system: StateSpaceModel) -> Complex:
 
 
 def shown_modes(system: StateSpaceModel) -> tuple[Mode, ...]:
-    """:meth:`LinearSystem.damp` of the displayed poles."""
+    """The modes of the displayed poles, as :meth:`LinearSystem.damp`."""
     modes: list[Mode] = []
     for pole in shown_poles(system).tolist():
         mode = mode_of(complex(pole), system.dt)
-        if system.is_discrete and on_edge(pole, discrete=True):
+        if system.is_discrete and on_stability_boundary(pole, discrete=True):
             # On the unit circle the decay rate is exactly 0, but log(|z|) has a rounding error.
             mode = dataclasses.replace(mode, damping=0.0 if mode.frequency else 1.0, time_constant=math.inf)
         modes.append(mode)
     return tuple(modes)
 
 
-def on_edge(pole: complex, *, discrete: bool) -> bool:
+def on_stability_boundary(pole: complex, *, discrete: bool) -> bool:
     """Whether a displayed pole is on the imaginary axis, or on the unit circle."""
     return abs(abs(pole) - 1.0) <= 2.0 * EPSILON if discrete else pole.real == 0.0
 
 
 def growth(system: StateSpaceModel) -> float:
-    """The largest real part of the displayed poles, or the largest ``|z| - 1``: 0 on the stability boundary,
-    ``-inf`` without poles."""
+    """The largest real part of the displayed poles; for a sampled system the largest ``|z| - 1``.
+
+    It is 0 on the stability boundary, and ``-inf`` without poles.
+    """
     discrete = system.is_discrete
     rates = [
-        0.0 if on_edge(pole, discrete=discrete) else (abs(pole) - 1.0 if discrete else pole.real)
+        0.0
+        if on_stability_boundary(pole, discrete=discrete)
+        else (abs(pole) - 1.0 if discrete else pole.real)
         for pole in shown_poles(system).tolist()
     ]
     return max(rates, default=-math.inf)
 
 
 def is_stable(system: StateSpaceModel) -> bool:
-    """Whether every free motion decays: see :attr:`LinearSystem.is_stable`."""
+    """See :attr:`LinearSystem.is_stable`."""
     return growth(system) < 0.0
 
 
 def response_errors(system: StateSpaceModel, s: complex) -> tuple[float, float]:
-    """For a system with one input and one output: a bound of the rounding error of its response at a complex
-    number, and the magnitude of the derivative of the response there."""
+    """A bound of the rounding error of the response at ``s``, and the magnitude of its derivative there.
+
+    The system has one input and one output.
+    """
     n = system.order
     direct = abs(float(system.D[0, 0]))
     if not n:
@@ -191,6 +200,6 @@ def shown_matrices(system: StateSpaceModel) -> tuple[Array, Array, Array, Array]
     scaled = np.block([[a, b], [c, d]])
     rows = np.linalg.norm(scaled, axis=1, keepdims=True)
     columns = np.linalg.norm(scaled, axis=0, keepdims=True)
-    whole = np.block([[system.A, system.B], [system.C, system.D]])
-    shown = np.where(np.abs(scaled) <= EPSILON * np.minimum(rows, columns), 0.0, whole)
+    unscaled = np.block([[system.A, system.B], [system.C, system.D]])
+    shown = np.where(np.abs(scaled) <= EPSILON * np.minimum(rows, columns), 0.0, unscaled)
     return shown[:n, :n], shown[:n, n:], shown[n:, :n], shown[n:, n:]

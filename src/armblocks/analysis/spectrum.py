@@ -70,7 +70,7 @@ def signal_spectrum(
         raise UnknownNameError("quantity", quantity, QUANTITIES, where="spectrum")
     if window not in WINDOWS:
         raise UnknownNameError("window", window, list(WINDOWS), where="spectrum")
-    samples, rate = _evenly(np.asarray(time, dtype=np.float64), signals, sample_rate, begin)
+    samples, rate = _evenly_sampled(np.asarray(time, dtype=np.float64), signals, sample_rate, begin)
     length = 2 * len(samples) // (averages + 1)
     length -= length % 2
     if length < 4:
@@ -78,14 +78,14 @@ def signal_spectrum(
             f"{averages} segments of {len(samples)} samples are requested",
             where="spectrum",
             allowed="4 samples or more in each segment",
-            fix="run longer, record more finely, or average less",
+            fix="simulate longer, decrease the sample time, or decrease averages",
         )
     angle = 2.0 * math.pi * np.arange(length) / length
     weights = np.asarray(sum(a * np.cos(k * angle) for k, a in enumerate(WINDOWS[window])))
-    pieces = np.stack([samples[k * length // 2 :][:length] for k in range(averages)])
+    segments = np.stack([samples[k * length // 2 :][:length] for k in range(averages)])
     if remove_mean:
-        pieces = pieces - pieces.mean(axis=1, keepdims=True)
-    power = (np.abs(np.fft.rfft(pieces * weights[:, None], axis=1)) ** 2).mean(axis=0)
+        segments = segments - segments.mean(axis=1, keepdims=True)
+    power = (np.abs(np.fft.rfft(segments * weights[:, None], axis=1)) ** 2).mean(axis=0)
     if quantity == "amplitude":
         values = 2.0 * np.sqrt(power) / weights.sum()
         values[[0, -1]] /= 2.0  # 0 and half the rate have no negative counterpart
@@ -102,9 +102,11 @@ def signal_spectrum(
     )
 
 
-def _evenly(time: Array, signals: ArrayLike, sample_rate: float, begin: float) -> tuple[Array, float]:
-    """Evenly spaced samples (n, k) and their rate. The last sample is omitted, because after whole periods it
-    equals the first."""
+def _evenly_sampled(time: Array, signals: ArrayLike, sample_rate: float, begin: float) -> tuple[Array, float]:
+    """Evenly spaced samples (n, k) and their rate (Hz).
+
+    The last sample is omitted, because after an integer number of periods it equals the first.
+    """
     values = np.asarray(signals, dtype=np.float64).reshape(time.size, -1)
     steps = np.diff(time)
     steps = steps[steps > 0.0]
@@ -122,12 +124,12 @@ def _evenly(time: Array, signals: ArrayLike, sample_rate: float, begin: float) -
     count = math.floor(span * sample_rate + 1e-6) if sample_rate else round(span / float(np.median(steps)))
     if count < 1:
         raise InputError(
-            f"nothing is recorded after {begin:g} s",
+            f"there are no samples after {begin:g} s",
             where="spectrum",
             allowed=f"a begin before {time[-1]:g} s",
             fix="set an earlier begin, or run longer",
         )
     rate = sample_rate or count / span
-    instants = start + np.arange(count) / rate
-    columns: list[Array] = [np.interp(instants, time, values[:, k]) for k in range(values.shape[1])]
+    sample_times = start + np.arange(count) / rate
+    columns: list[Array] = [np.interp(sample_times, time, values[:, k]) for k in range(values.shape[1])]
     return np.column_stack(columns), rate

@@ -1,4 +1,4 @@
-"""The matrices of a linear system with names: the data of the functions of this package."""
+"""The matrices of a linear system with names, on which the functions of this package operate."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StateSpaceModel:
-    """``x' = A x + B u, y = C x + D u`` where ``dt`` is 0, else ``x[k+1] = A x[k] + B u[k]`` every ``dt`` s.
+    """The system ``x' = A x + B u, y = C x + D u``, or ``x[k+1] = A x[k] + B u[k]`` for ``dt > 0`` (s).
 
-    ``A (nx, nx)``, ``B (nx, nu)``, ``C (ny, nx)``, ``D (ny, nu)``. All quantities are small changes about the
+    ``A (nx, nx)``, ``B (nx, nu)``, ``C (ny, nx)``, ``D (ny, nu)``. All quantities are deviations from the
     operating ``point``. ``states``, ``inputs`` and ``outputs`` name the scalars, with their SI units; without
     names they are ``x1``, ``u1``, ``y1`` … Raises ``InputError`` for matrices whose shapes do not fit or
     whose entries are not finite.
@@ -55,7 +55,7 @@ class StateSpaceModel:
                     f"{len(names)} names and {len(units)} units are given for the {kind}s",
                     allowed=f"one for each of the {size}",
                     where="linear system",
-                    fix="give as many, or leave them out",
+                    fix="give a name and a unit for each, or omit them",
                 )
             object.__setattr__(self, f"{kind}s", names)
             object.__setattr__(self, f"{kind}_units", units)
@@ -68,13 +68,13 @@ class StateSpaceModel:
             )
 
     def __reduce__(self) -> tuple[object, ...]:
-        # Unpickled by the constructor, because pickling does not preserve that arrays are read-only.
+        # Pickling does not preserve that arrays are read-only, but the constructor does.
         fields = {entry.name: getattr(self, entry.name) for entry in dataclasses.fields(self)}
         return partial(type(self), **fields), ()
 
     @property
     def order(self) -> int:
-        """Count of states."""
+        """Number of states."""
         return self.A.shape[0]
 
     @property
@@ -90,10 +90,9 @@ class StateSpaceModel:
     def select(
         self, outputs: str | Sequence[str] | None = None, inputs: str | Sequence[str] | None = None
     ) -> Self:
-        """The same system with some of its inputs and outputs, by name; a vector's name selects all its
-        entries.
+        """The same system with some of its inputs and outputs, by name.
 
-        Raises ``UnknownNameError``.
+        The name of a vector selects all its entries. Raises ``UnknownNameError`` for an unknown name.
         """
         rows = _chosen(self.outputs, outputs, "output")
         columns = _chosen(self.inputs, inputs, "input")
@@ -126,8 +125,7 @@ SystemT = TypeVar("SystemT", bound=StateSpaceModel)
 
 
 def _checked_matrices(system: StateSpaceModel) -> tuple[int, int, int]:
-    """Replace the matrices by two-dimensional read-only copies; return the numbers of states, inputs,
-    outputs."""
+    """Replace the matrices by read-only copies, and return the numbers of states, inputs and outputs."""
     for letter in "ABCD":
         matrix = np.array(getattr(system, letter), dtype=np.float64)
         if matrix.ndim != 2:
@@ -139,7 +137,7 @@ def _checked_matrices(system: StateSpaceModel) -> tuple[int, int, int]:
             )
         if not np.isfinite(matrix).all():
             raise InputError(
-                f"{letter} is not all finite numbers",
+                f"{letter} contains NaN or infinity",
                 allowed="finite matrices",
                 where="linear system",
                 fix=f"remove NaN and infinities from {letter}",

@@ -28,12 +28,12 @@ STYLE = """
 
 
 def number(value: float, digits: int = 5) -> str:
-    """A number of a matrix: no trailing zeros, ``0`` for zero."""
+    """A number as text, without trailing zeros."""
     return f"{value + 0.0:.{digits}g}"
 
 
 def complex_number(value: complex, digits: int = 5) -> str:
-    """``-1.5``, or ``-0.5 + 2j``."""
+    """A complex number as text, such as ``-1.5`` or ``-0.5 + 2j``."""
     if value.imag == 0.0:
         return number(value.real, digits)
     sign = "+" if value.imag >= 0 else "-"
@@ -60,7 +60,7 @@ def stability(system: StateSpaceModel) -> str:
     largest = growth(system)
     if largest < 0.0:
         return "stable"
-    return "on the edge of stability" if largest == 0.0 else "unstable"
+    return "on the stability boundary" if largest == 0.0 else "unstable"
 
 
 def matrix_lines(matrix: Array, rows: tuple[str, ...], columns: tuple[str, ...]) -> list[str]:
@@ -99,7 +99,7 @@ def matrices(system: StateSpaceModel) -> list[tuple[str, Array, tuple[str, ...],
 
 
 def system_text(system: StateSpaceModel) -> str:
-    """Heading, matrices, poles."""
+    """Heading, matrices and poles as text."""
     lines = [f"<LinearSystem {heading(system)}>"]
     for letter, matrix, rows, columns in matrices(system):
         lines.append(f"  {letter}")

@@ -21,15 +21,17 @@ Array = NDArray[np.float64]
 
 SystemT_co = TypeVar("SystemT_co", bound=StateSpaceModel, covariant=True)
 
-MAX_INSTANTS = 20_000
+MAX_SAMPLES = 20_000
+"""Maximum number of samples of the response of a discrete system."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class StepMeasures:
     """Characteristics of a step response (all times in s; ``nan`` if undefined).
 
-    ``final``: the steady-state value. ``rise_time``: from 10 to 90 per cent of it. ``settling_time``: after
-    which the response stays within 2 per cent of it. ``overshoot`` and ``undershoot``: per cent of it.
+    ``final``: the steady-state value. ``rise_time``: the time from 10 to 90 per cent of it.
+    ``settling_time``: the time after which the response stays within 2 per cent of it. ``overshoot`` and
+    ``undershoot``: per cent of it.
     ``peak``: the largest value in the direction of the final value, at ``peak_time``.
     """
 
@@ -62,33 +64,35 @@ class TimeResponse(Generic[SystemT_co]):
 
 
 def natural_times(system: StateSpaceModel) -> tuple[float, float]:
-    """The time in which the slowest mode decays or visibly grows, and the time constant of the fastest mode,
-    s."""
-    small = minimal(system)
-    roots = poles(small)
-    if small.is_discrete:
-        roots = np.log(roots[np.abs(roots) > 1e-6]) / small.dt
-    sizes = np.abs(roots)
-    largest = float(sizes.max(initial=0.0))
-    moving = roots[sizes > 1e-9 * largest] if largest > 0.0 else roots[:0]
+    """Two times (s): the duration of the slowest mode, and the time constant of the fastest mode.
+
+    The duration is the time in which the slowest mode decays or visibly grows.
+    """
+    reduced = minimal(system)
+    roots = poles(reduced)
+    if reduced.is_discrete:
+        roots = np.log(roots[np.abs(roots) > 1e-6]) / reduced.dt
+    magnitudes = np.abs(roots)
+    largest = float(magnitudes.max(initial=0.0))
+    moving = roots[magnitudes > 1e-9 * largest] if largest > 0.0 else roots[:0]
     if not moving.size:
         return (100.0 * system.dt if system.is_discrete else 1.0), 1.0
     fastest = 1.0 / largest
     spans: list[float] = []
     for pole in moving.tolist():
         decay = abs(pole.real)
-        turns = 2.0 * math.pi / abs(pole.imag) if pole.imag else math.inf
+        period = 2.0 * math.pi / abs(pole.imag) if pole.imag else math.inf
         if decay < 1e-3 * abs(pole):
-            spans.append(10.0 * turns)  # lightly damped: show ten periods
+            spans.append(10.0 * period)  # lightly damped: show ten periods
         elif pole.real < 0.0:
-            spans.append(min(7.0 / decay, 25.0 * turns))
+            spans.append(min(7.0 / decay, 25.0 * period))
         else:
             spans.append(4.0 / decay)
     span = max(spans) if all(pole.real <= 0.0 for pole in moving.tolist()) else min(spans)
     return span, fastest
 
 
-def _instants(system: StateSpaceModel, stop_time: float | None, points: int) -> Array:
+def _sample_times(system: StateSpaceModel, stop_time: float | None, points: int) -> Array:
     span, fastest = natural_times(system)
     end = span if stop_time is None else float(stop_time)
     if not (math.isfinite(end) and end > 0.0):
@@ -96,11 +100,11 @@ def _instants(system: StateSpaceModel, stop_time: float | None, points: int) -> 
             f"the stop time is {stop_time}",
             allowed="a finite time > 0 s",
             where="time response",
-            fix="leave it out, or give one in seconds",
+            fix="omit the stop time, or give it in seconds",
         )
     if system.is_discrete:
         count = max(round(end / system.dt), 1)
-        return system.dt * np.arange(min(count, MAX_INSTANTS) + 1, dtype=np.float64)
+        return system.dt * np.arange(min(count, MAX_SAMPLES) + 1, dtype=np.float64)
     if stop_time is None:
         end = _rounded_up(end)
     # Enough points for the fastest motion that is visible in the whole figure.
@@ -109,6 +113,7 @@ def _instants(system: StateSpaceModel, stop_time: float | None, points: int) -> 
 
 
 def _rounded_up(span: float) -> float:
+    """The next round number, such as 1.5 or 20, for the end of a time axis."""
     power = 10.0 ** math.floor(math.log10(span))
     return next(
         f * power for f in (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0) if f * power >= span * 0.999
@@ -116,7 +121,7 @@ def _rounded_up(span: float) -> float:
 
 
 def _powers(transition: Array, start: Array, count: int) -> Array:
-    """``start, transition start, …`` (count, rows, columns)."""
+    """The sequence ``start, transition start, transition^2 start, …`` (count, rows, columns)."""
     states = np.empty((count, *start.shape))
     states[0] = start
     for k in range(1, count):
@@ -125,12 +130,14 @@ def _powers(transition: Array, start: Array, count: int) -> Array:
 
 
 def step_response(system: SystemT, stop_time: float | None, points: int) -> TimeResponse[SystemT]:
-    """The response of every output to a step of every input. ``stop_time=None``: until the slowest mode
-    settles."""
-    time = _instants(system, stop_time, points)
+    """The response of every output to a unit step of every input.
+
+    ``stop_time=None``: until the slowest mode has decayed.
+    """
+    time = _sample_times(system, stop_time, points)
     n, nu = system.B.shape
     # Constant inputs are states with the derivative 0.
-    transition = _held(system, float(time[1]))
+    transition = _step_map(system, float(time[1]))
     start = np.vstack([np.zeros((n, nu)), np.eye(nu)])
     states = _powers(transition, start, time.size)[:, :n]
     return TimeResponse(
@@ -139,11 +146,13 @@ def step_response(system: SystemT, stop_time: float | None, points: int) -> Time
 
 
 def impulse_response(system: SystemT, stop_time: float | None, points: int) -> TimeResponse[SystemT]:
-    """The response of every output to an impulse of every input, without the impulses of direct
-    feedthrough."""
-    time = _instants(system, stop_time, points)
+    """The response of every output to a unit impulse of every input.
+
+    The impulses due to direct feedthrough are omitted for a continuous system.
+    """
+    time = _sample_times(system, stop_time, points)
     n = system.order
-    transition = _held(system, float(time[1]))[:n, :n]
+    transition = _step_map(system, float(time[1]))[:n, :n]
     if system.is_discrete:
         later = _powers(transition, system.B, time.size - 1)
         states = np.concatenate([np.zeros((1, *system.B.shape)), later])
@@ -155,18 +164,18 @@ def impulse_response(system: SystemT, stop_time: float | None, points: int) -> T
     return TimeResponse(system=system, kind="impulse", time=time, values=values, states=states)
 
 
-def _held(system: StateSpaceModel, step: float) -> Array:
-    """The map of ``[x; u]`` over a step with the inputs held."""
+def _step_map(system: StateSpaceModel, step: float) -> Array:
+    """The map of ``[x; u]`` over a step (s) with constant inputs."""
     with from_extra("analysis", "responses of a linear system"):
         from scipy.linalg import expm
 
     n, nu = system.B.shape
-    whole = np.zeros((n + nu, n + nu))
-    whole[:n] = np.hstack([system.A, system.B])
+    matrix = np.zeros((n + nu, n + nu))
+    matrix[:n] = np.hstack([system.A, system.B])
     if system.is_discrete:
-        whole[n:, n:] = np.eye(nu)
-        return whole
-    return expm(whole * step)
+        matrix[n:, n:] = np.eye(nu)
+        return matrix
+    return expm(matrix * step)
 
 
 def forced_response(
@@ -176,22 +185,22 @@ def forced_response(
     with from_extra("analysis", "responses of a linear system"):
         from scipy.linalg import expm
 
-    instants = np.asarray(time, dtype=np.float64)
+    sample_times = np.asarray(time, dtype=np.float64)
     signals = np.asarray(inputs, dtype=np.float64)
     n, nu = system.B.shape
     signals = signals[:, None] if signals.ndim == 1 and nu == 1 else signals
-    steps = np.diff(instants)
-    if instants.ndim != 1 or instants.size < 2 or not (steps > 0.0).all():
+    steps = np.diff(sample_times)
+    if sample_times.ndim != 1 or sample_times.size < 2 or not (steps > 0.0).all():
         raise InputError(
             "the times are not ascending",
             allowed="two or more ascending times, s",
             where="time response",
-            fix="sort them and remove duplicates",
+            fix="sort the times and remove duplicates",
         )
-    if signals.shape != (instants.size, nu):
+    if signals.shape != (sample_times.size, nu):
         raise InputError(
             f"the inputs have shape {signals.shape}",
-            allowed=f"shape {(instants.size, nu)}: times, inputs",
+            allowed=f"shape {(sample_times.size, nu)}: times, inputs",
             where="time response",
             fix="give one row of inputs for each time",
         )
@@ -208,9 +217,9 @@ def forced_response(
             f"the start has shape {x.shape}",
             allowed=f"shape {(n,)}, one for each state",
             where="time response",
-            fix="leave it out to start at rest",
+            fix="omit start for the initial state 0",
         )
-    states = np.empty((instants.size, n))
+    states = np.empty((sample_times.size, n))
     states[0] = x
     maps: dict[float, Array] = {}
     for k, step in enumerate(steps.tolist()):
@@ -219,16 +228,16 @@ def forced_response(
             continue
         key = float(f"{step:.12e}")
         if key not in maps:
-            # Inputs that are linear in time: their derivatives are states too (Van Loan, 1978).
-            whole = np.zeros((n + 2 * nu, n + 2 * nu))
-            whole[:n, : n + nu] = np.hstack([system.A, system.B])
-            whole[n : n + nu, n + nu :] = np.eye(nu)
-            maps[key] = expm(whole * step)[:n]
-        slope = (signals[k + 1] - signals[k]) / step
-        states[k + 1] = maps[key] @ np.concatenate([states[k], signals[k], slope])
+            # For inputs that are linear in time, their derivatives are additional states (Van Loan, 1978).
+            matrix = np.zeros((n + 2 * nu, n + 2 * nu))
+            matrix[:n, : n + nu] = np.hstack([system.A, system.B])
+            matrix[n : n + nu, n + nu :] = np.eye(nu)
+            maps[key] = expm(matrix * step)[:n]
+        input_rate = (signals[k + 1] - signals[k]) / step
+        states[k + 1] = maps[key] @ np.concatenate([states[k], signals[k], input_rate])
     values = states @ system.C.T + signals @ system.D.T
     return TimeResponse(
-        system=system, kind="forced", time=instants, values=values[:, :, None], states=states[:, :, None]
+        system=system, kind="forced", time=sample_times, values=values[:, :, None], states=states[:, :, None]
     )
 
 
@@ -246,39 +255,39 @@ def step_measures(time: Array, values: Array, final: float) -> StepMeasures:
             peak=float(values[k]),
             peak_time=float(time[k]),
         )
-    shares = values / final
-    k = int(np.argmax(shares))
-    begin, end = _first_above(time, shares, 0.1), _first_above(time, shares, 0.9)
+    fractions = values / final
+    k = int(np.argmax(fractions))
+    begin, end = _first_above(time, fractions, 0.1), _first_above(time, fractions, 0.9)
     return StepMeasures(
         final=final,
         rise_time=end - begin,
-        settling_time=_settled_after(time, shares, 0.02),
-        overshoot=max(0.0, 100.0 * (float(shares[k]) - 1.0)),
-        undershoot=max(0.0, -100.0 * float(shares.min())),
+        settling_time=_settled_after(time, fractions, 0.02),
+        overshoot=max(0.0, 100.0 * (float(fractions[k]) - 1.0)),
+        undershoot=max(0.0, -100.0 * float(fractions.min())),
         peak=float(values[k]),
         peak_time=float(time[k]),
     )
 
 
-def _first_above(time: Array, shares: Array, level: float) -> float:
-    above = shares >= level
+def _first_above(time: Array, fractions: Array, level: float) -> float:
+    above = fractions >= level
     if not above.any():
         return math.nan
     k = int(np.argmax(above))
     if k == 0:
         return float(time[0])
-    part = (level - shares[k - 1]) / (shares[k] - shares[k - 1])
-    return float(time[k - 1] + part * (time[k] - time[k - 1]))
+    fraction = (level - fractions[k - 1]) / (fractions[k] - fractions[k - 1])
+    return float(time[k - 1] + fraction * (time[k] - time[k - 1]))
 
 
-def _settled_after(time: Array, shares: Array, band: float) -> float:
-    outside = np.flatnonzero(np.abs(shares - 1.0) > band)
+def _settled_after(time: Array, fractions: Array, band: float) -> float:
+    outside = np.flatnonzero(np.abs(fractions - 1.0) > band)
     if not outside.size:
         return 0.0
     k = int(outside[-1])
     if k == time.size - 1:
         return math.nan
-    off, on = abs(shares[k] - 1.0), abs(shares[k + 1] - 1.0)
+    off, on = abs(fractions[k] - 1.0), abs(fractions[k + 1] - 1.0)
     return float(time[k] + (off - band) / (off - on) * (time[k + 1] - time[k]))
 
 

@@ -1,4 +1,4 @@
-"""The transfer function of one input and one output by zeros, poles and gain."""
+"""The transfer function from one input to one output, as zeros, poles and gain."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Complex = NDArray[np.complex128]
 class TransferFunction:
     """``gain prod(s - zeros) / prod(s - poles)``, in ``z`` where ``dt`` is not 0.
 
-    The roots are the exact description; the polynomials are multiplied out from them.
+    The roots define the transfer function; the coefficients of the polynomials are computed from them.
     """
 
     zeros: Complex
@@ -42,20 +42,23 @@ class TransferFunction:
         return _multiplied_out(self.poles)
 
     def __call__(self, s: complex) -> complex:
-        """The value at one complex number."""
+        """The value at a complex number."""
         return complex(self.gain * np.prod(s - self.zeros) / np.prod(s - self.poles))
 
     def __repr__(self) -> str:
         letter = "z" if self.dt else "s"
-        above = polynomial(self.numerator, letter, self.zeros)
-        below = polynomial(self.denominator, letter, self.poles)
-        width = max(len(above), len(below))
-        return f"{above.center(width).rstrip()}\n{'-' * width}\n{below.center(width).rstrip()}"
+        numerator_text = polynomial(self.numerator, letter, self.zeros)
+        denominator_text = polynomial(self.denominator, letter, self.poles)
+        width = max(len(numerator_text), len(denominator_text))
+        lines = (numerator_text.center(width).rstrip(), "-" * width, denominator_text.center(width).rstrip())
+        return "\n".join(lines)
 
 
 def transfer_function(system: StateSpaceModel) -> TransferFunction:
-    """The transfer function of a system with one input and one output; common zeros and poles are
-    cancelled."""
+    """The transfer function of a system with one input and one output, without common zeros and poles.
+
+    Raises ``InputError`` for other systems.
+    """
     if not system.is_siso:
         raise InputError(
             f"the system has {system.D.shape[1]} inputs and {system.D.shape[0]} outputs",
@@ -63,17 +66,19 @@ def transfer_function(system: StateSpaceModel) -> TransferFunction:
             allowed="one of each",
             fix="choose with system.select(output, input)",
         )
-    small = minimal(system)
-    found_zeros, found_poles = zeros(small), poles(small)
+    reduced = minimal(system)
+    found_zeros, found_poles = zeros(reduced), poles(reduced)
     # The gain is computed from the value at a point far from all roots, where no factor is small.
-    far = 2.0 * max(1e-300, float(np.abs(np.concatenate([found_zeros, found_poles])).max(initial=0.0))) or 1.0
-    far = far if len(found_zeros) + len(found_poles) else 1.0
-    value = complex(evaluate(small, np.array([far], dtype=np.complex128))[0, 0, 0])
+    point = (
+        2.0 * max(1e-300, float(np.abs(np.concatenate([found_zeros, found_poles])).max(initial=0.0))) or 1.0
+    )
+    point = point if len(found_zeros) + len(found_poles) else 1.0
+    value = complex(evaluate(reduced, np.array([point], dtype=np.complex128))[0, 0, 0])
     # The factors are divided in pairs, so that no intermediate result overflows.
     gain = value
     for k in range(max(len(found_zeros), len(found_poles))):
-        gain *= (far - found_poles[k]) if k < len(found_poles) else 1.0
-        gain /= (far - found_zeros[k]) if k < len(found_zeros) else 1.0
+        gain *= (point - found_poles[k]) if k < len(found_poles) else 1.0
+        gain /= (point - found_zeros[k]) if k < len(found_zeros) else 1.0
     return TransferFunction(zeros=found_zeros, poles=found_poles, gain=float(np.real(gain)), dt=system.dt)
 
 
@@ -83,10 +88,10 @@ def _multiplied_out(roots: Complex) -> Array:
 
 
 def polynomial(coefficients: Array, letter: str, roots: Complex) -> str:
-    """``3 s^2 + s - 2``, with six digits. Coefficients that are only rounding errors of the roots are
-    omitted.
+    """A polynomial as text with six digits, such as ``3 s^2 + s - 2``.
 
-    The k-th coefficient is the sum of all products of k roots. If ``r`` is the largest magnitude of a root
+    Coefficients that are only rounding errors of the roots are omitted. The k-th coefficient is the
+    sum of all products of k roots. If ``r`` is the largest magnitude of a root
     and each root has an error of at most ``e r``, the coefficient changes by at most ``e k r^k`` times the
     number of products.
     """

@@ -4,10 +4,10 @@ The unknowns are the states that are not given, the discrete states of clocks, t
 unknowns of implicit equations, and the free parameters. The equations are: the derivatives of all non-moving
 states are 0, ticks change no state, outputs of delays equal their inputs, the implicit equations hold, and
 the chosen signals have their required values. Steps are those of Levenberg and Marquardt (Moré, Lecture Notes
-in Mathematics 630, 1978, 105-116), with each unknown scaled by its column and limited to its bounds. Of
-several solutions, one near the start is found. The modes are updated at the solution, and the iteration is
-repeated. If this fails, the modes are updated at every step. An example is a table whose first segment,
-extended as a straight line, reaches zero only far beyond the last segment.
+in Mathematics 630, 1978, 105-116), with each unknown scaled by its column and limited to its bounds. If there
+are several solutions, the result is one near the start. The modes are updated at the solution, and the
+iteration is repeated. If this fails, the modes are updated at every step. This is necessary, for example, for
+a table whose first segment, extended as a straight line, reaches zero only far beyond the last segment.
 """
 
 from __future__ import annotations
@@ -28,17 +28,18 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 MAX_ITERATIONS = 200
-MAX_MODES = 20
+"""Maximum number of steps of one search."""
+MAX_MODE_CHANGES = 20
 """Maximum number of mode changes."""
-ROUNDOFFS = 4.0 * float(np.finfo(np.float64).eps)
+ROUNDING_ERROR = 4.0 * float(np.finfo(np.float64).eps)
 """Relative rounding error of a term of an equation."""
-NAMED = 6
+MAX_NAMED_EQUATIONS = 6
 """Maximum number of equations that a message names."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TrimProblem:
-    """A trim problem.
+    """The definition of a trim problem.
 
     ``start`` is the first guess. The others are indices: ``free_states`` of the states in ``x`` that may
     change, ``resting`` of the states whose derivative must be 0, ``free_parameters`` in ``p``, ``rows`` of
@@ -98,10 +99,12 @@ class TrimResult:
 
 
 def trim_system(problem: TrimProblem) -> TrimResult:
-    """Solve a problem. Raises ``SimulationError`` if there is no equilibrium; ``partial`` is the last
-    point."""
+    """Solve a trim problem.
+
+    Raises ``SimulationError`` if no equilibrium is found; its ``partial`` is the result at the last point.
+    """
     search = _Search(problem)
-    point, iterations, inconsistent = _modes_afterwards(search)
+    point, iterations, inconsistent = _solve_with_mode_updates(search)
     if inconsistent or not search.is_solution(point):
         other, used = search.run(problem.start, update_modes=True)
         iterations += used
@@ -110,9 +113,9 @@ def trim_system(problem: TrimProblem) -> TrimResult:
     result = search.result(point, iterations)
     if inconsistent:
         raise SimulationError(
-            f"the modes {', '.join(inconsistent[:NAMED])} remain inconsistent",
+            f"the modes {', '.join(inconsistent[:MAX_NAMED_EQUATIONS])} remain inconsistent",
             where=problem.system.name,
-            allowed="an operating point inside one piece of every switching block",
+            allowed="an operating point at which no switching block is at a threshold",
             fix="start from a point on the intended side, or change the limits",
             partial=result,
         )
@@ -121,9 +124,11 @@ def trim_system(problem: TrimProblem) -> TrimResult:
     return result
 
 
-def _modes_afterwards(search: _Search) -> tuple[Point, int, list[str]]:
-    """Solve with constant modes, update the modes, and repeat. Also returns the modes that remain
-    inconsistent."""
+def _solve_with_mode_updates(search: _Search) -> tuple[Point, int, list[str]]:
+    """Solve with constant modes, update the modes, and repeat.
+
+    Returns the point, the number of iterations and the modes that remain inconsistent.
+    """
     point, iterations = search.problem.start, 0
     previous_modes: list[bytes] = []
     while True:
@@ -131,7 +136,7 @@ def _modes_afterwards(search: _Search) -> tuple[Point, int, list[str]]:
         iterations += used
         changing = search.inconsistent_modes(point)
         z = search.consistent_modes(point)
-        if not changing or z.tobytes() in previous_modes or len(previous_modes) == MAX_MODES:
+        if not changing or z.tobytes() in previous_modes or len(previous_modes) == MAX_MODE_CHANGES:
             return point, iterations, changing
         previous_modes.append(point.z.tobytes())
         point = dataclasses.replace(point, z=z)
@@ -148,7 +153,7 @@ class _Search:
         system = problem.system
         self.problem = problem
         self.evaluated = EvaluatedSystem(system, problem.free_parameters.tolist(), problem.rows.tolist())
-        self.whole = EvaluatedSystem(system)
+        self.full_system = EvaluatedSystem(system)
         self.sampled = self.evaluated.sampled
         delays = system.delays
         self.delayed: Indices = np.array(
@@ -170,13 +175,13 @@ class _Search:
         self.equations: list[str] = [
             *(f"rate of {self.state_names[k]}" for k in problem.resting.tolist()),
             *(f"tick of {discrete_names[k]}" for k in self.ticked.tolist()),
-            *(f"past of {discrete_names[k]}" for k in self.delayed.tolist()),
+            *(f"delay of {discrete_names[k]}" for k in self.delayed.tolist()),
             *(f"equation of {name}" for name in _elements(system.algebraic)),
             *(signal_names[k] for k in problem.rows.tolist()),
         ]
-        ends = [problem.bounds.get(name, (-np.inf, np.inf)) for name in self.unknowns]
-        self.lower = np.array([low for low, _ in ends], dtype=np.float64)
-        self.upper = np.array([high for _, high in ends], dtype=np.float64)
+        bounds = [problem.bounds.get(name, (-np.inf, np.inf)) for name in self.unknowns]
+        self.lower = np.array([low for low, _ in bounds], dtype=np.float64)
+        self.upper = np.array([high for _, high in bounds], dtype=np.float64)
 
     def values(self, point: Point) -> Array:
         """The unknowns of a point in one vector."""
@@ -211,8 +216,11 @@ class _Search:
         return np.concatenate(parts)
 
     def _jacobian_rows(self, point: Point) -> list[tuple[Jacobians, Indices, Indices]]:
-        """Derivatives of the equations in their order: the derivatives, the selected rows, and for each row
-        the index of the entry of z that the equation subtracts."""
+        """The derivatives of the equations, in their order.
+
+        Each entry has the derivatives, the selected rows, and for each row the index of the entry of z that
+        the equation subtracts.
+        """
         problem, evaluated = self.problem, self.evaluated
         flow = evaluated.derivative_jacobians(point)
         none = np.zeros(0, dtype=np.intp)
@@ -256,7 +264,7 @@ class _Search:
             if subtracted.size:
                 terms += np.abs(point.z[subtracted])
             sizes.append(terms)
-        equations = ROUNDOFFS * np.concatenate(sizes) + np.abs(self.residuals(point))
+        equations = ROUNDING_ERROR * np.concatenate(sizes) + np.abs(self.residuals(point))
         return np.abs(np.linalg.pinv(matrix)) @ equations
 
     def is_solution(self, point: Point) -> bool:
@@ -270,7 +278,7 @@ class _Search:
         """``z`` with consistent modes; the entries that clocks update are unchanged."""
         if not point.z.size:
             return point.z
-        return np.where(self.sampled, point.z, self.whole.consistent_modes(point))
+        return np.where(self.sampled, point.z, self.full_system.consistent_modes(point))
 
     def inconsistent_modes(self, point: Point) -> list[str]:
         """The inconsistent modes at a point."""
@@ -333,19 +341,19 @@ class _Search:
     def result(self, point: Point, iterations: int) -> TrimResult:
         """The result at a point, by name."""
         if self.is_solution(point):
-            point = solved(self.whole, point)
+            point = solved(self.full_system, point)
         values = self.values(point)
         bounded = (values <= self.lower) | (values >= self.upper)
         system = self.problem.system
-        known = operating_point(self.whole, point)
+        known = operating_point(self.full_system, point)
         chosen = {int(k) for k in self.problem.free_parameters}
         free = {
             name: known.parameters[name]
             for name, entry in system.parameters.ranges.items()
             if chosen & set(range(*entry.indices(system.parameters.size)))
         }
-        nothing = Point(t=0.0, **{part: np.zeros_like(getattr(point, part)) for part in "xzwp"})
-        accuracies = self.point_with(self.errors(point), nothing)
+        zero_point = Point(t=0.0, **{part: np.zeros_like(getattr(point, part)) for part in "xzwp"})
+        accuracies = self.point_with(self.errors(point), zero_point)
         return TrimResult(
             point=known,
             free=free,
@@ -369,13 +377,15 @@ def _failure(problem: TrimProblem, search: _Search, point: Point, result: TrimRe
     worst = sorted(
         violated, key=lambda name: -abs(violated[name]) if np.isfinite(violated[name]) else -np.inf
     )
-    listed = ", ".join(f"{name} is {_residual_text(name, violated[name])}" for name in worst[:NAMED])
-    others = f" and {len(worst) - NAMED} more" if len(worst) > NAMED else ""
+    listed = ", ".join(
+        f"{name} is {_residual_text(name, violated[name])}" for name in worst[:MAX_NAMED_EQUATIONS]
+    )
+    others = f" and {len(worst) - MAX_NAMED_EQUATIONS} more" if len(worst) > MAX_NAMED_EQUATIONS else ""
     return SimulationError(
         f"no operating point was found: {listed}{others}",
         where=problem.system.name,
         allowed=_cause(problem, search, point, worst, result),
-        fix="free another parameter, give another start, or exempt a state with moving",
+        fix="free another parameter, give another start, or name states in moving",
         partial=result,
     )
 
@@ -393,9 +403,10 @@ def _cause(
     rows = {name: jacobian[k] for k, name in enumerate(search.equations)}
     fixed = [name for name in worst if not rows[name].any()]
     if fixed:
-        return f"equations that depend on a free variable; {', '.join(fixed[:NAMED])} depends on none"
+        named = ", ".join(fixed[:MAX_NAMED_EQUATIONS])
+        return f"equations that depend on a free variable; {named} depends on none"
     if result.at_bounds:
-        return f"values within the bounds; {', '.join(result.at_bounds[:NAMED])} is at a bound"
+        return f"values within the bounds; {', '.join(result.at_bounds[:MAX_NAMED_EQUATIONS])} is at a bound"
     if len(search.equations) > len(search.unknowns):
         return f"as many equations as unknowns ({len(search.equations)} and {len(search.unknowns)} here)"
     return "a start from which the equations can be solved"

@@ -45,8 +45,10 @@ def zero_pencil(A: Array, B: Array, C: Array, D: Array) -> tuple[Array, Array, f
     # Inputs and outputs are scaled to similar sizes, which does not change the zeros.
     b, d = _columns_scaled(b, D)
     c, d = (part.T for part in _columns_scaled(c.T, d.T))
-    whole = np.block([[a, b], [c, d]])
-    tolerance = 10.0 * max(whole.shape) * np.finfo(np.float64).eps * float(np.linalg.norm(whole))
+    system_matrix = np.block([[a, b], [c, d]])
+    tolerance = (
+        10.0 * max(system_matrix.shape) * np.finfo(np.float64).eps * float(np.linalg.norm(system_matrix))
+    )
     a, b, c, d = _reduced(a, b, c, d, tolerance)
     if a.size:
         # The same reduction of the dual system, whose inputs are the outputs.
@@ -58,11 +60,12 @@ def zero_pencil(A: Array, B: Array, C: Array, D: Array) -> tuple[Array, Array, f
         return a, np.eye(n), tolerance
     # [C D] W = [0 *] eliminates the inputs without dividing by D.
     _, _, right = np.linalg.svd(np.hstack([c, d]))
-    free = right[d.shape[0] :].T
-    return np.hstack([a, b]) @ free, free[:n], tolerance
+    null_space = right[d.shape[0] :].T
+    return np.hstack([a, b]) @ null_space, null_space[:n], tolerance
 
 
 def _columns_scaled(upper: Array, lower: Array) -> tuple[Array, Array]:
+    """Both matrices with the columns of ``[upper; lower]`` scaled to unit length."""
     sizes = np.sqrt((upper**2).sum(axis=0) + (lower**2).sum(axis=0))
     factors = 1.0 / np.where(sizes > 0.0, sizes, 1.0)
     return upper * factors, lower * factors
@@ -80,17 +83,17 @@ def _reduced(a: Array, b: Array, c: Array, d: Array, tolerance: float) -> tuple[
         if rank == d.shape[0]:
             break
         c, d = left.T @ c, left.T @ d
-        plain = c[rank:]  # outputs without direct feedthrough
+        without_feedthrough = c[rank:]
         c, d = c[:rank], d[:rank]
-        _, sizes, right = np.linalg.svd(plain)
-        plain_rank = _rank(sizes, tolerance)
-        if not plain_rank:
+        _, sizes, right = np.linalg.svd(without_feedthrough)
+        output_rank = _rank(sizes, tolerance)
+        if not output_rank:
             break
         rotation = np.vstack(
-            [right[plain_rank:], right[:plain_rank]]
+            [right[output_rank:], right[:output_rank]]
         ).T  # first the states that do not affect these outputs
         a, b, c = rotation.T @ a @ rotation, rotation.T @ b, c @ rotation
-        rest = a.shape[0] - plain_rank
-        c, d = np.vstack([c[:, :rest], a[rest:, :rest]]), np.vstack([d, b[rest:]])
-        a, b = a[:rest, :rest], b[:rest]
+        remaining = a.shape[0] - output_rank
+        c, d = np.vstack([c[:, :remaining], a[remaining:, :remaining]]), np.vstack([d, b[remaining:]])
+        a, b = a[:remaining, :remaining], b[:remaining]
     return a, b, c, d

@@ -38,7 +38,7 @@ FAMILIES = (
 )
 """The families in their order in lists. Within a family the types are in alphabetical order."""
 
-_KNOWN_TO_THE_DIAGRAM: dict[str, tuple[type[Block], ...]] = {
+_DIAGRAM_LAYER_TYPES: dict[str, tuple[type[Block], ...]] = {
     "routing": (BusAssignment, BusCreator, BusSelector, From, Goto, Merge),
     "structure": (
         ActionSubsystem,
@@ -54,15 +54,15 @@ _KNOWN_TO_THE_DIAGRAM: dict[str, tuple[type[Block], ...]] = {
 """The block types that the diagram layer defines, because its passes over a diagram process them."""
 
 
-def _kinds_of(family: str) -> Iterator[type[Block] | UnimportedBlock]:
+def _types_of(family: str) -> Iterator[type[Block] | UnimportedBlock]:
     """The block types of one family. A base class that several types share has no title."""
-    yield from _KNOWN_TO_THE_DIAGRAM.get(family, ())
+    yield from _DIAGRAM_LAYER_TYPES.get(family, ())
     for name, module in classes_with(f"{__name__}.{family}", "title"):
         yield UnimportedBlock(name, module)
 
 
 BLOCKS = BlockLibrary(
-    {family: sorted(_kinds_of(family), key=lambda kind: kind.type_name().casefold()) for family in FAMILIES}
+    {family: sorted(_types_of(family), key=lambda kind: kind.type_name().casefold()) for family in FAMILIES}
 )
 """Every block type by type name."""
 

@@ -1,7 +1,7 @@
 """Complex arithmetic with one rounding for each real operation: the same bits on every machine.
 
 Complex products and quotients in Python and NumPy depend on the C compiler, which may fuse a product and a
-sum into one rounding. Their magnitudes and roots depend on the C library.
+sum into one rounding. Magnitudes and square roots depend on the C library.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from armblocks.rounded_functions import hypot
 
 
 def magnitude(z: complex) -> float:
-    """``|z|``."""
+    """The magnitude ``|z|``."""
     return hypot(z.real, z.imag)
 
 

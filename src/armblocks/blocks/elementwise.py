@@ -21,11 +21,11 @@ def parameters_shape(block: Block, *names: str) -> Shape:
 
 
 def common_unit(units: Mapping[str, str]) -> str:
-    """The common unit, or ``""``."""
+    """The unit that all have in common; ``""`` if the units differ."""
     distinct = set(units.values())
     return distinct.pop() if len(distinct) == 1 else ""
 
 
 def unit_of_terms(units: Mapping[str, str]) -> Mapping[str, str]:
-    """Units of quantities that are added, compared or selected: all have the same unit."""
+    """For each name, the common unit of quantities that are added, compared or selected."""
     return dict.fromkeys(units, common_unit({name: unit for name, unit in units.items() if unit}))

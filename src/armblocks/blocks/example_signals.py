@@ -15,6 +15,7 @@ HALF_ANGLE = driver(
 ).named("quaternion")
 """The quaternion (cos t/2, 0, 0, sin t/2): a rotation by t about z."""
 ZERO = driver("Ground").named("zero")
+"""The constant 0."""
 SPINNING_POSE = driver("AngleAxis2T").by(
     angle=driver("Ramp", slope=0.6).named("angle"),
     axis=driver("Constant", value=(0.0, 0.0, 1.0)).named("axis"),
@@ -39,11 +40,11 @@ def corner_of(T: Driver) -> ExampleBlock:
 
 
 def last_column_of(T: Driver) -> ExampleBlock:
-    """The position in a pose, and the 1 below it."""
+    """The last column of a pose: the position and a 1."""
     return driver("SubMatrix", first_column=4).named("last column").by(u=T)
 
 
 def position_of(T: Driver) -> tuple[ExampleBlock, ExampleBlock, ExampleBlock]:
-    """x, y and z of a pose."""
+    """The coordinates x, y and z of the position of a pose."""
     position = driver("T2xyz").named("position").by(T=T)
     return position.at("x"), position.at("y"), position.at("z")

@@ -1,8 +1,8 @@
 """External resets with Simulink's names: when a trigger signal resets the states of a block.
 
 ``rising``: the trigger becomes positive. ``falling``: it stops being positive. ``either``: both events.
-``level``: the trigger is not 0, or has just become 0. ``level hold``: the trigger is not 0. The states are
-held while the trigger is not 0.
+``level``: the trigger is not 0, or has just become 0. ``level hold``: the trigger is not 0. In both
+level modes the states are held while the trigger is not 0.
 """
 
 from __future__ import annotations
@@ -28,7 +28,9 @@ PREVIOUS_SIGN = State(
 
 def external_reset_parameter(default: str) -> Any:
     """Declare ``external_reset``, which adds the input ``reset``."""
-    return parameter(default, choices=EXTERNAL_RESETS, doc="when the input reset resets the state")
+    return parameter(
+        default, choices=EXTERNAL_RESETS, doc="edge or level at the input reset that resets the state"
+    )
 
 
 def initial_source_parameter(default: str = "internal") -> Any:
@@ -47,20 +49,20 @@ def reset_ports(external_reset: str, initial_condition_source: str) -> tuple[Por
     )
 
 
-def side_of(external_reset: str, trigger: SX) -> SX:
-    """1 or 0: whether the trigger is positive, or not 0 for the level modes."""
+def trigger_state(external_reset: str, trigger: SX) -> SX:
+    """1 if the trigger is positive (for the level modes, not 0), else 0."""
     return trigger != 0.0 if external_reset in LEVELS else trigger > 0.0
 
 
 def fires_at_tick(external_reset: str, trigger: SX, previous_side: SX) -> SX:
     """Whether a sampled block is reset at this tick; ``previous_side`` is the state ``PREVIOUS_SIGN``."""
-    side = side_of(external_reset, trigger)
+    side = trigger_state(external_reset, trigger)
     rises, falls = logic_and(side, previous_side == 0.0), logic_and(side == 0.0, previous_side == 1.0)
-    fires = {
+    reset_conditions = {
         "rising": rises,
         "falling": falls,
         "either": logic_or(rises, falls),
         "level": logic_or(side, falls),
         "level hold": side,
     }
-    return if_else(fires[external_reset], 1.0, 0.0)
+    return if_else(reset_conditions[external_reset], 1.0, 0.0)

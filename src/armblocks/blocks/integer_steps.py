@@ -1,4 +1,4 @@
-"""Integers that follow a signal, as modes whose changes are events."""
+"""Modes that are rounded inputs: an event occurs where the integer changes."""
 
 from __future__ import annotations
 
@@ -27,10 +27,9 @@ ROUNDINGS: Mapping[str, Callable[[SX], SX]] = {
 
 
 def rounding_edges(function: str, n: SX, mirrored: bool = False) -> tuple[SX, SX]:
-    """The boundary above which a rounding exceeds n, and whether the boundary itself is rounded to more than
-    n.
+    """Return the upper end of the interval that is rounded to n, and whether this end is rounded to n + 1.
 
-    ``mirrored``: the same for -f(-u) instead of f(u).
+    With ``mirrored``, the rounding function is -f(-u) instead of f(u).
     """
     if function == "round":
         return n + 0.5, n >= 0.0
@@ -42,10 +41,11 @@ def rounding_edges(function: str, n: SX, mirrored: bool = False) -> tuple[SX, SX
 
 
 def step_after(target: SX, before: SX, e: Signals, up: str = "up", down: str = "down") -> SX:
-    """An integer after the events at both ends of its interval; ``target``: computed from the present values.
+    """Return the mode after the events ``up`` and ``down`` at the ends of its interval.
 
-    A jump may pass several integers at once. The integer changes by at least one, because at a boundary
-    rounding errors could give the old value again.
+    ``target`` is the integer for the present signal, ``before`` the mode before the events. A jump may pass
+    several integers at once. The mode changes by at least one, although rounding errors at a boundary could
+    make ``target`` the old value.
     """
     lower = if_else(e[down] < 0.0, fmin(target, before - 1.0), before)
     return if_else(e[up] > 0.0, fmax(target, before + 1.0), lower)
@@ -55,47 +55,50 @@ def step_after(target: SX, before: SX, e: Signals, up: str = "up", down: str = "
 class IntegerSteps:
     """Rounding of the input ``signal`` to the mode ``mode``, element by element.
 
-    A block returns these modes, guards and values from its methods. With ``count`` the integer is limited to
-    0 … ``count - 1``; without ``count`` it is unlimited. ``mark`` is the prefix of the guard names.
+    The methods of a block with the same names return these modes, guards and values. ``function`` is a key
+    of :data:`ROUNDINGS`. With ``count`` the integer is limited to 0 … ``count - 1``; without ``count`` it is
+    unlimited. The names of the guards begin with ``prefix``.
     """
 
     signal: str
     function: str = "floor"
     mode: str = "integer"
     count: int | None = None
-    mark: str = ""
+    prefix: str = ""
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State(self.mode, inputs[self.signal], f"{self.signal} as an integer"),)
+        return (State(self.mode, inputs[self.signal], f"{self.signal} rounded to an integer"),)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         shape = inputs[self.signal]
-        up = Guard(f"{self.mark}up", shape, f"{self.signal} reaches the next integer", 1)
-        return (up, Guard(f"{self.mark}down", shape, f"{self.signal} reaches the integer below", -1))
+        up = Guard(f"{self.prefix}up", shape, f"{self.signal} is rounded to the next integer", 1)
+        return (up, Guard(f"{self.prefix}down", shape, f"{self.signal} is rounded to the integer below", -1))
 
     def guard_values(self, x: Signals, u: Signals) -> Signals:
         integer, value = x[self.mode], u[self.signal]
-        edge, owned = rounding_edges(self.function, integer)
-        below, below_owned = rounding_edges(self.function, -integer, mirrored=True)
-        up = value - edge + if_else(owned, THRESHOLD_OFFSET, -THRESHOLD_OFFSET)
-        down = value + below - if_else(below_owned, THRESHOLD_OFFSET, -THRESHOLD_OFFSET)
+        edge, upper_end_rounds_up = rounding_edges(self.function, integer)
+        below, lower_end_rounds_down = rounding_edges(self.function, -integer, mirrored=True)
+        up = value - edge + if_else(upper_end_rounds_up, THRESHOLD_OFFSET, -THRESHOLD_OFFSET)
+        down = value + below - if_else(lower_end_rounds_down, THRESHOLD_OFFSET, -THRESHOLD_OFFSET)
         if self.count is not None:
             up = if_else(integer >= self.count - 1.0, -1.0, up)
             down = if_else(integer <= 0.0, 1.0, down)
-        return {f"{self.mark}up": up, f"{self.mark}down": down}
+        return {f"{self.prefix}up": up, f"{self.prefix}down": down}
 
     def mode_values(self, x: Signals, u: Signals) -> Signals:
-        ends = self.guard_values(x, u)
+        guards = self.guard_values(x, u)
         return {
-            self.mode: cell_of(self._rounded(u), x[self.mode], ends, f"{self.mark}up", f"{self.mark}down")
+            self.mode: cell_of(
+                self._rounded(u), x[self.mode], guards, f"{self.prefix}up", f"{self.prefix}down"
+            )
         }
 
     def contradictions(self, x: Signals, u: Signals) -> Signals:
-        return {self.mode: beyond(self.guard_values(x, u), f"{self.mark}up", f"{self.mark}down")}
+        return {self.mode: beyond(self.guard_values(x, u), f"{self.prefix}up", f"{self.prefix}down")}
 
     def resets(self, x: Signals, u: Signals, e: Signals) -> Signals:
         return {
-            self.mode: step_after(self._rounded(u), x[self.mode], e, f"{self.mark}up", f"{self.mark}down")
+            self.mode: step_after(self._rounded(u), x[self.mode], e, f"{self.prefix}up", f"{self.prefix}down")
         }
 
     def _rounded(self, u: Signals) -> SX:
@@ -104,12 +107,12 @@ class IntegerSteps:
 
 
 class BlockWithSteps(Block):
-    """Base class of blocks with integers that follow inputs, given by :meth:`_steps`."""
+    """Base class of blocks whose modes are rounded inputs; subclasses declare them in :meth:`_steps`."""
 
     following_modes: ClassVar[bool] = True
 
     def _steps(self) -> tuple[IntegerSteps, ...]:
-        """The integers whose changes are events."""
+        """The rounded inputs of the block."""
         raise NotImplementedError
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:

@@ -1,8 +1,8 @@
 """Traced interpolation in tables: every method computes weights of the table's entries.
 
-At a position u between the break points the value is the sum of ``weights[k] * table[k]``. The weights depend
-on u and the break points alone, so one tensor contraction handles tables with any number of axes and any
-method, and the entries stay tunable. At a break point one weight is exactly 1 and the others are exactly 0.
+At a position u between the points the value is the sum of ``weights[k] * table[k]``. The weights depend
+on u and the points alone, so one tensor contraction handles tables with any number of axes and any
+method, and the entries stay tunable. At a point one weight is exactly 1 and the others are exactly 0.
 """
 
 from __future__ import annotations
@@ -32,11 +32,10 @@ def weights(
     extrapolation: str = "clip",
     cell: SX | None = None,
 ) -> list[SX]:
-    """The weight of each of n >= 2 ascending break points at position ``u``, a scalar.
+    """The weight of each of n >= 2 ascending points at position ``u``, a scalar.
 
-    Break points may be symbols, except for the method ``cubic``.
-
-    ``cell``, if given, is the number of :func:`boundaries` at or below u and selects the equations.
+    The points may be symbols, except for the method ``cubic``. ``cell``, if given, is the number of
+    :func:`boundaries` at or below u and selects the equations.
     """
     ends = boundaries(points, method, extrapolation)
     if method in ("flat", "nearest"):
@@ -45,27 +44,29 @@ def weights(
         interval = None if cell is None else [cell == float(k) for k in range(len(points) - 1)]
         return linear_weights(u, points, interval)
     if cell is None:
-        inside, interval = fmin(fmax(u, points[0]), points[-1]), None
+        clipped, interval = fmin(fmax(u, points[0]), points[-1]), None
     else:
         last = float(len(ends))
-        inside = if_else(cell == 0.0, points[0], if_else(cell == last, points[-1], u))
+        clipped = if_else(cell == 0.0, points[0], if_else(cell == last, points[-1], u))
         inner_cell = fmin(fmax(cell, 1.0), last - 1.0)
         interval = [inner_cell == float(k) for k in range(1, len(points))]
     if method == "linear":
-        return linear_weights(inside, points, interval)
-    fixed = [float(point) for point in points]  # splines need constant break points
-    weighted = _cubic_weights(inside, fixed)
+        return linear_weights(clipped, points, interval)
+    fixed = [float(point) for point in points]  # splines need constant points
+    weighted = _cubic_weights(clipped, fixed)
     if extrapolation == "linear":
         derivatives = spline_derivatives(fixed, np.eye(len(fixed)))
         for k in range(len(points)):
             rate = if_else(u < points[0], float(derivatives[0, k]), float(derivatives[-1, k]))
-            weighted[k] = weighted[k] + rate * (u - inside)
+            weighted[k] = weighted[k] + rate * (u - clipped)
     return weighted
 
 
 def boundaries(points: Sequence[Point], method: str, extrapolation: str) -> list[Point]:
-    """The positions at which the curve or its derivative jumps; for a spline, only the ends if it is
-    clipped."""
+    """The positions at which the curve or its derivative jumps.
+
+    A clipped spline has two such positions, its ends. Other splines have none.
+    """
     if method == "flat":
         return list(points[1:])
     if method == "nearest":
@@ -78,9 +79,7 @@ def boundaries(points: Sequence[Point], method: str, extrapolation: str) -> list
 def linear_weights(u: SX, points: Sequence[Point], interval: Sequence[SX] | None = None) -> list[SX]:
     """Weights of linear interpolation (hat functions); the end intervals extend beyond the ends.
 
-    Break points may be symbols.
-
-    ``interval``, if given, is 1 for the interval of u and 0 for all others.
+    The points may be symbols. ``interval``, if given, is 1 for the interval of u and 0 for all others.
     """
     weights = [SX(0.0) for _ in points]
     for k, inside in enumerate(interval or cells(u, points[1:-1])):
@@ -111,7 +110,7 @@ def contract(table: SX, shape: Shape, weights_by_axis: Sequence[Sequence[SX]]) -
 
 
 def _cubic_weights(u: SX, points: Sequence[float]) -> list[SX]:
-    """The cubic Hermite interpolant on each interval, from values and derivatives at its ends."""
+    """The weights of a cubic spline, from its Hermite form on each interval."""
     values = [SX(0.0) for _ in points]
     derivatives = [SX(0.0) for _ in points]
     for k, inside in enumerate(cells(u, points[1:-1])):

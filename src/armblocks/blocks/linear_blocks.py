@@ -91,7 +91,8 @@ class LinearBlock(Block):
 class RationalBlock(Block):
     """A rational transfer function in direct form II, initially at rest.
 
-    Its states are u filtered by 1/denominator and its derivatives, highest first, or its last values.
+    Let v be u filtered by 1/denominator. The states of a continuous block are the derivatives of v, highest
+    order first. The states of a sampled block are the values of v at the last ticks, newest first.
     """
 
     numerator: ArrayLike = parameter((1.0,), dimensions=(1,), doc="b0 … bm, highest power first")
@@ -103,7 +104,7 @@ class RationalBlock(Block):
             raise InputError(
                 f"the denominator is {a.tolist()} and the numerator has {len(b)} coefficients",
                 where=self.type_name(),
-                allowed="a0 not zero, at least two a, and no more b than a",
+                allowed="a0 not zero, at least two coefficients in a, and at most as many in b",
                 fix="remove leading zeros; a transfer function with more zeros than poles is not causal",
             )
 
@@ -147,7 +148,7 @@ class SectionsByRoots(Block):
 
     zeros: ArrayLike = parameter((1.0,), dimensions=(1, 2), tunable=False, roots=True, doc="z1 … zm, or none")
     poles: ArrayLike = parameter((0.0, -1.0), dimensions=(1, 2), tunable=False, roots=True, doc="p1 … pn")
-    gain: float = parameter(1.0, doc="the factor")
+    gain: float = parameter(1.0, doc="the gain")
 
     def check(self) -> None:
         check_proper(*roots_of(self), where=self.type_name())
@@ -192,13 +193,15 @@ def section_change(system: LinearSystem, x: SX, u: SX) -> SX:
 class FilterByBand(Block):
     """A scalar filter from a design, an order and edge frequencies; analog or digital, initially at rest.
 
-    Subclasses define ``system``, and ``edge`` and ``upper_edge`` in their own units.
+    Subclasses define ``system``, and redefine ``edge`` and ``upper_edge`` with their units.
     """
 
     design: str = parameter("butterworth", choices=_FILTER_DESIGNS, doc="the design of the filter")
-    filter_type: str = parameter("low_pass", choices=_FILTER_TYPES, doc="the frequencies that pass")
+    filter_type: str = parameter("low_pass", choices=_FILTER_TYPES, doc="type of the filter by its pass band")
     order: int = parameter(2, minimum=1, maximum=20, doc="order of the low-pass prototype")
-    edge: float = parameter(1.0, above=0.0, tunable=False, doc="edge frequency; of a band, the lower one")
+    edge: float = parameter(
+        1.0, above=0.0, tunable=False, doc="edge frequency; for band filters, the lower edge"
+    )
     upper_edge: float = parameter(2.0, above=0.0, tunable=False, doc="upper edge frequency of a band")
     ripple: float = parameter(1.0, above=0.0, tunable=False, doc="ripple in the pass band (chebyshev1), dB")
     attenuation: float = parameter(
@@ -214,7 +217,7 @@ class FilterByBand(Block):
                 f"edge is {self.edge} and upper_edge is {self.upper_edge}",
                 where=self.type_name(),
                 allowed="edge < upper_edge",
-                fix="exchange them",
+                fix="exchange the two values",
             )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -236,7 +239,7 @@ class FilterByBand(Block):
 
     @property
     def prototype(self) -> ZeroPoleGain:
-        """The low-pass filter with its edge at 1 rad/s."""
+        """The low-pass prototype with its edge at 1 rad/s."""
         return low_pass(self.design, self.order, self.ripple, self.attenuation)
 
     @property

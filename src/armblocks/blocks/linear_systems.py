@@ -27,7 +27,7 @@ Roots = NDArray[np.complex128]
 
 @dataclass(frozen=True, kw_only=True)
 class ZeroPoleGain:
-    """gain (s - zero1) (s - zero2) … / ((s - pole1) (s - pole2) …); real coefficients."""
+    """The transfer function gain (s - zero1) (s - zero2) … / ((s - pole1) …), with real coefficients."""
 
     zeros: Roots
     poles: Roots
@@ -36,7 +36,7 @@ class ZeroPoleGain:
 
 @dataclass(frozen=True, kw_only=True)
 class LinearSystem:
-    """x' (or the next x) = A x + B u, y = C x + D u for one input and one output."""
+    """A linear system with one input and output: x' (or the next x) = A x + B u, y = C x + D u."""
 
     A: Matrix
     B: Matrix
@@ -58,8 +58,8 @@ def complex_roots(rows: ArrayLike, where: str, name: str) -> Roots:
             fix="give a row of two numbers for each complex root",
         )
     roots = values.astype(np.complex128) if values.ndim == 1 else values[:, 0] + 1j * values[:, 1]
-    above, below = roots[roots.imag > 0.0], roots[roots.imag < 0.0]
-    if sorted(above, key=_order) != sorted(np.conj(below), key=_order):
+    upper, lower = roots[roots.imag > 0.0], roots[roots.imag < 0.0]
+    if sorted(upper, key=_sort_key) != sorted(np.conj(lower), key=_sort_key):
         raise InputError(
             f"{name} are {roots.tolist()}",
             where=where,
@@ -81,7 +81,7 @@ def check_proper(zeros: Roots, poles: Roots, where: str) -> None:
 
 
 def realised(system: ZeroPoleGain) -> LinearSystem:
-    """The cascade of sections."""
+    """The system as a cascade of sections."""
     total = LinearSystem(A=np.zeros((0, 0)), B=np.zeros(0), C=np.zeros(0), D=1.0)
     scale = system.gain
     for zeros, poles in _sections(system.zeros, system.poles):
@@ -90,17 +90,17 @@ def realised(system: ZeroPoleGain) -> LinearSystem:
     return LinearSystem(A=total.A, B=total.B, C=scale * total.C, D=scale * total.D)
 
 
-def _order(root: complex) -> tuple[float, float]:
+def _sort_key(root: complex) -> tuple[float, float]:
+    """The sorting key of a root."""
     return (root.real, root.imag)
 
 
 def _sections(zeros: Roots, poles: Roots) -> list[tuple[list[complex], list[complex]]]:
-    """Real poles and conjugate pairs, each with at most as many zeros as poles."""
+    """The zeros and poles of each section: one or two poles, and at most as many zeros."""
     pole_groups = _groups(poles)
     zero_groups = _groups(zeros)
     pairs = [group for group in zero_groups if len(group) == 2]
-    # A pair of zeros needs a section with two poles; if there are too few conjugate pairs, real poles are
-    # paired.
+    # A pair of zeros needs a section with two poles. Real poles are paired while conjugate pairs are missing.
     while sum(len(group) == 2 for group in pole_groups) < len(pairs):
         first, second = [group for group in pole_groups if len(group) == 1][:2]
         pole_groups = [group for group in pole_groups if group is not first and group is not second]
@@ -114,24 +114,25 @@ def _sections(zeros: Roots, poles: Roots) -> list[tuple[list[complex], list[comp
 
 
 def _groups(roots: Roots) -> list[list[complex]]:
-    real = [[complex(root)] for root in sorted(roots[roots.imag == 0.0], key=_order)]
-    upper = sorted(roots[roots.imag > 0.0], key=_order)
+    """The conjugate pairs, then the real roots, in a defined order."""
+    real = [[complex(root)] for root in sorted(roots[roots.imag == 0.0], key=_sort_key)]
+    upper = sorted(roots[roots.imag > 0.0], key=_sort_key)
     return [[complex(root), complex(root).conjugate()] for root in upper] + real
 
 
 def _section(zeros: Sequence[complex], poles: Sequence[complex]) -> tuple[LinearSystem, float]:
-    """The section multiplied by a factor that makes its gain about 1, and the factor."""
+    """The section, multiplied by a factor for a gain of about 1, and this factor."""
     size = max(map(magnitude, poles)) or 1.0
     factor = math.prod([size] * len(poles)) / math.prod(max(magnitude(zero), size) for zero in zeros)
-    above, below = factor * _polynomial(zeros), _polynomial(poles)
-    above = np.concatenate([np.zeros(len(below) - len(above)), above])
-    direct = float(above[0])
-    rest: Matrix = (above - direct * below)[1:]
+    numerator, denominator = factor * _polynomial(zeros), _polynomial(poles)
+    numerator = np.concatenate([np.zeros(len(denominator) - len(numerator)), numerator])
+    direct = float(numerator[0])
+    rest: Matrix = (numerator - direct * denominator)[1:]
     first = poles[0]
     if len(poles) == 1:
         a, b, c = [[first.real]], [size], [rest[0] / size]
     elif first.imag:
-        # x1 + i x2 rotates in the complex plane
+        # x1 + i x2 is the state of the complex pole sigma - i omega.
         sigma, omega = first.real, first.imag
         a, b = [[sigma, omega], [-omega, sigma]], [size, 0.0]
         c = [rest[0] / size, -(rest[1] + rest[0] * sigma) / omega / size]
@@ -161,26 +162,31 @@ def _in_series(one: LinearSystem, two: LinearSystem) -> LinearSystem:
     )
 
 
-# Filters. Frequencies are in rad/s, or warped for the bilinear transformation.
+# Filters. Frequencies are in rad/s; for digital filters they are prewarped for the bilinear transformation.
 
 
 def low_pass(design: str, order: int, ripple: float, attenuation: float) -> ZeroPoleGain:
-    """The filter whose pass band ends (``chebyshev2``: stop band begins) at 1 rad/s; two numbers in dB."""
+    """The low-pass prototype: its pass band ends (``chebyshev2``: stop band begins) at 1 rad/s.
+
+    ``ripple`` and ``attenuation`` are in dB.
+    """
     angles = math.pi * (2.0 * np.arange(1, order + 1) - 1.0) / (2.0 * order)
     sines, cosines = (np.array([function(angle) for angle in angles.tolist()]) for function in (sin, cos))
-    circle = _complex(-sines, cosines)
-    none = np.zeros(0, dtype=np.complex128)
+    circle_poles = _complex(-sines, cosines)
+    no_zeros = np.zeros(0, dtype=np.complex128)
     if design == "butterworth":
-        return ZeroPoleGain(zeros=none, poles=_paired(circle), gain=1.0)
-    squeeze = power(10.0, (ripple if design == "chebyshev1" else attenuation) / 10.0) - 1.0
-    stretch = asinh(math.sqrt(squeeze if design == "chebyshev2" else 1.0 / squeeze)) / order
-    ellipse = _paired(_complex(sinh(stretch) * -sines, cosh(stretch) * cosines))
+        return ZeroPoleGain(zeros=no_zeros, poles=_paired(circle_poles), gain=1.0)
+    excess_loss = power(10.0, (ripple if design == "chebyshev1" else attenuation) / 10.0) - 1.0
+    mu = asinh(math.sqrt(excess_loss if design == "chebyshev2" else 1.0 / excess_loss)) / order
+    ellipse_poles = _paired(_complex(sinh(mu) * -sines, cosh(mu) * cosines))
     if design == "chebyshev1":
-        gain = product(-ellipse).real
+        gain = product(-ellipse_poles).real
         return ZeroPoleGain(
-            zeros=none, poles=ellipse, gain=gain / math.sqrt(1.0 + squeeze) if order % 2 == 0 else gain
+            zeros=no_zeros,
+            poles=ellipse_poles,
+            gain=gain / math.sqrt(1.0 + excess_loss) if order % 2 == 0 else gain,
         )
-    poles = _paired(_quotients(1.0, ellipse))
+    poles = _paired(_quotients(1.0, ellipse_poles))
     middle = order // 2 if order % 2 else None
     heights = [1.0 / cos(angle) for k, angle in enumerate(angles.tolist()) if k != middle]
     zeros = _paired(_complex(np.zeros(len(heights)), np.array(heights)))
@@ -188,15 +194,15 @@ def low_pass(design: str, order: int, ripple: float, attenuation: float) -> Zero
     return ZeroPoleGain(zeros=zeros, poles=poles, gain=gain)
 
 
-def shifted(base: ZeroPoleGain, kind: str, edge: float, upper_edge: float) -> ZeroPoleGain:
-    """The low-pass filter of 1 rad/s as ``low_pass``, ``high_pass``, ``band_pass`` or ``band_stop``."""
+def frequency_transformed(base: ZeroPoleGain, kind: str, edge: float, upper_edge: float) -> ZeroPoleGain:
+    """The low-pass prototype, transformed to ``low_pass``, ``high_pass``, ``band_pass`` or ``band_stop``."""
     z, p, k, excess = base.zeros, base.poles, base.gain, len(base.poles) - len(base.zeros)
     if kind == "low_pass":
         return ZeroPoleGain(zeros=z * edge, poles=p * edge, gain=k * math.prod([edge] * excess))
-    turned = k * quotient(product(-z), product(-p)).real
+    inverted_gain = k * quotient(product(-z), product(-p)).real
     if kind == "high_pass":
         zeros = np.concatenate([_quotients(edge, z), np.zeros(excess)])
-        return ZeroPoleGain(zeros=_paired(zeros), poles=_paired(_quotients(edge, p)), gain=turned)
+        return ZeroPoleGain(zeros=_paired(zeros), poles=_paired(_quotients(edge, p)), gain=inverted_gain)
     width, centre = upper_edge - edge, math.sqrt(edge * upper_edge)
     if kind == "band_pass":
         zeros = np.concatenate([_split(z * width / 2.0, centre), np.zeros(excess)])
@@ -205,7 +211,7 @@ def shifted(base: ZeroPoleGain, kind: str, edge: float, upper_edge: float) -> Ze
     notches = np.concatenate([np.full(excess, 1j * centre), np.full(excess, -1j * centre)])
     zeros = np.concatenate([_split(_quotients(width / 2.0, z), centre), notches])
     poles = _split(_quotients(width / 2.0, p), centre)
-    return ZeroPoleGain(zeros=_paired(zeros), poles=_paired(poles), gain=turned)
+    return ZeroPoleGain(zeros=_paired(zeros), poles=_paired(poles), gain=inverted_gain)
 
 
 def warped(fraction: float) -> float:
@@ -231,19 +237,19 @@ def _complex(real: Matrix, imaginary: Matrix) -> Roots:
 
 
 def _quotients(dividends: complex | Roots, divisors: Roots) -> Roots:
-    """Elementwise quotients; one dividend, or as many as divisors."""
+    """Elementwise quotients of one dividend, or of as many dividends as divisors."""
     pairs = zip(np.broadcast_to(dividends, divisors.shape).tolist(), divisors.tolist())
     return np.array([quotient(complex(a), b) for a, b in pairs], dtype=np.complex128)
 
 
 def _split(roots: Roots, centre: float) -> Roots:
-    """The two roots around ``centre`` to which the band transformation maps one root around 0."""
-    apart = np.array([square_root(product([root, root]) - centre * centre) for root in roots], complex)
-    return np.concatenate([roots + apart, roots - apart])
+    """The pairs of roots to which the band transformation maps the roots of the prototype."""
+    offset = np.array([square_root(product([root, root]) - centre * centre) for root in roots], complex)
+    return np.concatenate([roots + offset, roots - offset])
 
 
 def _paired(roots: ArrayLike) -> Roots:
-    """The roots without rounding errors of symmetry: exact conjugate pairs and exactly real roots."""
+    """The roots as exact conjugate pairs and exactly real roots, without asymmetric rounding errors."""
     values = np.asarray(roots, dtype=np.complex128)
     tolerance = np.array([1e-9 * magnitude(root) for root in values])
     real = values[np.abs(values.imag) <= tolerance].real + 0j

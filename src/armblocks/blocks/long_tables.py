@@ -1,9 +1,9 @@
 """Tables with many points: a binary search finds the interval, and its end points are read by index.
 
-The equations of a short table contain every point, which is faster than a search for up to ``SHORT`` points.
-The cost of a long table grows with log n, in compilation and in runs. Its positions and values are run
-inputs, stored contiguously, and a run is not differentiated with respect to them. The run inputs of a long
-cubic spline are computed from positions and values (:mod:`.splines`).
+The equations of a short table contain every point, which is faster than a search for up to
+``MAX_SHORT_POINTS`` points. The cost of a long table grows with log n, in compilation and in runs. Its
+positions and values are run inputs, stored contiguously, and a run is not differentiated with respect to
+them. The run inputs of a long cubic spline are computed from positions and values (:mod:`.splines`).
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from casadi import SX, fmax, fmin
 from armblocks.diagram import Block, Parameter, ParameterKind
 from armblocks.equations import Shape, last_at_or_below, read_entry
 
-SHORT = 16
+MAX_SHORT_POINTS = 16
+"""Largest number of points of a short table."""
 KNOTS = Parameter(
     name="knots", kind=ParameterKind.ARRAY, default=(), doc="positions of the spline, axis after axis"
 )
@@ -31,7 +32,7 @@ SPLINE = Parameter(
 
 def is_long(shape: Shape, method: str = "linear") -> bool:
     """Whether a table with this number of points along each axis is read by index."""
-    return max(shape) > SHORT or (method != "cubic" and math.prod(shape) > 4 * SHORT)
+    return max(shape) > MAX_SHORT_POINTS or (method != "cubic" and math.prod(shape) > 4 * MAX_SHORT_POINTS)
 
 
 def inputs_with(block: Block, long: bool, table: str, *positions: str) -> tuple[Parameter, ...]:
@@ -55,5 +56,5 @@ def interval_of(u: SX, positions: SX) -> SX:
 def interpolated(u: SX, positions: SX, interval: SX, entry: Callable[[SX], SX]) -> SX:
     """The linear interpolation in an interval, with the weights of :func:`interpolation.linear_weights`."""
     begin, end = read_entry(positions, interval), read_entry(positions, interval + 1.0)
-    share = (u - begin) / (end - begin)
-    return (1.0 - share) * entry(interval) + share * entry(interval + 1.0)
+    fraction = (u - begin) / (end - begin)
+    return (1.0 - fraction) * entry(interval) + fraction * entry(interval + 1.0)

@@ -21,7 +21,7 @@ ODD = State("odd", (), "1 after an odd number of repeated samples, else 0")
 INSTANT = Guard("instant", (), "t - the next sample time", 1)
 RESAMPLE = Guard("again", (2,), "the input differs from its sample", -1)
 SAME_VALUE = 2.0**-40
-"""Relative difference within which a signal equals its sample: in loops the rounding errors differ."""
+"""Relative tolerance for a signal to equal its sample; in a loop their rounding errors differ."""
 
 
 def sample_time(p: Signals, count: SX) -> SX:
@@ -32,7 +32,7 @@ def sample_time(p: Signals, count: SX) -> SX:
 def sampled(t: SX, x: Signals, p: Signals, e: Signals) -> tuple[SX, SX, Signals]:
     """Whether a period begins, whether to sample the input, and the next values of the states.
 
-    The start needs no event: every mode iteration at t = 0 samples the input again.
+    At t = 0 no event is necessary, because every mode iteration samples the input again.
     """
     at_sample_time = logic_or(e["instant"] > 0.0, t >= sample_time(p, x["count"]))
     samples = logic_or(at_sample_time, _just_sampled(t, x, p))
@@ -45,18 +45,20 @@ def sampled(t: SX, x: Signals, p: Signals, e: Signals) -> tuple[SX, SX, Signals]
 
 
 def sampling_guards(t: SX, x: Signals, p: Signals, value: SX, sample: SX) -> Signals:
-    """The guards of both events: a sample time is reached; the input is no longer equal to its sample.
+    """The guards of two events: a sample time is reached; the input differs from its sample.
 
-    The two entries of the second guard alternate, because an entry that has fired needs the other sign first.
+    The two entries of the second guard alternate, because a guard must change its sign before it can fire
+    again.
     """
-    # False for NaN, which no repetition changes: the run then ends with an error at the block that causes it.
-    apart = fabs(value - sample) > SAME_VALUE * fmax(fabs(value), fabs(sample))
-    differs = logic_and(_just_sampled(t, x, p), mmax(apart))
-    values = [if_else(logic_and(differs, x["odd"] == turn), -1.0, 1.0) for turn in (0.0, 1.0)]
+    # The comparison is false for NaN, so a NaN is not sampled repeatedly. The run ends with an error at the
+    # block that outputs the NaN.
+    different = fabs(value - sample) > SAME_VALUE * fmax(fabs(value), fabs(sample))
+    differs = logic_and(_just_sampled(t, x, p), mmax(different))
+    values = [if_else(logic_and(differs, x["odd"] == parity), -1.0, 1.0) for parity in (0.0, 1.0)]
     return {"instant": since(t, sample_time(p, x["count"])), "again": vertcat(*values)}
 
 
 def _just_sampled(t: SX, x: Signals, p: Signals) -> SX:
-    """Whether the last sample was taken at this instant: t_k, or a few units in the last place beside it."""
+    """Whether the last sample was taken at this instant, within a few units in the last place."""
     last = fmax(x["when"], sample_time(p, x["count"] - 1.0))
     return logic_and(x["count"] > 0.0, t <= last)

@@ -35,12 +35,12 @@ class Errors:
 
 
 def one_error(u: SX) -> Errors:
-    """One degree of freedom."""
+    """The input as the error of all three actions (one degree of freedom)."""
     return Errors(proportional=u, integral=u, derivative=u)
 
 
 def weighted_errors(r: SX, u: SX, p: Signals) -> Errors:
-    """Two degrees of freedom: the set-point weights ``b`` (proportional) and ``c`` (derivative action)."""
+    """The errors with the set-point weights ``b`` (proportional) and ``c`` (derivative action)."""
     return Errors(proportional=p["b"] * r - u, integral=r - u, derivative=p["c"] * r - u)
 
 
@@ -58,13 +58,14 @@ def pid_start(p: Signals) -> Signals:
 
 
 def _gains(form: str, p: Signals) -> tuple[SX, SX, SX]:
+    """The gains P, I and D of the parallel form."""
     factor = p["P"] if form == "ideal" else SX(1.0)
     return p["P"], factor * p["I"], factor * p["D"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ContinuousPid:
-    """The law in continuous time. Reaching and leaving a limit are events."""
+    """The PID law in continuous time. Reaching and leaving a limit are events."""
 
     form: str
     limited: bool
@@ -73,11 +74,11 @@ class ContinuousPid:
 
     @property
     def clamps(self) -> bool:
-        """Whether the integral stops while it would drive the output further beyond a limit."""
+        """Whether the integral stops while it drives the output further beyond a limit."""
         return self.limited and self.anti_windup == "clamping"
 
     def modes(self, shape: Shape) -> tuple[State, ...]:
-        """The active limit, and the direction of the integral."""
+        """The modes: the active limit, and the direction of the integral."""
         limit = (State("limit", shape, "1 at the upper limit, -1 at the lower limit, else 0", follows=True),)
         drive = (State("drive", shape, "1 while the integral increases, else -1", follows=True),)
         return (*(limit if self.limited else ()), *(drive if self.clamps else ()))
@@ -98,10 +99,10 @@ class ContinuousPid:
 
     def output(self, x: Signals, e: Errors, p: Signals) -> SX:
         """The controller output."""
-        free = self._free(x, e, p)
+        unlimited = self._unlimited_output(x, e, p)
         if not self.limited:
-            return free
-        below = if_else(x["limit"] < 0.0, p["lower"], free)
+            return unlimited
+        below = if_else(x["limit"] < 0.0, p["lower"], unlimited)
         return if_else(x["limit"] > 0.0, p["upper"], below)
 
     def derivatives(self, x: Signals, e: Errors, p: Signals, tracked: SX | None) -> Signals:
@@ -111,7 +112,7 @@ class ContinuousPid:
         if self.clamps:
             rate = if_else(x["limit"] * x["drive"] > 0.0, 0.0, rate)
         elif self.limited and self.anti_windup == "back_calculation":
-            rate = rate + p["Kb"] * (self.output(x, e, p) - self._free(x, e, p))
+            rate = rate + p["Kb"] * (self.output(x, e, p) - self._unlimited_output(x, e, p))
         return {"integral": rate, "filter": p["N"] * (D * e.derivative - x["filter"])}
 
     def guard_values(
@@ -120,8 +121,8 @@ class ContinuousPid:
         """The values of :meth:`guards`."""
         values = dict[str, SX]()
         if self.limited:
-            free = self._free(x, e, p)
-            values |= {"upper": free - p["upper"], "lower": free - p["lower"]}
+            unlimited = self._unlimited_output(x, e, p)
+            values |= {"upper": unlimited - p["upper"], "lower": unlimited - p["lower"]}
         if self.clamps:
             values["drive"] = self._rate(x, e, p, tracked) - THRESHOLD_OFFSET
         if trigger is not None:
@@ -132,7 +133,7 @@ class ContinuousPid:
         """The modes that follow from the present values."""
         values = dict[str, SX]()
         if self.limited:
-            values["limit"] = zone(self._free(x, e, p), p["lower"], p["upper"])
+            values["limit"] = zone(self._unlimited_output(x, e, p), p["lower"], p["upper"])
         if self.clamps:
             values["drive"] = if_else(self._rate(x, e, p, tracked) > 0.0, 1.0, -1.0)
         return values
@@ -149,11 +150,13 @@ class ContinuousPid:
             after |= {name: if_else(untriggered, x[name], start) for name, start in pid_start(p).items()}
         return after
 
-    def _free(self, x: Signals, e: Errors, p: Signals) -> SX:
+    def _unlimited_output(self, x: Signals, e: Errors, p: Signals) -> SX:
+        """The controller output before it is limited."""
         P, _, D = _gains(self.form, p)
         return P * e.proportional + x["integral"] + p["N"] * (D * e.derivative - x["filter"])
 
     def _rate(self, x: Signals, e: Errors, p: Signals, tracked: SX | None) -> SX:
+        """The rate of the integral without anti-windup."""
         _, I, _ = _gains(self.form, p)  # noqa: E741
         rate = I * e.integral
         return rate if tracked is None else rate + p["Kt"] * (tracked - self.output(x, e, p))
@@ -161,10 +164,10 @@ class ContinuousPid:
 
 @dataclass(frozen=True, kw_only=True)
 class SampledPid:
-    """The law at the ticks of a clock; T is the period.
+    """The PID law at the ticks of a clock with the period T.
 
-    Sums are forward Euler T / (z - 1), backward Euler T z / (z - 1), or trapezoidal T (z + 1) / 2 (z - 1).
-    With the last two, the output contains the newest increment of the integral. The increment of
+    Sums are forward Euler T / (z - 1), backward Euler T z / (z - 1), or trapezoidal T (z + 1) / (2 (z - 1)).
+    With the last two rules, the output contains the newest increment of the integral. The increment of
     back-calculation then depends on the output itself. This equation is piecewise linear and is solved here,
     so that there is no algebraic loop.
     """
@@ -192,20 +195,20 @@ class SampledPid:
 
     def output(self, x: Signals, e: Errors, p: Signals, trigger: SX | None) -> SX:
         """The controller output."""
-        return self._limited(self._free(self._at_tick(x, p, trigger), e, p), p)
+        return self._limited(self._unlimited_output(self._at_tick(x, p, trigger), e, p), p)
 
     def updates(self, x: Signals, e: Errors, p: Signals, trigger: SX | None, tracked: SX | None) -> Signals:
         """The next states."""
         states = self._at_tick(x, p, trigger)
         _, I, D = _gains(self.form, p)  # noqa: E741
-        rate, free = I * e.integral, self._free(states, e, p)
-        limited = self._limited(free, p)
+        rate, unlimited = I * e.integral, self._unlimited_output(states, e, p)
+        limited = self._limited(unlimited, p)
         if self.anti_windup == "clamping":
-            outwards = (free - limited) * rate > 0.0
+            outwards = (unlimited - limited) * rate > 0.0
             rate = if_else(outwards, SX(0.0), rate)
         elif self.anti_windup == "back_calculation":
-            share = _share(self.integrator_method) * p["T"] * p["Kb"]
-            rate = rate + p["Kb"] * (limited - free) / (1.0 + share)
+            fraction = _included_fraction(self.integrator_method) * p["T"] * p["Kb"]
+            rate = rate + p["Kb"] * (limited - unlimited) / (1.0 + fraction)
         if tracked is not None:
             rate = rate + p["Kt"] * (tracked - limited)
         after = {
@@ -216,30 +219,31 @@ class SampledPid:
             after["trigger"] = if_else(trigger > 0.0, 1.0, -1.0)
         return after
 
-    def _free(self, states: Signals, e: Errors, p: Signals) -> SX:
+    def _unlimited_output(self, states: Signals, e: Errors, p: Signals) -> SX:
+        """The controller output before it is limited."""
         P, I, D = _gains(self.form, p)  # noqa: E741
-        free = P * e.proportional + states["integral"] + self._derivative(states, D * e.derivative, p)
-        share = _share(self.integrator_method)
-        return free + share * p["T"] * I * e.integral if share else free
+        unlimited = P * e.proportional + states["integral"] + self._derivative(states, D * e.derivative, p)
+        fraction = _included_fraction(self.integrator_method)
+        return unlimited + fraction * p["T"] * I * e.integral if fraction else unlimited
 
     def _derivative(self, states: Signals, weighted: SX, p: Signals) -> SX:
         """The filtered derivative d = N (D e - f), where f is the sum of d."""
-        rate, share = p["N"] * (weighted - states["filter"]), _share(self.filter_method)
-        return rate / (1.0 + share * p["T"] * p["N"]) if share else rate
+        rate, fraction = p["N"] * (weighted - states["filter"]), _included_fraction(self.filter_method)
+        return rate / (1.0 + fraction * p["T"] * p["N"]) if fraction else rate
 
     def _at_tick(self, x: Signals, p: Signals, trigger: SX | None) -> Signals:
-        """The states, reset where the trigger fires."""
+        """The states at this tick, after a possible reset."""
         if trigger is None:
             return x
         rises = logic_and(x["trigger"] < 0.0, trigger > 0.0)
         falls = logic_and(x["trigger"] > 0.0, trigger <= 0.0)
-        fires = {"rising": rises, "falling": falls, "either": logic_or(rises, falls)}[self.external_reset]
-        return {name: if_else(fires, start, x[name]) for name, start in pid_start(p).items()}
+        is_reset = {"rising": rises, "falling": falls, "either": logic_or(rises, falls)}[self.external_reset]
+        return {name: if_else(is_reset, start, x[name]) for name, start in pid_start(p).items()}
 
     def _limited(self, value: SX, p: Signals) -> SX:
         return fmin(fmax(value, p["lower"]), p["upper"])
 
 
-def _share(method: str) -> float:
-    """The part of the present increment that the sum includes at its tick."""
+def _included_fraction(method: str) -> float:
+    """The fraction of the present increment that a sum includes at the same tick."""
     return {"forward_euler": 0.0, "backward_euler": 1.0, "trapezoidal": 0.5}[method]

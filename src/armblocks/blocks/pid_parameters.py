@@ -25,54 +25,56 @@ from armblocks.errors import InputError
 
 
 def gain_parameter(default: float, doc: str, unit: str = "", **rules: Any) -> Any:
-    """A scalar, or one value for each element."""
+    """Declare a gain: a scalar, or one value for each element."""
     return parameter(default, kind=ParameterKind.ARRAY, doc=doc, unit=unit, **rules)
 
 
 def bandwidth_parameter() -> Any:
-    """The corner frequency of the derivative filter."""
+    """Declare the corner frequency of the derivative filter."""
     return gain_parameter(100.0, "bandwidth of the derivative filter", "rad/s", above=0.0)
 
 
 def lower_limit_parameter(doc: str = "lower limit of the output") -> Any:
-    """The lower limit of the output."""
+    """Declare the lower limit of the output."""
     return gain_parameter(-math.inf, doc, finite=False)
 
 
 def upper_limit_parameter(doc: str = "upper limit of the output") -> Any:
-    """The upper limit of the output."""
+    """Declare the upper limit of the output."""
     return gain_parameter(math.inf, doc, finite=False)
 
 
 def limit_output_parameter() -> Any:
-    """Whether the output is limited."""
+    """Declare ``limit_output``: whether the output is limited."""
     return parameter(False, doc="whether the output is limited to the range from lower to upper")
 
 
 def form_parameter() -> Any:
-    """How the three gains are combined."""
-    return parameter("parallel", choices=FORMS, doc="ideal: P multiplies I and D too")
+    """Declare ``form``, which combines the three gains."""
+    return parameter("parallel", choices=FORMS, doc="parallel, or ideal: P also multiplies I and D")
 
 
 def anti_windup_parameter() -> Any:
-    """The anti-windup method."""
+    """Declare ``anti_windup``."""
     return parameter("none", choices=ANTI_WINDUP, doc="anti-windup method")
 
 
 def external_reset_parameter() -> Any:
-    """When the trigger resets the states."""
+    """Declare ``external_reset``, which adds the input ``reset``."""
     return parameter(
-        "none", choices=tuple(RESETS), doc="when the input reset sets both states to their initial values"
+        "none",
+        choices=tuple(RESETS),
+        doc="edge at the input reset that sets both states to their initial values",
     )
 
 
 def tracking_parameter() -> Any:
-    """Whether the controller has a tracking input."""
-    return parameter(False, doc="whether the output tracks the input tracking")
+    """Declare ``tracking``, which adds the input ``tracking``."""
+    return parameter(False, doc="whether the output follows the signal at the input tracking")
 
 
 def method_parameter(doc: str) -> Any:
-    """The integration method of a sum."""
+    """Declare the integration method of a sum."""
     return parameter("forward_euler", choices=METHODS, doc=doc)
 
 
@@ -87,7 +89,7 @@ def further_inputs(external_reset: str, tracking: bool) -> tuple[Port, ...]:
 
 
 def pid_example(kind: str, **parameters: Any) -> WorkedExample:
-    """A closed loop with two lags and a step of the reference."""
+    """A closed loop with a second-order lag as the plant, and a step of the reference."""
     plant = driver("SecondOrderLag", natural_frequency=2.0, damping=0.8).named("plant")
     step = driver("Step")
     inputs = (
@@ -106,8 +108,8 @@ def pid_example(kind: str, **parameters: Any) -> WorkedExample:
 def check_limits(block: Block, limited: bool) -> None:
     """Raise ``InputError`` unless lower <= upper, and for limits without ``limit_output``."""
     limits_in_order(block, "lower", "upper")
-    ends = [np.ravel(np.asarray(block.parameter_value(name))) for name in ("lower", "upper")]
-    if not limited and np.isfinite(np.concatenate(ends)).any():
+    limits = [np.ravel(np.asarray(block.parameter_value(name))) for name in ("lower", "upper")]
+    if not limited and np.isfinite(np.concatenate(limits)).any():
         raise InputError(
             "there are limits, but limit_output is false",
             where=block.type_name(),
@@ -118,8 +120,10 @@ def check_limits(block: Block, limited: bool) -> None:
 
 def pid_shape(block: Block, inputs: Shapes) -> Shape:
     """The broadcast shape of inputs and gains."""
-    wide = {name: shape for name, shape in inputs.items() if name != "reset"}
-    own = {
-        rule.name: shape_of(block.parameter_value(rule.name)) for rule in block.parameters() if rule.tunable
+    input_shapes = {name: shape for name, shape in inputs.items() if name != "reset"}
+    parameter_shapes = {
+        declared.name: shape_of(block.parameter_value(declared.name))
+        for declared in block.parameters()
+        if declared.tunable
     }
-    return broadcast({**wide, **own})
+    return broadcast({**input_shapes, **parameter_shapes})

@@ -38,17 +38,20 @@ def stream_start(seed: SX, shape: Shape) -> dict[str, SX]:
     count = shape[0] * (shape[1] if len(shape) > 1 else 1) if shape else 1
     terms: list[list[SX]] = []
     for matrix, modulus in ((_RECURRENCE_1, int(_M1)), (_RECURRENCE_2, int(_M2))):
-        jump = _squared(matrix, 127, modulus)
+        seed_jump = _squared(matrix, 127, modulus)
         state = [SX(_START)] * 3
-        rest = floor(seed)
+        remaining = floor(seed)
         for _ in range(SEED_BITS):
-            half = floor(rest / 2.0)
-            odd = rest - 2.0 * half
-            state = [if_else(odd, far, near) for far, near in zip(_product(jump, state, modulus), state)]
-            rest, jump = half, _squared(jump, 1, modulus)
-        hop, elements = _squared(matrix, 76, modulus), [state]
+            half = floor(remaining / 2.0)
+            odd = remaining - 2.0 * half
+            state = [
+                if_else(odd, after, before)
+                for after, before in zip(_product(seed_jump, state, modulus), state)
+            ]
+            remaining, seed_jump = half, _squared(seed_jump, 1, modulus)
+        element_jump, elements = _squared(matrix, 76, modulus), [state]
         for _ in range(count - 1):
-            elements.append(_product(hop, elements[-1], modulus))
+            elements.append(_product(element_jump, elements[-1], modulus))
         terms += [[element[k] for element in elements] for k in range(3)]
     return {name: _shaped(values, shape) for name, values in zip(_NAMES, terms)}
 
@@ -78,13 +81,16 @@ def normal_quantile(probability: SX) -> SX:
 
 
 def _modulo(value: SX, modulus: float) -> SX:
-    # Exact for |value| < 2^53: the quotient is below 2^21, where the distance of doubles is below 1 /
-    # modulus.
+    """The remainder of ``value / modulus``."""
+    # Exact for |value| < 2^53: the quotient is below 2^21, where doubles are less than 1 / modulus apart.
     return value - modulus * floor(value / modulus)
 
 
 def _product(matrix: _Matrix, vector: Sequence[SX], modulus: int) -> list[SX]:
-    """A matrix of 32-bit numbers times a vector, modulo; entries are split in two, so that sums are exact."""
+    """The product of a matrix of 32-bit integers and a vector, modulo ``modulus``.
+
+    Each entry is split into two parts, so that all sums are exact.
+    """
     product = list[SX]()
     for row in matrix:
         high = sum((float(entry >> 17) * value for entry, value in zip(row, vector)), SX(0.0))
@@ -94,6 +100,7 @@ def _product(matrix: _Matrix, vector: Sequence[SX], modulus: int) -> list[SX]:
 
 
 def _squared(matrix: _Matrix, times: int, modulus: int) -> _Matrix:
+    """The power 2^times of the matrix, modulo ``modulus``."""
     for _ in range(times):
         columns = tuple(zip(*matrix))
         matrix = tuple(
@@ -103,11 +110,13 @@ def _squared(matrix: _Matrix, times: int, modulus: int) -> _Matrix:
 
 
 def _shaped(values: Sequence[SX], shape: Shape) -> SX:
+    """The values in row-major order as a symbolic matrix."""
     column = vertcat(*values)
     return reshape(column, shape[1], shape[0]).T if len(shape) > 1 else column
 
 
 def _ratio(x: SX, coefficients: tuple[Sequence[float], Sequence[float]]) -> SX:
+    """The ratio of two polynomials in x."""
     numerator, denominator = (SX(0.0), SX(0.0))
     for a, b in zip(*coefficients):
         numerator, denominator = numerator * x + a, denominator * x + b

@@ -1,11 +1,11 @@
 """Cubic splines through given points: computes the derivatives at the points from the values.
 
-Not-a-knot at both ends, as MATLAB's ``spline``; three points give the parabola, two the line. de Boor, A
-Practical Guide to Splines, 2001, chapter IV.
+The end conditions are not-a-knot, as in MATLAB's ``spline``. With three points the curve is the parabola,
+with two the straight line. C. de Boor, A Practical Guide to Splines, 2001, chapter IV.
 
 A long spline is read by index from a table in which values and derivatives alternate along each axis: for a
-table ``(n, m)`` its shape is ``(2 n, 2 m)``. It is computed numerically from positions and values before a
-run.
+table ``(n, m)`` its shape is ``(2 n, 2 m)``. This table is computed numerically from positions and values
+before a run.
 """
 
 from __future__ import annotations
@@ -54,26 +54,25 @@ def with_derivatives(axes: tuple[tuple[float, ...], ...], table: object) -> Arra
 
 
 def spline_corners(u: SX, points: SX, cell: SX | None, *, straight: bool) -> list[tuple[SX, SX]]:
-    """Indices and weights of the entries of :func:`with_derivatives` at position u: the cubic Hermite
-    interpolant.
+    """Indices and weights of the entries of :func:`with_derivatives` for the curve at position u.
 
-    ``cell``: 0 below the first point, 2 from the last on; outside the curve is constant, or extrapolated
-    linearly (``straight``).
+    The curve is the cubic Hermite interpolant. ``cell`` is 0 below the first point, 2 from the last point on,
+    else 1. Outside the points the curve is constant, or extrapolated linearly (``straight``).
     """
     n = points.numel()
     first, last = points[0], points[n - 1]
     if straight or cell is None:
-        inside = fmin(fmax(u, first), last)
+        clipped = fmin(fmax(u, first), last)
     else:
-        inside = if_else(cell == 0.0, first, if_else(cell == 2.0, last, u))
-    k = interval_of(inside, points)
+        clipped = if_else(cell == 0.0, first, if_else(cell == 2.0, last, u))
+    k = interval_of(clipped, points)
     begin, end = read_entry(points, k), read_entry(points, k + 1.0)
     h = end - begin
-    s = (inside - begin) / h
+    s = (clipped - begin) / h
     r = 1.0 - s
     left, right = h * s * r * r, -h * s * s * r
     if straight:
-        beyond = u - inside
+        beyond = u - clipped
         left, right = left + if_else(u < first, beyond, 0.0), right + if_else(u > last, beyond, 0.0)
     offset = 2.0 * k
     return [
@@ -99,7 +98,7 @@ def _diagonals(h: Array) -> tuple[Array, Array, Array]:
 
 
 def _right_side(h: Array, quotients: Array) -> Array:
-    """The right side ``(n, …)`` of that system, from the difference quotients ``(n - 1, …)``."""
+    """The right side ``(n, …)`` of the system, from the difference quotients ``(n - 1, …)``."""
     n = len(h) + 1
     right = np.empty((n, *quotients.shape[1:]))
     before, after = (part.reshape(-1, *[1] * (quotients.ndim - 1)) for part in (h[:-1], h[1:]))

@@ -31,7 +31,7 @@ _HALF_LATER = 1.0 + 2.0**-51
 
 
 def since(t: SX, instant: SX) -> SX:
-    """A guard: time since a parameter-dependent time (s), positive from that time on.
+    """A guard: the time since an instant that depends on parameters (s), positive from the instant on.
 
     A computed time, such as 5 times 0.2 s, may differ by rounding from a recorded time or a tick at the same
     time. The guard is therefore already positive two units in the last place earlier.
@@ -50,7 +50,7 @@ def zero_crossing_parameter() -> Any:
 
 
 def located(block: Block, *conditions: Condition) -> tuple[Condition, ...]:
-    """The guards of a block with the parameter ``zero_crossing``; none if it is false."""
+    """The conditions of a block, located as events if its parameter ``zero_crossing`` is true."""
     crossing = bool(block.parameter_value("zero_crossing"))
     return tuple(dataclasses.replace(entry, located=crossing) for entry in conditions)
 
@@ -64,15 +64,15 @@ def limits_in_order(block: Block, lower: str, upper: str) -> None:
             f"{lower} is {low} and {upper} is {high}",
             where=block.type_name(),
             allowed=f"{lower} <= {upper}",
-            fix="exchange them",
+            fix="exchange the two values",
         )
 
 
 def zone(u: SX, lower: SX, upper: SX) -> SX:
-    """-1 below both limits, 1 above, 0 between.
+    """The zone of u: -1 below the lower limit, 1 above the upper limit, else 0.
 
-    It compares the same differences as the guards ``u - upper`` and ``u - lower``, so that mode and guard
-    agree even if the compiler fuses a product with the subtraction.
+    The function compares the same differences as the guards ``u - upper`` and ``u - lower``, so that mode and
+    guard agree even if the compiler fuses a product with the subtraction.
     """
     return if_else(u - upper > 0.0, 1.0, if_else(u - lower < 0.0, -1.0, 0.0))
 
@@ -88,8 +88,8 @@ def cell_of(target: SX, before: SX, guards: Signals, up: str = "up", down: str =
     ``target`` is computed from the present values. If it equals ``before`` because of rounding, the result is
     the next cell.
     """
-    left = if_else(guards[down] < 0.0, fmin(target, before - 1.0), before)
-    return if_else(guards[up] > 0.0, fmax(target, before + 1.0), left)
+    lower = if_else(guards[down] < 0.0, fmin(target, before - 1.0), before)
+    return if_else(guards[up] > 0.0, fmax(target, before + 1.0), lower)
 
 
 def edge_count(target: SX, before: SX, next_edge: SX) -> SX:

@@ -18,11 +18,12 @@ import numpy as np
 from casadi import SX, fmax, fmin, if_else, reshape, vertcat
 from numpy.typing import ArrayLike, NDArray
 
+from armblocks.blocks.elementwise import numbered_ports
 from armblocks.blocks.interpolation import boundaries, contract, weights
 from armblocks.blocks.long_tables import inputs_with, is_spline
 from armblocks.blocks.splines import spline_corners, with_derivatives
 from armblocks.blocks.switching import THRESHOLD_OFFSET, beyond, cell_of
-from armblocks.diagram import Block, Guard, Parameter, Shapes, Signals, State, shape_of
+from armblocks.diagram import Block, Guard, Parameter, Port, Shapes, Signals, State, shape_of
 from armblocks.equations import Shape, flatten, last_at_or_below, read_entry
 from armblocks.errors import InputError
 
@@ -30,27 +31,33 @@ Array = NDArray[np.float64]
 
 
 def ascending_positions(where: str, name: str, points: ArrayLike, count: int) -> list[float]:
-    """Break points as floats; raises ``InputError`` unless they are ascending and fit the table."""
+    """Positions as floats; raises ``InputError`` unless they are ascending and fit the table."""
     values = [float(value) for value in np.ravel(cast("Any", points))]
     if len(values) < 2 or any(right <= left for left, right in pairwise(values)):
         raise InputError(
             f"{name} is {values}"[:90],
             where=where,
-            allowed="at least two numbers, each greater than the one before",
-            fix="sort them and drop repeated ones",
+            allowed="at least two numbers in strictly ascending order",
+            fix="sort the numbers and remove duplicates",
         )
     if len(values) != count:
         raise InputError(
-            f"{name} has {len(values)} break points for {count} entries of the table",
+            f"{name} has {len(values)} positions for {count} entries of the table",
             where=where,
             allowed="one for each entry along that axis",
-            fix="correct the table or the break points",
+            fix="correct the table or the positions",
         )
     return values
 
 
+def axis_ports(quantity: str, table: ArrayLike) -> tuple[Port, ...]:
+    """The ports ``u`` or ``u1, u2, …`` for a quantity along each axis of a table."""
+    count = len(shape_of(table))
+    return numbered_ports("u", count, f"{quantity} along {'axis' if count > 1 else 'the axis'}")
+
+
 def numbers_of(block: Block, name: str) -> list[float]:
-    """The entries of an array parameter."""
+    """The entries of an array parameter as a flat list of numbers."""
     return [float(value) for value in np.ravel(cast("Any", block.parameter_value(name)))]
 
 
@@ -75,11 +82,11 @@ class Axis(Protocol):
         ...
 
     def above_upper_boundary(self, u: SX, cell: SX) -> SX:
-        """The distance of u beyond the upper boundary of its cell; -inf without an upper boundary."""
+        """u minus the upper boundary of its cell; -inf without an upper boundary."""
         ...
 
     def above_lower_boundary(self, u: SX, cell: SX) -> SX:
-        """The distance of u beyond the lower boundary of its cell; inf without a lower boundary."""
+        """u minus the lower boundary of its cell; inf without a lower boundary."""
         ...
 
 
@@ -160,8 +167,8 @@ class LongAxis:
         begin, end = read_entry(self.points, interval), read_entry(self.points, interval + 1.0)
         if self._constant_outside:
             u = if_else(cell == 0.0, self.points[0], if_else(cell == float(n), self.points[n - 1], u))
-        share = (u - begin) / (end - begin)
-        return [(interval, 1.0 - share), (interval + 1.0, share)]
+        fraction = (u - begin) / (end - begin)
+        return [(interval, 1.0 - fraction), (interval + 1.0, fraction)]
 
     def _boundary(self, number: SX) -> SX:
         """The position of a boundary; its index starts at 0 and is limited to valid values."""
@@ -201,14 +208,15 @@ class SplineAxis:
 
 
 def _beyond(ends: Sequence[float | SX], u: SX, cell: SX) -> SX:
+    """``u - ends[cell]``."""
     return sum((if_else(cell == float(k), u - end, 0.0) for k, end in enumerate(ends)), SX(0.0))
 
 
 @dataclass(frozen=True, eq=False)
 class Axes:
-    """The axes of a table by the input port that gives the position along each.
+    """The axes of a table, by the names of the input ports for the positions along them.
 
-    ``located``: whether the cells are modes; then the block has the states ``cell`` or ``cell1``, ….
+    ``located``: whether the cells are modes. The block then has the modes ``cell`` or ``cell1``, ….
     """
 
     axes: Mapping[str, Axis]
@@ -242,7 +250,7 @@ class Axes:
         return values
 
     def mode_values(self, x: Signals, u: Signals) -> Signals:
-        """The cells that follow from the present values."""
+        """The consistent cells for the present inputs."""
         guards = self.guard_values(x, u)
         return {
             f"cell{k}": cell_of(
@@ -258,7 +266,7 @@ class Axes:
 
     def cell(self, port: str, x: Signals, u: Signals) -> SX:
         """The cell along one axis: the mode, or computed from the present values."""
-        modes = {moving: x[f"cell{k}"] for moving, k, _ in self._axes_with_modes()}
+        modes = {mode_port: x[f"cell{k}"] for mode_port, k, _ in self._axes_with_modes()}
         return modes[port] if port in modes else elementwise([u[port]], self.axes[port].cell)
 
     def resets(self, x: Signals, u: Signals, e: Signals) -> Signals:
@@ -279,14 +287,14 @@ class Axes:
         entries = flatten(table, shape)
 
         def at(*point: SX) -> SX:
-            positions, known = dict(zip(self.axes, point)), dict(zip(cells, point[len(self.axes) :]))
+            positions, cell_by_port = dict(zip(self.axes, point)), dict(zip(cells, point[len(self.axes) :]))
             corners = list[list[tuple[SX, SX]]]()
             weights_by_axis = list[list[SX]]()
             for port, axis in self.axes.items():
                 if isinstance(axis, LongAxis | SplineAxis):
-                    corners.append(axis.corners(positions[port], known[port]))
+                    corners.append(axis.corners(positions[port], cell_by_port[port]))
                 elif isinstance(axis, ShortAxis):
-                    weights_by_axis.append(axis.weights(positions[port], known.get(port)))
+                    weights_by_axis.append(axis.weights(positions[port], cell_by_port.get(port)))
             return read(entries, shape, corners) if corners else contract(table, shape, weights_by_axis)
 
         return elementwise([*(u[port] for port in self.axes), *cells.values()], at)
@@ -381,7 +389,7 @@ class BlockWithAxes(Block):
         return str(self.parameter_value("method"))
 
     def _axes(self, p: Signals | None = None) -> Axes:
-        """The axis of each input, with the positions from run inputs where the table is long."""
+        """The axis of each input; the positions of a long table are run inputs."""
         extrapolation = str(self.parameter_value("extrapolation"))
         axes = dict[str, Axis]()
         if p and is_spline(self, self._is_long()):
@@ -390,8 +398,8 @@ class BlockWithAxes(Block):
                 axes[port] = SplineAxis(p["knots"][first : first + len(points)], extrapolation)
                 first += len(points)
         else:
-            along = self._run_positions(p) if p and self._is_long() else self._positions_by_input()
-            axes = {port: axis(points, self._method, extrapolation) for port, points in along.items()}
+            positions = self._run_positions(p) if p and self._is_long() else self._positions_by_input()
+            axes = {port: axis(points, self._method, extrapolation) for port, points in positions.items()}
         return Axes(axes, bool(self.parameter_value("zero_crossing")))
 
     def _value(self, x: Signals, u: Signals, p: Signals) -> SX:

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 Value = float | bool | str | list[Any]
 
 _ALLOWED = "a number, a vector [1 2 3] or 1,2,3, a matrix [1 2; 3 4], formulas of numbers, or text in quotes"
-_WHOLE = re.compile(r"[+-]?\d{1,15}", re.ASCII)
-_PLAIN = re.compile(r"[+-]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:e[+-]?\d+)?|nan|inf)", re.ASCII | re.IGNORECASE)
+_INTEGER = re.compile(r"[+-]?\d{1,15}", re.ASCII)
+_DECIMAL = re.compile(r"[+-]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:e[+-]?\d+)?|nan|inf)", re.ASCII | re.IGNORECASE)
 _WORD = re.compile(r"(?!pi$)[A-Za-z_][A-Za-z0-9_.-]*", re.ASCII)
 
 
@@ -66,9 +66,9 @@ def parse_value(text: str, where: str = "--set") -> Value:
     """The value of one text; raises ``InputError`` for an invalid text."""
     if len(text) >= 2 and text[0] == text[-1] and text[0] in "\"'":
         return text[1:-1]
-    if _WHOLE.fullmatch(text):
+    if _INTEGER.fullmatch(text):
         return int(text)
-    if _PLAIN.fullmatch(text):  # also NaN: the rule of the parameter checks the range
+    if _DECIMAL.fullmatch(text):  # also NaN: the rule of the parameter checks the range
         return float(text)
     if text in ("true", "false"):
         return text == "true"

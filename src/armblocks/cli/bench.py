@@ -1,4 +1,4 @@
-"""``armblocks bench``: times the kernels of a robot on this machine, within seconds."""
+"""``armblocks bench``: measures the time of a robot's kernels on this machine; takes seconds."""
 
 from __future__ import annotations
 
@@ -35,7 +35,9 @@ def bench(
         str, typer.Option(help="A shipped robot's name, or a robot file.", autocompletion=complete_robots)
     ] = "puma560",
     samples: Annotated[int, typer.Option(min=1, max=10_000_000, help="Size of the batch.")] = 100_000,
-    threads: Annotated[int, typer.Option(min=1, max=1024, help="Threads of the last column.")] = 2,
+    threads: Annotated[
+        int, typer.Option(min=1, max=1024, help="Number of threads of the third time column.")
+    ] = 2,
 ) -> None:
     """Time the kernels of one robot: single calls, a batch on one thread and on several threads."""
     import armblocks as ab
@@ -70,20 +72,20 @@ def _row(arm: Arm, method: str, inputs: int, samples: int, threads: int) -> list
             call(*single)
 
     times = (
-        _fastest(many_single_calls) / calls,
-        _fastest(lambda: call(*batch, out=out)) / samples,
-        _fastest(lambda: call(*batch, out=out, threads=threads)) / samples,
+        _min_time(many_single_calls) / calls,
+        _min_time(lambda: call(*batch, out=out)) / samples,
+        _min_time(lambda: call(*batch, out=out, threads=threads)) / samples,
     )
     others = count.divisions + count.square_roots + count.comparisons + count.others + count.function_calls
     counts = (count.multiplies, count.adds, count.fused_multiply_adds, others)
     return [*(f"{seconds * 1e9:,.1f}" for seconds in times), *(str(number) for number in counts)]
 
 
-def _fastest(work: Callable[[], object]) -> float:
-    """Time of the fastest repeat, s."""
+def _min_time(function: Callable[[], object]) -> float:
+    """Minimum time of a call over all repeats, s."""
     best = float("inf")
     for _ in range(_REPEATS):
         start = time.perf_counter()
-        work()
+        function()
         best = min(best, time.perf_counter() - start)
     return best

@@ -1,4 +1,4 @@
-"""``armblocks blocks``: all blocks by family, or one: its equation, ports, parameters, a worked example."""
+"""``armblocks blocks``: lists all blocks by family, or shows one block with an example."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def describe_blocks(
         typer.Option("--save", metavar="FILE.json", help="Write the block's example, for 'armblocks run'."),
     ] = None,
 ) -> None:
-    """List the blocks, or show one: its equation, ports, units, parameters, and a worked example."""
+    """List the blocks, or show the equation, ports, units, parameters and an example of one block."""
     from armblocks.errors import InputError
 
     console = results_console()
@@ -43,7 +43,7 @@ def describe_blocks(
         raise InputError(
             "--save needs a block",
             allowed="armblocks blocks NAME --save FILE",
-            fix="name one",
+            fix="give the name of a block",
             where="armblocks blocks",
         )
     if name is None:
@@ -71,7 +71,7 @@ def _list(console: Console, search: str | None) -> None:
     from armblocks.blocks import BLOCKS
     from armblocks.errors import InputError
 
-    kinds = [kind for kind in BLOCKS.values() if search is None or _mentions(kind, search)]
+    kinds = [kind for kind in BLOCKS.values() if search is None or _contains(kind, search)]
     if not kinds:
         raise InputError(
             f"no block's documentation contains '{search}'",
@@ -83,7 +83,7 @@ def _list(console: Console, search: str | None) -> None:
     console.print(Text(f"\n{len(kinds)} blocks. 'armblocks blocks NAME' shows one, with an example."))
 
 
-def _mentions(kind: type[Block], search: str) -> bool:
+def _contains(kind: type[Block], search: str) -> bool:
     from armblocks.blocks import BLOCKS
 
     words = (kind.type_name(), kind.title, BLOCKS.family_of(kind), inspect.cleandoc(kind.__doc__ or ""))
@@ -92,7 +92,7 @@ def _mentions(kind: type[Block], search: str) -> bool:
 
 
 def blocks_table(kinds: list[type[Block]]) -> Table:
-    """One line for each block, grouped by family."""
+    """A table with one line for each block, grouped by family."""
     from armblocks.blocks import BLOCKS
 
     rows = table(("block", "left"), ("description", "left"))
@@ -159,7 +159,7 @@ def _ports(title: str, ports: tuple[Port, ...]) -> Table:
 
 
 def shape_text(port: Port) -> str:
-    """``any``, ``scalar``, ``3``, ``4 x 4``."""
+    """The shape of a port as text: ``any``, ``scalar``, ``3``, ``4 x 4``."""
     if port.shape is None:
         return "any"
     return " x ".join(map(str, port.shape)) or "scalar"

@@ -8,8 +8,12 @@ from typing import Annotated
 import typer
 
 from armblocks.cli.completion import complete_anything
+from armblocks.cli.robot_options import PackageFolders, TipName, XacroArguments, named_values
 from armblocks.cli.terminal import results_console
 from armblocks.errors import FormatError
+
+_SUFFIXES = {"diagram": (".json", ".py"), "robot": (".json", ".urdf"), "library": (".json",)}
+"""The suffixes of the formats in which each kind of document is written."""
 
 
 def convert(
@@ -21,17 +25,21 @@ def convert(
         ),
     ],
     target: Annotated[
-        Path, typer.Argument(help="The file to write: .json, or .py for a diagram as a Python program.")
+        Path,
+        typer.Argument(help="The file to write: .json, .urdf for a robot, .py for a diagram as a program."),
     ],
     name: Annotated[
         str | None, typer.Option("--name", help="Robot to select from a script with several robots.")
     ] = None,
+    tip: TipName = None,
+    package: PackageFolders = None,
+    argument: XacroArguments = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
     trust: Annotated[
         bool, typer.Option("--trust", help="Run the Python files that the diagram names.")
     ] = False,
 ) -> None:
-    """Write a robot, diagram or library in another format: .m or .json to .json, a diagram to .py."""
+    """Write a robot (.json, .urdf), a diagram (.json, .py) or a library (.json) in another format."""
     import armblocks as ab
     from armblocks.files import write_atomically
     from armblocks.formats import DocumentKind, kind_of_document
@@ -44,7 +52,7 @@ def convert(
             fix='run it with an additional call ab.save_diagram(diagram, "model.json")',
         )
     kind = kind_of_document(source)
-    suffixes = (".json", ".py") if kind is DocumentKind.DIAGRAM else (".json",)
+    suffixes = _SUFFIXES[kind.value]
     if target.suffix.lower() not in suffixes:
         raise FormatError(
             f"a {kind.value} cannot be written as '{target.suffix or target.name}'",
@@ -60,7 +68,14 @@ def convert(
             fix="choose another name, or replace the file with --force",
         )
     if kind is DocumentKind.ROBOT:
-        ab.save_robot(ab.load_robot(source, name=name), target)
+        robot = ab.load_robot(
+            source,
+            name=name,
+            tip=tip,
+            packages=named_values(package, "--package"),
+            arguments=named_values(argument, "--argument"),
+        )
+        ab.save_robot(robot, target)
     elif kind is DocumentKind.LIBRARY:
         ab.save_library(ab.load_library(source, trust=trust), target)
     elif target.suffix.lower() == ".py":

@@ -36,8 +36,8 @@ def diagram(
     """Draw a diagram, or one of its subsystems, into a file."""
     import armblocks as ab
 
-    drawn = ab.load_diagram(model, trust=trust)
-    name = "-".join((drawn.name, *sheet.split("/"))) if sheet else drawn.name
+    source_diagram = ab.load_diagram(model, trust=trust)
+    name = "-".join((source_diagram.name, *sheet.split("/"))) if sheet else source_diagram.name
     theme = None if dark is None else "dark" if dark else "light"
-    path = ab.draw_diagram(drawn, out or Path(f"{name}.svg"), sheet=sheet, theme=theme, rates=rates)
+    path = ab.draw_diagram(source_diagram, out or Path(f"{name}.svg"), sheet=sheet, theme=theme, rates=rates)
     results_console().print(f"wrote {path}", soft_wrap=True)

@@ -54,9 +54,9 @@ def diff(
 
 
 def print_difference(difference: DiagramDifference, before: str, after: str, console: Console) -> None:
-    """A heading, then grouped differences, one per line; leading signs repeat the colours."""
+    """Print a heading, then the grouped differences, one per line. A sign and a colour mark each kind."""
     if not difference:
-        console.print(f"{before} and {after} are the same, layout aside", style=STRONG, soft_wrap=True)
+        console.print(f"{before} and {after} are the same except for layout", style=STRONG, soft_wrap=True)
         return
     noun = "difference" if difference.count == 1 else "differences"
     console.print(f"{before} -> {after}: {difference.count} {noun}", style=STRONG, soft_wrap=True)
@@ -117,11 +117,11 @@ def _ports(ports: Sequence[PlacedPort]) -> list[str]:
 
 def _block_text(block: Block) -> str:
     """The type, and the parameters that differ from their defaults."""
-    words = [f"{name}={value_text(value)}" for name, value in own_values(block).items()]
+    words = [f"{name}={value_text(value)}" for name, value in non_default_values(block).items()]
     return " ".join([block.type_name(), *words])
 
 
-def own_values(block: Block) -> dict[str, object]:
+def non_default_values(block: Block) -> dict[str, object]:
     """The parameters of a block that differ from their defaults; formulas as text."""
     rules = block.own_parameters()
     values = {rule.name: block.stated_value(rule.name) for rule in rules}
@@ -132,12 +132,12 @@ def own_values(block: Block) -> dict[str, object]:
     }
 
 
-def _change_text(entry: ValueChange, joint: str) -> str:
+def _change_text(entry: ValueChange, separator: str) -> str:
     before, after = value_text(entry.before), value_text(entry.after)
     note = ""
     if before == after:
         note = f" (differs in {_where_different(entry.before, entry.after)})"
-    return f"{entry.path}{joint}{entry.name}: {before} -> {after}{note}"
+    return f"{entry.path}{separator}{entry.name}: {before} -> {after}{note}"
 
 
 def _where_different(before: object, after: object) -> str:
@@ -217,8 +217,8 @@ def difference_document(difference: DiagramDifference) -> dict[str, object]:
     """The differences as a JSON object: all lists are present, possibly empty."""
     return {
         "same": not difference,
-        "added": [_placed(entry.path, entry.block) for entry in difference.added],
-        "removed": [_placed(entry.path, entry.block) for entry in difference.removed],
+        "added": [_placed_block(entry.path, entry.block) for entry in difference.added],
+        "removed": [_placed_block(entry.path, entry.block) for entry in difference.removed],
         "renamed": [
             {"before": entry.before, "after": entry.after, "type": entry.block.type_name()}
             for entry in difference.renamed
@@ -243,20 +243,20 @@ def difference_document(difference: DiagramDifference) -> dict[str, object]:
     }
 
 
-def _placed(path: str, block: Block) -> dict[str, object]:
-    values = {name: _plain(value) for name, value in own_values(block).items()}
+def _placed_block(path: str, block: Block) -> dict[str, object]:
+    values = {name: _json_value(value) for name, value in non_default_values(block).items()}
     return {"path": path, "type": block.type_name(), "parameters": values}
 
 
 def _change(entry: ValueChange) -> dict[str, object]:
-    before, after = _plain(entry.before), _plain(entry.after)
+    before, after = _json_value(entry.before), _json_value(entry.after)
     return {"path": entry.path, "name": entry.name, "before": before, "after": after}
 
 
-def _plain(value: object) -> object:
+def _json_value(value: object) -> object:
     """The value if JSON can represent it, else its text (an infinity is the text ``inf``)."""
     if isinstance(value, tuple):
-        return [_plain(entry) for entry in cast("tuple[object, ...]", value)]
+        return [_json_value(entry) for entry in cast("tuple[object, ...]", value)]
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     return value if value is None or isinstance(value, bool | int | float | str) else value_text(value)

@@ -16,9 +16,9 @@ from armblocks.errors import FormatError, UnknownNameError
 from armblocks.extras import installed
 
 PACKAGE = Path(__file__).parents[1]
-INSTALLED = PACKAGE / "shipped" / "docs"
+INSTALLED_PAGES = PACKAGE / "shipped" / "docs"
 """The folder of the pages in a wheel."""
-BUILD = PACKAGE.parents[1] / "docs" / "build_site.py"
+BUILD_SCRIPT = PACKAGE.parents[1] / "docs" / "build_site.py"
 """The script that builds the pages; only a checkout has it."""
 TOOLS = ("sphinx", "furo", "myst_parser")
 """The libraries of the extra ``docs``, which the script needs."""
@@ -26,7 +26,7 @@ TOOLS = ("sphinx", "furo", "myst_parser")
 
 def complete_pages(typed: str) -> list[str]:
     """Names of the existing pages."""
-    folder = INSTALLED if INSTALLED.is_dir() else BUILD.parent / "_build" / "html"
+    folder = INSTALLED_PAGES if INSTALLED_PAGES.is_dir() else BUILD_SCRIPT.parent / "_build" / "html"
     return [name for name in pages(folder) if name.startswith(typed)]
 
 
@@ -45,7 +45,7 @@ def docs(
 ) -> None:
     """Open the documentation in the browser, without network access."""
     console = messages_console()
-    folder = built_pages(lambda text: console.print(text, soft_wrap=True), INSTALLED, BUILD)
+    folder = built_pages(lambda text: console.print(text, soft_wrap=True), INSTALLED_PAGES, BUILD_SCRIPT)
     known_pages = pages(folder)
     if page not in known_pages:
         raise UnknownNameError("page of the documentation", page, known_pages)
@@ -60,7 +60,7 @@ def pages(folder: Path) -> dict[str, Path]:
 
 
 def built_pages(notify: Callable[[str], None], installed_pages: Path, script: Path) -> Path:
-    """The folder of the built pages; a checkout without pages builds them first.
+    """The folder of the built pages; in a checkout without pages, they are built first.
 
     ``notify`` is called with one line of text before the build. Raises ``FormatError`` if there are
     no pages and they cannot be built.

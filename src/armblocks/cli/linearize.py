@@ -1,4 +1,4 @@
-"""``armblocks linearize``: the linear system of a diagram, in numbers and figures."""
+"""``armblocks linearize``: prints the linear system of a diagram and draws its figures."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def linearize(
         typer.Option(help="States per dead time (order of the Padé approximation).", show_default=False),
     ] = None,
     trimmed: Annotated[
-        bool, typer.Option("--trim", help="Trim from there, and linearize at the operating point.")
+        bool, typer.Option("--trim", help="Trim, starting at the --at time, and linearize at the result.")
     ] = False,
     free: Annotated[
         list[str] | None,
@@ -60,7 +60,8 @@ def linearize(
 ) -> None:
     """Print the exact linear system of a diagram: matrices, poles, zeros, margins.
 
-    A loop that is opened at its input and output is shown as L of 1 + L, that is, with inverted sign.
+    If one signal is the input, the output and the opening, its open loop is printed with inverted sign:
+    as the loop transfer function L of 1 + L.
     """
     import armblocks as ab
 
@@ -100,7 +101,7 @@ def linearize(
 
 
 def print_system(system: LinearSystem, console: Console, *, loop: bool, hertz: bool) -> None:
-    """Heading, matrices, poles, zeros and, for a single channel, gain, bandwidth and margins."""
+    """Print the heading, matrices, poles, zeros and, for a single channel, gain, bandwidth and margins."""
     from armblocks.analysis.shown_values import shown_dcgain, shown_zeros
     from armblocks.analysis.text import complex_number, heading, matrices, matrix_lines
 

@@ -1,4 +1,4 @@
-"""``armblocks list``: the names of shipped items, with one line each."""
+"""``armblocks list``: lists the shipped items, one line each."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from armblocks.errors import InertiaWarning
 
 
 class Kind(StrEnum):
-    """The kinds of items."""
+    """The kinds of items that can be listed."""
 
     ROBOTS = "robots"
     BLOCKS = "blocks"
@@ -24,7 +24,7 @@ class Kind(StrEnum):
     SOLVERS = "solvers"
 
 
-def list_names(kind: Annotated[Kind, typer.Argument(help="What to list.")]) -> None:
+def list_names(kind: Annotated[Kind, typer.Argument(help="The kind of items to list.")]) -> None:
     """List the shipped robots, example diagrams and libraries of subsystems, the blocks, or the solvers."""
     rows = {
         Kind.ROBOTS: _robots,

@@ -1,7 +1,7 @@
 """The entry point of the command line: commands, and handling of errors, warnings and Ctrl-C.
 
 Exit codes: 0 done, 1 a defect of armblocks (with a traceback), 2 invalid input (a message, no traceback), 130
-interrupted with Ctrl-C. ``diff`` also exits with 1 if its diagrams differ.
+interrupted with Ctrl-C. ``diff`` also exits with 1 if its diagrams differ, and ``lint`` if it has findings.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from armblocks.cli import (
     diff,
     docs,
     linearize,
+    lint,
     listing,
     run,
     show,
@@ -68,6 +69,7 @@ app.command("diff")(diff.diff)
 app.command("diagram")(diagram.diagram)
 app.command("convert")(convert.convert)
 app.command("show")(show.show)
+app.command("lint")(lint.lint)
 app.command("list")(listing.list_names)
 app.command("blocks")(blocks.describe_blocks)
 app.command("docs")(docs.docs)
@@ -95,7 +97,7 @@ def options(
 
 def main() -> None:
     """The entry point of the installed ``armblocks`` script."""
-    # Imports and reports create many objects and few cycles. The default of 700 would take a tenth of their
-    # time for garbage collection.
+    # Imports and reports create many objects and few cycles. With the default threshold of 700, garbage
+    # collection takes a tenth of their time.
     gc.set_threshold(GARBAGE_THRESHOLD)
     app()

@@ -10,20 +10,23 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn
 
 from armblocks.cli.terminal import ACCENT
 
-_FIRST_LINE, _LINE_EVERY = 0.5, 5.0
+_FIRST_LINE_DELAY, _LINE_INTERVAL = 0.5, 5.0
 """Seconds before the first plain line, and between lines; short runs print none."""
-_REMAINING_SHOWN = 2.0
-"""Seconds after which the remaining time is shown."""
+_MIN_REMAINING_TIME = 2.0
+"""Minimum remaining time that is shown, s."""
 
 
 class RunProgress:
-    """Called during a run with the simulated time (s), the fraction done and the real-time factor."""
+    """Displays the progress of a run.
+
+    It is called during the run with the simulated time (s), the fraction done and the real-time factor.
+    """
 
     def __init__(self, name: str, console: Console) -> None:
         self._name = name
         self._console = console
-        self._began = time.perf_counter()
-        self._next_line = time.perf_counter() + _FIRST_LINE
+        self._start_time = time.perf_counter()
+        self._next_line = time.perf_counter() + _FIRST_LINE_DELAY
         self._bar: Progress | None = None
         self._task: TaskID | None = None
 
@@ -50,13 +53,13 @@ class RunProgress:
         time_text = f"{simulated:,.0f}" if simulated >= 1000 else f"{simulated:.4g}"
         where = f"t = {time_text} s, {factor_text(real_time_factor)} x real time"
         now = time.perf_counter()
-        remaining = (now - self._began) * (1.0 / fraction - 1.0) if fraction > 0.0 else 0.0
-        if remaining >= _REMAINING_SHOWN:
+        remaining = (now - self._start_time) * (1.0 / fraction - 1.0) if fraction > 0.0 else 0.0
+        if remaining >= _MIN_REMAINING_TIME:
             where += f", {_duration(remaining)} left"
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, total=1.0, completed=fraction, where=where)
         elif now >= self._next_line and fraction < 1.0:
-            self._next_line = now + _LINE_EVERY
+            self._next_line = now + _LINE_INTERVAL
             self._console.print(f"{self._name}: {where} ({fraction:.0%})")
 
 

@@ -78,7 +78,7 @@ def run(
         list[DataFormat] | None, typer.Option("--format", help="An additional data format; may be repeated.")
     ] = None,
     figures: Annotated[
-        bool, typer.Option("--figures/--no-figures", help="Also write the figures in this format.")
+        bool, typer.Option("--figures/--no-figures", help="Also write the figures as files.")
     ] = True,
     trust: Annotated[
         bool, typer.Option("--trust", help="Run the Python files that the diagram names.")
@@ -120,12 +120,12 @@ def run(
 
 
 def _given_settings(**settings: Any) -> dict[str, Any]:
-    """The settings that the command line gives; the model has the others."""
+    """The settings given on the command line. The others have the values of the model."""
     return {name: value for name, value in settings.items() if value is not None}
 
 
 def _simulate(diagram: Diagram, settings: dict[str, Any]) -> tuple[SimulationResult, SimulationError | None]:
-    """The result; for a failed run the partial result and the reason."""
+    """The result and no error; for a failed run the partial result and its error."""
     import armblocks as ab
 
     with RunProgress(diagram.name, messages_console()) as progress:
@@ -182,7 +182,7 @@ def _check_writable(folder: Path) -> None:
 
 @contextmanager
 def _empty_folders_removed(new_folders: Sequence[Path]) -> Generator[None]:
-    """If the run is refused, remove the folders that were created for it, if they are empty."""
+    """After an error in the ``with`` block, remove the folders that were created for the run, if empty."""
     try:
         yield
     except BaseException:

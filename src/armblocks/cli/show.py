@@ -1,4 +1,4 @@
-"""``armblocks show``: prints a robot's tables, as in the toolbox and the paper, or a diagram's tree."""
+"""``armblocks show``: prints the tables of a robot, or the hierarchy of a diagram."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import typer
 from rich.console import Console
 
 from armblocks.cli.completion import complete_anything
+from armblocks.cli.robot_options import PackageFolders, TipName, XacroArguments, named_values
 from armblocks.cli.terminal import STRONG, results_console, table
 
 if TYPE_CHECKING:
@@ -30,6 +31,9 @@ def show(
     name: Annotated[
         str | None, typer.Option(help="Robot to select from a script with several robots.")
     ] = None,
+    tip: TipName = None,
+    package: PackageFolders = None,
+    argument: XacroArguments = None,
     flat: Annotated[
         bool, typer.Option("--flat", help="List all blocks of a diagram without hierarchy.")
     ] = False,
@@ -54,7 +58,13 @@ def show(
             return
         case DocumentKind.ROBOT:
             pass
-    described = ab.load_robot(model, name=name).robot
+    described = ab.load_robot(
+        model,
+        name=name,
+        tip=tip,
+        packages=named_values(package, "--package"),
+        arguments=named_values(argument, "--argument"),
+    ).robot
     # Loading a shipped robot gives no warnings about known deviations; this command prints them.
     warn_of_inertias(described)
     warn_of_implausible_values(described)
@@ -62,7 +72,7 @@ def show(
 
 
 def print_robot(robot: Robot, console: Console) -> None:
-    """All tables of one robot."""
+    """Print all tables of one robot."""
     _print_heading(robot, console)
     _print_kinematics(robot, console)
     _print_links(robot, console, "Dynamics, link side (about the centre of mass, link axes)", _DYNAMICS)
@@ -85,7 +95,7 @@ def _print_heading(robot: Robot, console: Console) -> None:
 
 
 def _print_kinematics(robot: Robot, console: Console) -> None:
-    """The toolbox's table if every moving link has a D-H row, else parents, axes and poses."""
+    """Print the D-H table if every moving link has a D-H row, else parents, axes and poses."""
     from armblocks.robot.dh_table import dh_table, kinematics_text
 
     if dh_table(robot):
@@ -139,11 +149,11 @@ _MOTORS: Sequence[Row] = (
 
 
 def _print_links(robot: Robot, console: Console, title: str, rows: Sequence[Row]) -> None:
-    """One column per link, as many side by side as fit into the terminal."""
+    """Print tables with one column per link, as many columns as fit into the terminal."""
     width = max([10, *(len(link.name) + 2 for link in robot.links)])
-    fitting = max(1, (console.width - 16) // width)
-    for start in range(0, len(robot.links), fitting):
-        links = robot.links[start : start + fitting]
+    column_count = max(1, (console.width - 16) // width)
+    for start in range(0, len(robot.links), column_count):
+        links = robot.links[start : start + column_count]
         numbers = table(("", "left"), ("", "left"), *((link.name, "right") for link in links))
         for name, unit, read in rows:
             numbers.add_row(name, unit, *(_number(read(link)) for link in links))
@@ -165,14 +175,14 @@ def _print_limits(robot: Robot, console: Console) -> None:
         *((("torque", "right"),) if torques else ()),
     )
     for name, joint in zip(robot.joint_names, robot.joints):
-        turns = joint.unit == "rad"
-        scale, unit = (_DEGREE, "deg") if turns else (1.0, "m")
+        is_revolute = joint.unit == "rad"
+        scale, unit = (_DEGREE, "deg") if is_revolute else (1.0, "m")
         low, high = joint.limits.position or (float("nan"), float("nan"))
         cells = [_with_unit(low / scale, unit), _with_unit(high / scale, unit)]
         if speeds:
             cells.append(_with_unit(_or_nan(joint.limits.speed) / scale, f"{unit}/s"))
         if torques:
-            cells.append(_with_unit(_or_nan(joint.limits.torque), "N m" if turns else "N"))
+            cells.append(_with_unit(_or_nan(joint.limits.torque), "N m" if is_revolute else "N"))
         limits.add_row(name, *cells)
     console.print()
     console.print("Limits", style=STRONG)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def print_hierarchy(diagram: Diagram, console: Console) -> None:
-    """The tree of subsystems, with type, parameters, library and size of each."""
+    """Print the tree of subsystems, with type, parameters, library and size of each."""
     tree = Tree(_heading(diagram, diagram.name), guide_style=ACCENT)
     if diagram.description:
         tree.add(Text(diagram.description, "italic"))
@@ -32,15 +32,15 @@ def print_hierarchy(diagram: Diagram, console: Console) -> None:
 
 
 def print_flat(diagram: Diagram, console: Console) -> None:
-    """All blocks of the flat diagram, by path, with the parameters that differ from their defaults."""
-    from armblocks.cli.diff import own_values
+    """Print all blocks of the flat diagram, by path, with the parameters that differ from their defaults."""
+    from armblocks.cli.diff import non_default_values
     from armblocks.diagram import flat_diagram
 
     flat = flat_diagram(diagram)
     console.print(_heading(flat, diagram.name))
     blocks = table(("block", "left"), ("type", "left"), ("parameters", "left"))
     for path, block in flat.blocks.items():
-        words = (f"{name}={value_text(value)}" for name, value in own_values(block).items())
+        words = (f"{name}={value_text(value)}" for name, value in non_default_values(block).items())
         blocks.add_row(path, block.type_name(), "  ".join(words))
     console.print(blocks)
 
@@ -50,7 +50,7 @@ def _add_subsystems(tree: Tree, diagram: Diagram) -> None:
         inner = block.diagram
         label = Text.assemble((name, STRONG), "  ", block.title.lower())
         if inner.link:
-            label.append_text(Text.assemble("  from ", (_short(inner.link), ACCENT)))
+            label.append_text(Text.assemble("  from ", (_link_name(inner.link), ACCENT)))
         branch = tree.add(Text.assemble(label, "  ", _count(inner)))
         if values := _values(block):
             branch.add(Text(values))
@@ -71,11 +71,11 @@ def _heading(diagram: Diagram, name: str) -> Text:
 
 
 def _count(diagram: Diagram) -> str:
-    """``"12 blocks (80 with those inside), 14 wires"``."""
+    """The counts of blocks and wires: ``"12 blocks (80 including inner blocks), 14 wires"``."""
     from armblocks.diagram import block_count
 
     count, total = len(diagram.blocks), block_count(diagram)
-    inside = f" ({total} with those inside)" if total > count else ""
+    inside = f" ({total} including inner blocks)" if total > count else ""
     wires = len(diagram.connections)
     return f"{count} block{'' if count == 1 else 's'}{inside}, {wires} wire{'' if wires == 1 else 's'}"
 
@@ -89,7 +89,7 @@ def _mask_lines(diagram: Diagram) -> Iterator[Text]:
 
 
 def _values(block: DiagramBlock) -> str:
-    """``"w = 20 rad/s (from w0), G = 107.8"``: the values of the mask parameters, and their formulas."""
+    """The values of the mask parameters and their formulas: ``"w = 20 rad/s (from w0), G = 107.8"``."""
     formulas = dict(block.formulas)
     shown: list[str] = []
     for rule in block.diagram.mask:
@@ -99,6 +99,6 @@ def _values(block: DiagramBlock) -> str:
     return ", ".join(shown)
 
 
-def _short(link: str) -> str:
+def _link_name(link: str) -> str:
     """A library link without the folders of its file."""
     return link.rpartition("/")[2]

@@ -28,7 +28,7 @@ LIMIT_MARK = "!"
 
 
 def print_run(result: SimulationResult, console: Console) -> None:
-    """One line: model, solver and speed."""
+    """Print one line with model, solver and speed."""
     run = result.run
     end = f"{result.time[-1]:,.10g} s" if result.time.size else "nothing"
     method = "evaluated at" if run.solver == "none" else f"{run.solver}, {run.steps:,} steps, recorded at"
@@ -45,7 +45,7 @@ def print_run(result: SimulationResult, console: Console) -> None:
 
 
 def print_displays(diagram: Diagram, result: SimulationResult, console: Console) -> None:
-    """The last values of all Display blocks."""
+    """Print the last values of all Display blocks."""
     shown = table(("display", "left"), ("signal", "left"), ("at the end", "left"), ("", "left"))
     for block, view in diagram_views(diagram):
         if view.kind is not ViewKind.VALUE or not result.time.size:
@@ -60,14 +60,14 @@ def print_displays(diagram: Diagram, result: SimulationResult, console: Console)
 
 
 def _value_text(value: NDArray[np.float64]) -> str:
-    """Nine digits: more than a Display block shows, enough to compare two runs."""
+    """A value with nine digits: more than a Display block shows, enough to compare two runs."""
     rows = [[f"{number + 0.0:.9g}" for number in row] for row in np.atleast_2d(value)]
     widths = [max(len(cell) for cell in column) for column in zip(*rows)]
     return "\n".join("  ".join(cell.rjust(width) for cell, width in zip(row, widths)) for row in rows)
 
 
 def print_motions(diagram: Diagram, result: SimulationResult, console: Console) -> None:
-    """Each robot's joints and their limits; values beyond a limit are marked and listed."""
+    """Print the joints of each robot and their limits; values beyond a limit are marked and listed."""
     if not result.time.size:
         return
     for motion in motions(diagram, result):
@@ -133,7 +133,7 @@ def _short(value: float | None) -> str:
 
 
 def print_files(files: ReportFiles, console: Console) -> None:
-    """The paths of the report and its files."""
+    """Print the paths of the report and its files."""
     names = [path.name for path in (*files.data, files.diagram)]
     if files.figures:
         names.append(f"{len(files.figures)} figures in {files.figures[0].parent.name}")

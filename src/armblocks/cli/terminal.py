@@ -1,7 +1,7 @@
 """Terminal output of the commands: errors, warnings, tables.
 
-Colours are legible on light and dark backgrounds (contrast of at least 4:1 on both), colour is never the only
-carrier of a meaning, and no text is dimmed. Results go to standard output; progress, warnings and errors go
+Colours are legible on light and dark backgrounds (contrast of at least 4:1 on both). No information depends
+on colour alone, and no text is dimmed. Results go to standard output; progress, warnings and errors go
 to standard error.
 """
 
@@ -26,7 +26,7 @@ ACCENT = "color(166)"
 GOOD = "bold color(28)"
 STRONG = "bold"
 
-_UNWRAPPED = 100_000
+_UNLIMITED_WIDTH = 100_000
 """Width of errors outside a terminal: lines are not wrapped, because logs are searched by line."""
 
 
@@ -42,7 +42,7 @@ def messages_console() -> Console:
     """Standard error; lines are wrapped only for a terminal."""
     console = Console(stderr=True, highlight=False, markup=False, emoji=False)
     if not console.is_terminal:
-        console.width = _UNWRAPPED
+        console.width = _UNLIMITED_WIDTH
     return console
 
 
@@ -64,7 +64,7 @@ def table(*columns: tuple[str, str], title: str | None = None) -> Table:
 
 
 def show_error(error: ArmblocksError) -> None:
-    """The four parts of a message, one below the other."""
+    """Print the four parts of a message, one below the other."""
     console = messages_console()
     console.print(Text.assemble(("error: ", ERROR), (error.what, STRONG)), soft_wrap=not console.is_terminal)
     grid = Table.grid(padding=(0, 2))

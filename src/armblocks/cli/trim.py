@@ -105,11 +105,11 @@ def _list_names(
 ) -> None:
     import armblocks as ab
     from armblocks.cli.trimmable import print_trimmable
-    from armblocks.face.linearizing import described_diagram, operating_point_at
+    from armblocks.face.linearizing import operating_point_at, resolved_diagram
 
-    described = described_diagram(diagram, parameters)
-    start = operating_point_at(described, at)
-    print_trimmable(ab.compile_diagram(described).system, start, model, console)
+    resolved = resolved_diagram(diagram, parameters)
+    start = operating_point_at(resolved, at)
+    print_trimmable(ab.compile_diagram(resolved).system, start, model, console)
 
 
 def _pairs(texts: Sequence[str] | None, option: str) -> dict[str, Any]:
@@ -142,16 +142,16 @@ def _bounds(name: str, value: object) -> tuple[float, float]:
     numbers = np.atleast_1d(np.asarray(value, dtype=np.float64))
     if numbers.shape != (2,):
         raise InputError(
-            f"the range of '{name}' has {numbers.size} numbers",
+            f"the bounds of '{name}' have {numbers.size} numbers",
             where="--bound",
             allowed="NAME=LOW,HIGH",
-            fix="give the lower and the upper end",
+            fix="give the lower and the upper bound",
         )
     return float(numbers[0]), float(numbers[1])
 
 
 def print_trim(result: TrimResult, console: Console) -> None:
-    """The residual, then the values of all unknowns."""
+    """Print the residual, then the values of all unknowns."""
     import numpy as np
 
     console.print(
@@ -174,4 +174,4 @@ def print_trim(result: TrimResult, console: Console) -> None:
         console.print()
         console.print(rows)
     if result.at_bounds:
-        console.print(f"at an end of the range: {', '.join(result.at_bounds)}", soft_wrap=True)
+        console.print(f"at a bound: {', '.join(result.at_bounds)}", soft_wrap=True)

@@ -20,10 +20,11 @@ MAX_ROWS = 24
 """Maximum number of rows of each table."""
 
 MAX_NUMBERS = 8
+"""Maximum number of entries of a vector that a row shows."""
 
 
 def print_trimmable(system: HybridSystem, start: OperatingPoint, model: str, console: Console) -> None:
-    """Tables of the names with their values at the ``start``, and example commands."""
+    """Print tables of the names with their values at the ``start``, and example commands."""
     console.print(f"{system.name}: names for trim", style=STRONG)
     if not system.states.size:
         console.print("There are no states and therefore no equilibrium conditions.")

@@ -39,14 +39,14 @@ def in_order(
     Raises :class:`UnknownNameError` for a name that is neither an input nor one of the ``options`` of the
     call, :class:`InputError` for a missing or duplicate input.
     """
-    rest = signature.names[len(values) :]
-    if set(named) == set(rest):
-        return (*values, *[named[slot_name] for slot_name in rest])
+    remaining = signature.names[len(values) :]
+    if set(named) == set(remaining):
+        return (*values, *[named[slot_name] for slot_name in remaining])
     for argument in named:
         if argument not in signature.names:
             raise UnknownNameError("argument", argument, [*signature.names, *options], where=name)
-    duplicates = [argument for argument in named if argument not in rest]
-    missing = [slot_name for slot_name in rest if slot_name not in named]
+    duplicates = [argument for argument in named if argument not in remaining]
+    missing = [slot_name for slot_name in remaining if slot_name not in named]
     raise InputError(
         f"'{duplicates[0]}' is given twice" if duplicates else f"'{missing[0]}' is missing",
         where=name,

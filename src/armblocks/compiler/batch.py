@@ -22,8 +22,9 @@ def emit_batch(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
 
     It evaluates the samples ``start`` to ``stop - 1``. ``columns`` is N, the length of a line of the arrays
     in column layout. Outputs must not overlap inputs. Values that depend on shared inputs only are computed
-    once. Samples that do not fill a register are evaluated with one lane. So are blocks with a sample that a
-    vector function does not support, such as the sine of a huge angle. The results are identical.
+    once. Samples that do not fill a register are evaluated with one lane. If a vector function does not
+    support a sample, such as the sine of a huge angle, all samples of the register are evaluated with one
+    lane. The results are identical.
     """
     _add_block(module, tape, layout, 1, f"{name}.sample")
     if lanes > 1:
@@ -47,32 +48,33 @@ def emit_batch(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
 
 
 def emit_shares(module: Module, tape: Tape, name: str) -> None:
-    """Add ``void @name.shares(ptr job, i64 hold, i64 patience, ptr in0, …, ptr out0, …)``.
+    """Add ``void @name.shares(ptr job, i64 hold, i64 patience, ptr in0, …, ptr out0, …)``: work sharing.
 
-    Several threads call it with one ``job`` of four i64: the next sample, the count of threads at work, the
-    samples of a share, the samples of the batch. Each thread takes shares until none are left. Then it spins:
-    always ``hold`` iterations, and up to ``patience`` iterations while other threads are active.
+    Several threads call the function with one ``job`` of four i64: the next sample, the number of active
+    threads, the samples of a share, the samples of the batch. Each thread takes shares until none is left.
+    Then it spins: always ``hold`` iterations, and up to ``patience`` iterations while other threads are
+    active.
     """
-    following, at_work = 0, 1  # indices in the job that threads modify
+    next_sample, active_threads = 0, 1  # indices in the job that threads modify
 
     def batch(r: Routine, start: Integer, stop: Integer, columns: Integer, *arrays: Reals) -> None:
-        """What :func:`emit_batch` adds."""
+        """The function that :func:`emit_batch` adds."""
 
     evaluate = external(batch, name)
 
     def shares(r: Routine, job: Integers, hold: Integer, patience: Integer, *arrays: Reals) -> None:
         share, samples = job[2], job[3]
-        job.fetch_add(at_work, 1)
+        job.fetch_add(active_threads, 1)
         with r.loop() as taking:
-            start = job.fetch_add(following, share)
+            start = job.fetch_add(next_sample, share)
             taking.leave_unless(start < samples)
             end = start + share
             r.call(evaluate, start, select(end < samples, end, samples), samples, *arrays)
-        job.fetch_add(at_work, -1)
+        job.fetch_add(active_threads, -1)
         iteration = r.integer(0)
         with r.loop() as spinning:
             passed = iteration.value
-            waits = (job.acquire(at_work) != 0) & (passed < patience)
+            waits = (job.acquire(active_threads) != 0) & (passed < patience)
             spinning.leave_unless((passed < hold) | waits)
             iteration.value = passed + 1
 
@@ -86,7 +88,7 @@ def _sample(r: Routine, sample: Integer, columns: Integer, *arrays: Reals) -> No
 
 
 def _lanes(r: Routine, first: Integer, columns: Integer, *arrays: Reals) -> Boolean:
-    """Evaluate one sample per lane; return whether they must be evaluated one by one."""
+    """Evaluate one sample per lane; return whether the samples must be evaluated again with one lane."""
     raise NotImplementedError
 
 
@@ -95,8 +97,10 @@ def _pointers(tape: Tape) -> list[str]:
 
 
 def _add_block(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name: str) -> None:
-    """Add the function of :func:`_sample` or :func:`_lanes`: load the samples, one for each lane, evaluate
-    the tape, store the outputs."""
+    """Add the function :func:`_sample` (one lane) or :func:`_lanes`.
+
+    It loads one sample for each lane, evaluates the tape and stores the outputs.
+    """
     groups = _groups(tape, layout, lanes)
     stores = {k: registers for k, (_, _, registers) in enumerate(groups)}
 
@@ -131,9 +135,9 @@ def _add_block(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
         result, inlined = "void", "noinline"
         body.do("ret void")
     else:
-        # Inlined into the loop, so that LLVM computes values of shared inputs before the first iteration. The
-        # parameters of the loop already state that arrays do not overlap; here LLVM would note it at every
-        # access.
+        # The function is inlined into the loop, so that LLVM computes values of shared inputs before the
+        # first iteration. Its parameters are not "noalias": those of the loop are, and inlining would
+        # otherwise add metadata to every access.
         result, inlined = "i1", "alwaysinline"
         declared = [(kind.split()[0], argument) for kind, argument in declared]
         body.do(f"ret i1 {'false' if undecided is None else body.let(f'icmp ne i{lanes} {undecided}, 0')}")
@@ -180,15 +184,15 @@ def _inputs(body: Body, tape: Tape, layout: BatchLayout, sample: str) -> Inputs:
 
     def line(register: int) -> Line:
         slot, index = tape.input_position(register)
-        kind, size, step, lane_step = layout.inputs[slot], tape.input_sizes[slot], "1", "0"
+        kind, size, step, lane_stride = layout.inputs[slot], tape.input_sizes[slot], "1", "0"
         if kind is Layout.COLUMNS:
-            begin, step, lane_step = _column(body, f"%i{slot}", index, sample), "%columns", "1"
+            begin, step, lane_stride = _column(body, f"%i{slot}", index, sample), "%columns", "1"
         else:
             first = "0" if kind is Layout.SHARED else _row(body, sample, size)
             entry = body.let(f"add nsw i64 {first}, {index}")
             begin = body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {entry}")
-            lane_step = "0" if kind is Layout.SHARED else str(size)
-        return Line(address=begin, step=step, apart=lane_step)
+            lane_stride = "0" if kind is Layout.SHARED else str(size)
+        return Line(address=begin, step=step, lane_stride=lane_stride)
 
     return Inputs(load, line)
 

@@ -1,7 +1,7 @@
 """Disk cache of compilation results.
 
-There is one file for each result. Its name is the SHA-256 of everything that the result depends on, so a file
-never changes its meaning. A file has a checksum: damaged or truncated files count as absent. Files are
+There is one file for each result. Its name is the SHA-256 of everything that the result depends on, so the
+content of a file never changes. A file has a checksum: damaged or truncated files count as absent. Files are
 written under a temporary name and renamed, so concurrent processes see complete files only. If the folder
 cannot be read or written, everything is compiled again without an error.
 
@@ -24,7 +24,7 @@ _MAGIC = b"armblocks cache 1\n"
 _SIZE_LIMIT = 256 * 1024 * 1024
 _DAY = 86400.0
 _PRUNE_EVERY = 600.0
-"""Seconds between two scans of all files, of which there may be tens of thousands."""
+"""Minimum time between two scans of all files, s. There may be tens of thousands of files."""
 _SUFFIX = ".bin"
 
 
@@ -149,8 +149,8 @@ def prune(root: Path, limit: int = _SIZE_LIMIT) -> None:
     Remains of writers that were killed are removed after a day.
     """
     cached_files: list[tuple[float, int, str]] = []
-    for shelf in root.glob("??"):
-        with contextlib.suppress(OSError), os.scandir(shelf) as files:
+    for subfolder in root.glob("??"):
+        with contextlib.suppress(OSError), os.scandir(subfolder) as files:
             for file in files:
                 with contextlib.suppress(FileNotFoundError):  # another process prunes, too
                     status = file.stat()

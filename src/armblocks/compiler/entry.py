@@ -33,12 +33,11 @@ from armblocks.errors import InputError
 ENTRY = "armblocks_entry"
 """Symbol of the builtin's C function."""
 TABLE = "armblocks_entry_table"
-"""Symbol of the table of addresses that each process fills in, because cached code must not contain
-addresses."""
+"""Symbol of the table of addresses, which each process fills in: cached code must not contain addresses."""
 BATCHES = "armblocks_entry_batches"
 """Symbol of the addresses of the batch functions, null until :func:`offer_batch` sets them."""
-MOST_BATCH_INPUTS = 8
-"""Batches of kernels with more inputs go to the Python callable: the table has an entry for each subset."""
+MAX_BATCH_INPUTS = 8
+"""Batches of kernels with more inputs go to the Python callable: the table has 2^inputs entries."""
 
 _FASTCALL_WITH_KEYWORDS = 0x0080 | 0x0002
 # Byte offsets in the structures of CPython and NumPy on 64-bit systems.
@@ -46,7 +45,7 @@ OBJECT_TYPE, FLOAT_VALUE = 8, 16
 ARRAY_DATA, ARRAY_NDIM, ARRAY_DIMENSIONS, ARRAY_DESCR, ARRAY_FLAGS = 16, 24, 32, 56, 64
 C_CONTIGUOUS_AND_ALIGNED, WRITEABLE = 0x0001 | 0x0100, 0x0400
 OWNER_CALL = 16
-# Places in NumPy's table of C functions.
+# Indices in NumPy's table of C functions.
 _NUMPY_ARRAY_TYPE, _NUMPY_SCALAR, _NUMPY_NEW_FROM_DESCR = 2, 60, 94
 
 TABLE_ENTRIES = (
@@ -93,12 +92,11 @@ _DEFINITIONS: list[_MethodDefinition] = []
 
 
 Maker = tuple[Callable[..., object], tuple[object, ...]]
-"""A function with its arguments that creates, also in another process, an object with the builtin as an
-attribute; used for pickling."""
+"""For pickling: a function and its arguments that create an object with the builtin as an attribute."""
 
 
 class _Owner:
-    """The builtin's ``self``: its fallback, and the objects that it keeps alive.
+    """The builtin's ``self``: the fallback, and the objects that live as long as the builtin.
 
     The C function reads ``call`` by its offset.
     """
@@ -111,7 +109,7 @@ class _Owner:
         self.maker = maker
 
     def __reduce__(self) -> Maker:
-        """Python pickles a builtin as an attribute of its ``self``, here of the maker's object."""
+        """The maker: Python pickles a builtin as an attribute of its ``self``, here of the maker's object."""
         if self.maker is None:
             raise InputError(
                 "native code cannot be pickled",
@@ -127,8 +125,8 @@ def offer_batch(code: NativeCode, batched: Sequence[bool], address: int) -> None
 
     The function's code must live as long as the builtin.
     """
-    if len(batched) <= MOST_BATCH_INPUTS:
-        index = sum(1 << k for k, own in enumerate(batched) if own)
+    if len(batched) <= MAX_BATCH_INPUTS:
+        index = sum(1 << k for k, has_samples in enumerate(batched) if has_samples)
         ctypes.c_void_p.from_address(code.address(BATCHES) + 8 * index).value = address
 
 
@@ -220,11 +218,11 @@ def _python_function(name: str) -> int:
 def _layout_is_known() -> bool:
     """Compare the offsets with arrays, floats and an owner of known content."""
     array = np.empty((3, 5))
-    turned = array.T
+    transposed = array.T
     read_only = np.empty(2)
     read_only.flags.writeable = False
     owner = _Owner(len, None)
-    view, other = _View(id(array)), _View(id(turned))
+    view, other = _View(id(array)), _View(id(transposed))
     number = 0.1234567890123
     return (
         view.word(OBJECT_TYPE) == id(np.ndarray)

@@ -18,7 +18,7 @@ from armblocks.compiler.entry import (
     C_CONTIGUOUS_AND_ALIGNED,
     ENTRY,
     FLOAT_VALUE,
-    MOST_BATCH_INPUTS,
+    MAX_BATCH_INPUTS,
     OBJECT_TYPE,
     OWNER_CALL,
     TABLE,
@@ -27,7 +27,7 @@ from armblocks.compiler.entry import (
 )
 from armblocks.compiler.ir_text import Module
 from armblocks.compiler.program_text import add_program
-from armblocks.compiler.result_memory import LARGE
+from armblocks.compiler.result_memory import MIN_REUSED
 from armblocks.equations import Shape, Signature
 from armblocks.routines.arithmetic import select
 from armblocks.routines.memory import Address, Addresses, AddressVariable, Integers, Reals
@@ -105,7 +105,7 @@ class _PythonObjects:
 
 @dataclass(frozen=True, kw_only=True)
 class _Argument:
-    """Values of one argument: its numbers, count of samples (or -1), numbers of one sample."""
+    """One argument: its numbers, the number of samples (or -1), and the count of numbers in a sample."""
 
     data: Reals
     samples: Integer
@@ -114,8 +114,10 @@ class _Argument:
 
 @dataclass(frozen=True, kw_only=True)
 class _Result:
-    """Variables of one result: the object (null for a number that does not exist yet) and where to write
-    to."""
+    """Variables of one result: the Python object, and the address to write to.
+
+    The object is null for a number that has not been created yet.
+    """
 
     object: AddressVariable
     target: AddressVariable
@@ -132,7 +134,7 @@ class _Call:
         self.names = names
         self.evaluation = external(_evaluate, evaluate)
         self.owned: list[AddressVariable] = []
-        """Objects to release if something later fails."""
+        """Objects to release after an error."""
 
     def serve(self, count: Integer, inputs: Sequence[Shape], outputs: Sequence[Shape]) -> None:
         """Return the result, or use the Python callable."""
@@ -193,7 +195,7 @@ class _Call:
         return _Argument(data=data.value.reals, samples=samples.value, size=1)
 
     def common_samples(self, arguments: Sequence[_Argument]) -> Integer:
-        """The number of samples, -1 where no argument has the samples' axis; all that have it must agree."""
+        """The number of samples, or -1 if no argument has the samples' axis. All arguments must agree."""
         common = self.r.constant_integer(_NO_SAMPLES)
         for argument in arguments:
             none = argument.samples == _NO_SAMPLES
@@ -204,7 +206,7 @@ class _Call:
     def batch_function(self, arguments: Sequence[_Argument], batched: Boolean) -> Address:
         """The address of the batch function for these batched inputs; null for one sample."""
         r = self.r
-        if len(arguments) > MOST_BATCH_INPUTS:
+        if len(arguments) > MAX_BATCH_INPUTS:
             self.require(~batched)
             return r.null
         function = r.address(r.null)
@@ -220,10 +222,10 @@ class _Call:
 
     # ---- results -----------------------------------------------------------------------------------------
     def require_small(self, shapes: Sequence[Shape], samples: Integer, out: Address) -> None:
-        """Continue only if no new array is large, because the memory of large arrays is reused."""
+        """Continue only if no new array is large: the Python callable reuses the memory of large arrays."""
         size = max((math.prod(shape) for shape in shapes), default=0)
         if size:
-            self.require((samples < -(-LARGE // size)) | ~out.is_null)
+            self.require((samples < -(-MIN_REUSED // size)) | ~out.is_null)
 
     def new_result(self, shape: Shape, samples: Integer, batched: Boolean) -> _Result:
         """A new array, or memory for one number."""
@@ -242,18 +244,18 @@ class _Call:
 
     def _new_array(self, shape: Shape, samples: Integer, batched: Boolean, result: _Result) -> None:
         r, objects = self.r, self.objects
-        dimensions = r.integer_room(len(shape) + 1)
+        dimensions = r.local_integers(len(shape) + 1)
         for axis, extent in enumerate((samples, *shape)):
             dimensions[axis] = extent
-        own = batched.count()
+        sample_axes = batched.count()
         descr = objects.known("float64")  # a new array takes over one reference
         objects.call(python.reference, descr)
         array = objects.call(
             python.new_array,
             objects.known("array_type"),
             descr,
-            (own + len(shape)).to_int32(),
-            dimensions.after(1 - own),
+            (sample_axes + len(shape)).to_int32(),
+            dimensions.after(1 - sample_axes),
             r.null,
             r.null,
             r.constant_integer(0).to_int32(),
@@ -298,49 +300,48 @@ class _Call:
         """Continue only if the array matches a new one and does not overlap inputs."""
         r, objects = self.r, self.objects
         objects.require_array(out, C_CONTIGUOUS_AND_ALIGNED | WRITEABLE)
-        own = batched.count()
-        self.require(out.int32(ARRAY_NDIM) == own + len(shape))
+        sample_axes = batched.count()
+        self.require(out.int32(ARRAY_NDIM) == sample_axes + len(shape))
         dimensions = out.pointer(ARRAY_DIMENSIONS).integers
         if shape:
-            objects.require_extents(dimensions.after(own), shape)
+            objects.require_extents(dimensions.after(sample_axes), shape)
         with r.when(batched):
             self.require(dimensions[0] == samples)
         data = out.pointer(ARRAY_DATA).reals
         end = data.after(select(batched, samples, 1) * math.prod(shape))
         for argument in arguments:
             count = select(argument.samples == _NO_SAMPLES, 1, argument.samples)
-            behind = argument.data.after(count * argument.size)
-            self.require((end.start <= argument.data.start) | (behind.start <= data.start))
+            argument_end = argument.data.after(count * argument.size)
+            self.require((end.start <= argument.data.start) | (argument_end.start <= data.start))
 
     # ---- evaluation --------------------------------------------------------------------------------------
     def evaluate(
         self, batch: Address, samples: Integer, inputs: Sequence[Reals], results: Sequence[_Result]
     ) -> None:
-        """Evaluate one sample, or many with the function ``batch`` if it is not null."""
+        """Evaluate one sample, or evaluate_batch with the function ``batch`` if it is not null."""
         r, objects = self.r, self.objects
         arrays = [*inputs, *(result.target.value.reals for result in results)]
-        many = external(_evaluate_batch).at(batch)
+        evaluate_batch = external(_evaluate_batch).at(batch)
         start = r.constant_integer(0)
         with r.when(batch.is_null):
             r.call(self.evaluation, *arrays)
         with r.otherwise():
             with r.when(samples < _LONG_BATCH):
-                r.call(many, start, samples, samples, *arrays)
+                r.call(evaluate_batch, start, samples, samples, *arrays)
             with r.otherwise():
                 state = objects.call(python.save_thread)
-                r.call(many, start, samples, samples, *arrays)
+                r.call(evaluate_batch, start, samples, samples, *arrays)
                 objects.call(python.restore_thread, state)
 
     def succeed(self, object: Address) -> None:
-        """If ``object`` is null, release all owned references and return null, so that Python raises the
-        error."""
+        """If ``object`` is null, release all owned references and return null, so that an error is raised."""
         with self.r.when(object.is_null, rarely=True):
             for owned in self.owned:
                 self.objects.call(python.release, owned.value)
             self.r.return_(self.r.null)
 
     def finish(self, shapes: Sequence[Shape], results: Sequence[_Result]) -> None:
-        """Return the result, a tuple where there are several."""
+        """Return the result, or a tuple of several results."""
         r, objects = self.r, self.objects
         for shape, result in zip(shapes, results):
             if not shape:
@@ -349,11 +350,11 @@ class _Call:
         if len(python_objects) == 1:
             r.return_(python_objects[0])
             return
-        bundle = objects.call(python.new_tuple, r.constant_integer(len(python_objects)))
-        self.succeed(bundle)
+        result_tuple = objects.call(python.new_tuple, r.constant_integer(len(python_objects)))
+        self.succeed(result_tuple)
         for k, item in enumerate(python_objects):  # the tuple takes over the references
-            objects.call(python.set_item, bundle, r.constant_integer(k), item)
-        r.return_(bundle)
+            objects.call(python.set_item, result_tuple, r.constant_integer(k), item)
+        r.return_(result_tuple)
 
     def _make_number(self, result: _Result) -> None:
         """The ``numpy.float64`` of a scalar result, unless it has been written into an array."""

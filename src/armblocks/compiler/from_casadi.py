@@ -17,7 +17,7 @@ from armblocks.equations.linear_solution import derivative_rule, solution_size
 from armblocks.errors import CompileError
 
 # Operations with the same meaning in CasADi and in a tape, by CasADi's name.
-_SAME = {
+_EQUIVALENTS = {
     "OP_ADD": Opcode.ADD,
     "OP_SUB": Opcode.SUBTRACT,
     "OP_MUL": Opcode.MULTIPLY,
@@ -67,13 +67,17 @@ _NAMES: dict[int, str] = {
     for name, number in vars(casadi).items()
     if name.startswith("OP_") and isinstance(number, int)
 }
-_OPCODES = {number: (_SAME[name], _SAME[name].arity) for number, name in _NAMES.items() if name in _SAME}
+_OPCODES = {
+    number: (_EQUIVALENTS[name], _EQUIVALENTS[name].arity)
+    for number, name in _NAMES.items()
+    if name in _EQUIVALENTS
+}
 
 
 def tape_from(traced: TracedFunction) -> Tape:
     """The tape of a traced function.
 
-    Raises :class:`CompileError` naming the operation, if the graph has an unsupported operation.
+    Raises :class:`CompileError` with its name if the graph has an unsupported operation.
     """
     function = Function("f", list(traced.arguments), [*traced.results, traced.rounded], {"cse": True})
     builder = TapeBuilder([slot.size for slot in traced.inputs])
@@ -97,9 +101,9 @@ def _inlined(
     for k in range(function.n_instructions()):
         number = function.instruction_id(k)
         targets, sources = function.instruction_output(k), function.instruction_input(k)
-        same = _OPCODES.get(number)
-        if same is not None:
-            opcode, arity = same
+        equivalent = _OPCODES.get(number)
+        if equivalent is not None:
+            opcode, arity = equivalent
             operands = [work[source] for source in sources[:arity]]
             work[targets[0]] = builder.add(opcode, *operands)
         elif number == casadi.OP_OUTPUT:
@@ -161,12 +165,12 @@ def _translate(builder: TapeBuilder, number: int, operands: Sequence[int], name:
         f"the equations use the operation {_NAMES.get(number, number)}",
         where=name,
         allowed="CasADi SX operations with a scalar meaning, such as +, sin, if_else",
-        fix="write it with other operations",
+        fix="write the equation with other operations",
     )
 
 
 def _read(builder: TapeBuilder, table: int, second: int, name: str) -> int:
-    """An indexed read, as :mod:`armblocks.equations.table_reading` writes it."""
+    """An indexed read in the form of :mod:`armblocks.equations.table_reading`."""
     count = builder.value(second)
     if count is not None and count < 0.0:
         return builder.add(Opcode.READ, table, builder.constant(-count), builder.constant(0.0))
@@ -176,6 +180,6 @@ def _read(builder: TapeBuilder, table: int, second: int, name: str) -> int:
             "a table that is not a parameter of the system is read",
             where=name,
             allowed="tables that are parameters, not computed from other parameters",
-            fix="give the numbers of the table to the block",
+            fix="pass the table as a parameter of the block",
         )
     return builder.add(Opcode.READ, start[0], start[1], second)

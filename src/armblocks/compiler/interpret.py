@@ -1,7 +1,7 @@
 """A slow interpreter of tapes in NumPy, the reference for compiled code.
 
-It shares only the tape with the code generator: arithmetic is NumPy's, and sin, exp and the others are
-NumPy's or the C library's own. Tapes without elementary functions give the same bits as compiled code when
+It shares only the tape with the code generator: arithmetic is NumPy's, and elementary functions are
+those of NumPy or the C library. Tapes without elementary functions give the same bits as compiled code when
 ``fused`` is true, because fused multiply-adds are then rounded once, as the hardware does.
 """
 
@@ -38,11 +38,11 @@ def interpret(tape: Tape, inputs: Sequence[ArrayLike], *, fused: bool = True) ->
             where="tape",
             fix="give one array for each input of the tape",
         )
-    lead = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
+    sample_shape = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
     registers: list[Values] = []
     for array in arrays:
-        registers += [np.broadcast_to(array[..., index], lead) for index in range(array.shape[-1])]
-    registers += [np.full(lead, value) for value in tape.constants]
+        registers += [np.broadcast_to(array[..., index], sample_shape) for index in range(array.shape[-1])]
+    registers += [np.full(sample_shape, value) for value in tape.constants]
     with np.errstate(all="ignore"):
         for opcode, operands in tape.operations:
             if opcode is Opcode.READ:
@@ -61,7 +61,9 @@ def interpret(tape: Tape, inputs: Sequence[ArrayLike], *, fused: bool = True) ->
                 continue
             registers.append(evaluate(opcode, [registers[operand] for operand in operands], fused=fused))
     return [
-        np.stack([registers[register] for register in slot], axis=-1) if slot else np.empty((*lead, 0))
+        np.stack([registers[register] for register in slot], axis=-1)
+        if slot
+        else np.empty((*sample_shape, 0))
         for slot in tape.outputs
     ]
 
@@ -93,12 +95,12 @@ def _solve(values: Sequence[Values], n: int, *, fused: bool) -> Values:
     stacked = np.stack(values, axis=-1)
     matrix, right = stacked[..., : n * n].reshape((*stacked.shape[:-1], n, n)), stacked[..., n * n :].copy()
 
-    def less(a: Values, b: Values, c: Values) -> Values:
+    def subtract_product(a: Values, b: Values, c: Values) -> Values:
         """``c - a b``."""
         return multiply_add(-a, *np.broadcast_arrays(b, c)) if fused else c - a * b
 
     weights = 1.0 / np.max(np.where(np.isnan(matrix), 0.0, np.abs(matrix)), axis=-1)
-    # Whole rows are exchanged: of the factors and of the matrix, with the weight and the right side.
+    # Each exchange concerns the rows of the factors and of the matrix, the weight and the right side.
     rows = np.concatenate([matrix, matrix, weights[..., None], right[..., None]], axis=-1)
     for k in range(n):
         for i in range(k + 1, n):
@@ -115,26 +117,26 @@ def _solve(values: Sequence[Values], n: int, *, fused: bool) -> Values:
             if k + 1 < n:
                 span = slice(k + 1, n)
                 factors = np.broadcast_to(factor[..., None], rows[..., k, span].shape)
-                rows[..., i, span] = less(factors, rows[..., k, span], rows[..., i, span])
+                rows[..., i, span] = subtract_product(factors, rows[..., k, span], rows[..., i, span])
     matrix, right = rows[..., n : 2 * n], rows[..., 2 * n + 1]
 
     def substitute(work: Values) -> Values:
         work = work.copy()
         for i in range(n):
             for j in range(i):
-                work[..., i] = less(work[..., j], rows[..., i, j], work[..., i])
+                work[..., i] = subtract_product(work[..., j], rows[..., i, j], work[..., i])
         for i in reversed(range(n)):
             for j in range(i + 1, n):
-                work[..., i] = less(work[..., j], rows[..., i, j], work[..., i])
+                work[..., i] = subtract_product(work[..., j], rows[..., i, j], work[..., i])
             work[..., i] = work[..., i] / rows[..., i, i]
         return work
 
     solution = substitute(right)
-    rest = right.copy()
+    residual = right.copy()
     for i in range(n):
         for j in range(n):
-            rest[..., i] = less(solution[..., j], matrix[..., i, j], rest[..., i])
-    return solution + substitute(rest)
+            residual[..., i] = subtract_product(solution[..., j], matrix[..., i, j], residual[..., i])
+    return solution + substitute(residual)
 
 
 def evaluate(opcode: Opcode, values: Sequence[Values], *, fused: bool = True) -> Values:
@@ -157,11 +159,11 @@ def multiply_add(a: Values, b: Values, c: Values) -> Values:
     """
     product, product_error = _two_product(a, b)
     high, low = _two_sum(product, c)
-    rest, rest_error = _two_sum(product_error, low)
+    residual, residual_error = _two_sum(product_error, low)
     # Round to odd: if the sum was inexact and its last bit is even, step towards the error.
-    even = (rest.view(np.int64) & 1) == 0
-    target = np.where(rest_error > 0.0, np.inf, -np.inf)
-    odd = np.where((rest_error != 0.0) & even, np.nextafter(rest, target), rest)
+    even = (residual.view(np.int64) & 1) == 0
+    target = np.where(residual_error > 0.0, np.inf, -np.inf)
+    odd = np.where((residual_error != 0.0) & even, np.nextafter(residual, target), residual)
     result = np.asarray(high + odd)
     size = [np.abs(value) for value in (a, b, c, product)]
     in_range = np.all([(value < 1e250) & ((value > 1e-250) | (value == 0.0)) for value in size], axis=0)

@@ -1,7 +1,7 @@
 """LLVM IR as text: a module that collects definitions, and the body of one function over one or more lanes.
 
 A body is straight-line code; loops and branches are routines (:mod:`armblocks.routines`). Text is emitted
-directly, because building IR objects costs many times the work of printing them. A :class:`Body` hides the
+directly, because building IR objects takes many times as long as printing them. A :class:`Body` hides the
 number of lanes: ``body.add(a, b)`` is ``fadd double`` or ``fadd <8 x double>``. No fast-math flags are set
 and ``fma`` is emitted only on request, so results do not depend on the number of lanes.
 """
@@ -56,7 +56,7 @@ class Body:
         self.bit = self.type("i1")
         self.lines: list[str] = []
         self.undecided: str | None = None
-        """Condition that holds in lanes whose result must be computed with one lane; None: in no lane."""
+        """The condition of lanes that must be evaluated again with one lane; None if there are none."""
         self._count = 0
 
     def type(self, scalar: str) -> str:
@@ -94,7 +94,7 @@ class Body:
             f"shufflevector {self.real} {first}, {self.real} poison, <{self.lanes} x i32> zeroinitializer"
         )
 
-    # Arithmetic, each rounded once.
+    # Arithmetic operations, each rounded once.
 
     def add(self, a: str, b: str) -> str:
         """``a + b``."""
@@ -131,7 +131,7 @@ class Body:
         self.module.declare(self.real, symbol, *[self.real] * len(operands))
         return self.let(f"call {self.real} @{symbol}({', '.join(f'{self.real} {x}' for x in operands)})")
 
-    def held_index(self, a: str, size: int) -> str:
+    def limited_index(self, a: str, size: int) -> str:
         """``a`` truncated to a 64-bit integer and limited to 0 … size - 1 (0 for NaN)."""
         kind = "i64" if self.lanes == 1 else f"v{self.lanes}i64"
         real = "f64" if self.lanes == 1 else f"v{self.lanes}f64"
@@ -162,7 +162,7 @@ class Body:
         return self.intrinsic("fabs", a)
 
     def polynomial(self, x: str, coefficients: Sequence[float]) -> str:
-        """Horner's rule; coefficients from the constant term upwards."""
+        """The polynomial by Horner's rule; coefficients begin with the constant term."""
         result = self.number(coefficients[-1])
         for coefficient in reversed(coefficients[:-1]):
             result = self.fma(result, x, self.number(coefficient))
@@ -187,7 +187,7 @@ class Body:
         return self.let(f"or {self.bit} {a}, {b}")
 
     def mark_undecided(self, condition: str) -> None:
-        """Mark lanes in which this body's results are invalid and must be computed with one lane."""
+        """Mark lanes in which this body's results are invalid and must be computed again with one lane."""
         self.undecided = condition if self.undecided is None else self.either(self.undecided, condition)
 
     # Sums and products without error, as unevaluated pairs.

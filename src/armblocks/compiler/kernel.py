@@ -19,7 +19,7 @@ from armblocks.compiler.arguments import (
     new_outputs,
     read_input,
 )
-from armblocks.compiler.batch_threads import Shares, evaluate_in_threads, worth_while
+from armblocks.compiler.batch_threads import Shares, evaluate_in_threads, useful_threads
 from armblocks.compiler.entry import ENTRY, TABLE, Maker, make_entry, offer_batch
 from armblocks.compiler.layout import BatchLayout, Layout
 from armblocks.compiler.native import NativeCode, load_code
@@ -67,20 +67,22 @@ class Kernel:
 
     @cached_property
     def tape(self) -> Tape:
-        """The scalar program."""
+        """The scalar operations of one evaluation."""
         return self._make_tape()
 
     @property
     def count(self) -> OperationCount:
-        """Multiplies, adds, functions and so on of one evaluation."""
+        """The numbers of multiplications, additions, functions and other operations of one evaluation."""
         return self.tape.count
 
     @cached_property
     def entry(self) -> Callable[..., Any]:
         """A builtin with the same arguments as the kernel; the fastest way to call it."""
-        return self.entry_before(self.__call__)
+        return self.entry_with_fallback(self.__call__)
 
-    def entry_before(self, fallback: Callable[..., Any], maker: Maker | None = None) -> Callable[..., Any]:
+    def entry_with_fallback(
+        self, fallback: Callable[..., Any], maker: Maker | None = None
+    ) -> Callable[..., Any]:
         """A builtin like :attr:`entry` with another ``fallback``.
 
         It handles plain arrays, ``out=`` and ``threads=1``. All other calls, including keyword inputs, go to
@@ -125,7 +127,7 @@ class Kernel:
     def columns(self, *arrays: ArrayLike, out: object = None, threads: int = 1) -> Any:
         """Evaluate a batch into arrays of column layout: ``(*shape, N)`` for each output.
 
-        Inputs as in a call; at least one must have a sample axis. An input ``(N, n)`` that is the
+        The inputs are those of a call; at least one must have a sample axis. An input ``(N, n)`` that is the
         transpose of a C-contiguous ``(n, N)`` array is read in place too.
         """
         return self._run(arrays, out, threads, columns=True)
@@ -144,7 +146,7 @@ class Kernel:
             key, arrays = self._lay_out(arrays, columns=columns)
             batch, shares = self._batches.get(key) or self._load_batch(key)
             addresses = [_address(array) for array in (*arrays, *written)]
-            workers = worth_while(samples, workers)
+            workers = useful_threads(samples, workers)
             if workers == 1:
                 batch(0, samples, samples, *addresses)
             else:
@@ -157,19 +159,19 @@ class Kernel:
         return results[0] if len(results) == 1 else tuple(results)
 
     def _lay_out(self, arrays: Sequence[Array], *, columns: bool) -> tuple[str, list[Array]]:
-        """The key of the batch layout, and the arrays as native code reads them."""
+        """The key of the batch layout, and the arrays in this layout."""
         key = ""
-        ready: list[Array] = []
+        laid_out: list[Array] = []
         for slot, array in zip(self.inputs, arrays):
             shared = array.ndim == len(slot.shape)
             in_columns = columns and not shared and array.ndim == 2 and array.flags.f_contiguous
             if in_columns and array.flags.aligned and not array.flags.c_contiguous:
                 key += _COLUMNS
-                ready.append(array.T)
+                laid_out.append(array.T)
             else:
                 key += _SHARED if shared else _ROWS
-                ready.append(_in_place(array))
-        return f"{key}>{(_COLUMNS if columns else _ROWS) * len(self.outputs)}", ready
+                laid_out.append(_in_place(array))
+        return f"{key}>{(_COLUMNS if columns else _ROWS) * len(self.outputs)}", laid_out
 
     @cached_property
     def _single(self) -> NativeCode:
@@ -207,7 +209,7 @@ class Kernel:
             return self._batches[key]
 
     def _offer_batch(self, single: NativeCode, key: str) -> None:
-        """Let builtins in ``single`` call the function for batches of this layout, if results are rows."""
+        """Make the batch function available to the builtins in ``single``, unless a layout has columns."""
         inputs = key[: len(self.inputs)]
         if _COLUMNS not in key:
             address = self._loaded[key].address("batch")

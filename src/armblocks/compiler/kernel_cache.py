@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def cached_kernel(key: str, trace: Callable[[], TracedFunction]) -> Kernel:
     """The kernel of the equations that ``key`` identifies.
 
-    ``key`` must cover everything that the equations depend on (their kind, and all numbers traced into them);
+    ``key`` must cover everything that the equations depend on (their type, and all numbers traced into them);
     the sources of this package are added to it. ``trace()`` is only called if the key is not in the disk
     cache. Raises what ``trace`` and :func:`~armblocks.compiler.compile_function` raise.
     """

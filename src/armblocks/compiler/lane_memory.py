@@ -20,37 +20,36 @@ from armblocks.routines.values import Integer
 class Line:
     """The memory positions of an input register and the following registers of its slot.
 
-    The first is at ``address``. ``step`` is the distance to the next register, ``apart`` the distance between
-    neighbouring lanes, both in doubles and as LLVM values of type i64.
+    The first is at ``address``. ``step`` is the stride from a register to the next, ``lane_stride`` from a
+    lane to the next, both in doubles and as LLVM values of type i64.
     """
 
     address: str
     step: str = "1"
-    apart: str = "0"
+    lane_stride: str = "0"
 
     def is_plain_array(self, lanes: int) -> bool:
         """Whether the numbers are contiguous, and the same in all ``lanes``."""
-        return self.step == "1" and (lanes == 1 or self.apart == "0")
+        return self.step == "1" and (lanes == 1 or self.lane_stride == "0")
 
-    def read(self, body: Body, behind: str) -> str:
-        """The number at the distance ``behind`` from the first, in registers; ``behind`` has one value per
-        lane."""
+    def read(self, body: Body, index: str) -> str:
+        """The number at ``index``, counted in registers from the first; ``index`` has one value per lane."""
 
         def address(entry: str, lane: int) -> str:
             offset = body.let(f"mul nsw i64 {entry}, {self.step}")
-            if lane > 0 and self.apart != "0":
-                across = body.let(f"mul nsw i64 {self.apart}, {lane}")
-                offset = body.let(f"add nsw i64 {offset}, {across}")
+            if lane > 0 and self.lane_stride != "0":
+                lane_offset = body.let(f"mul nsw i64 {self.lane_stride}, {lane}")
+                offset = body.let(f"add nsw i64 {offset}, {lane_offset}")
             return body.let(f"getelementptr inbounds double, ptr {self.address}, i64 {offset}")
 
-        return body.gather(address, behind)
+        return body.gather(address, index)
 
     def copy(self, body: Body, target: str, length: int) -> None:
         """Copy ``length`` numbers to ``target``: for each number a row with its value in every lane."""
         if body.lanes == 1 and self.step == "1":
             body.module.declare("void", "llvm.memcpy.p0.p0.i64", "ptr", "ptr", "i64", "i1")
-            ends = f"ptr align 8 {target}, ptr align 8 {self.address}"
-            body.do(f"call void @llvm.memcpy.p0.p0.i64({ends}, i64 {8 * length}, i1 false)")
+            pointers = f"ptr align 8 {target}, ptr align 8 {self.address}"
+            body.do(f"call void @llvm.memcpy.p0.p0.i64({pointers}, i64 {8 * length}, i1 false)")
             return
         lanes = body.lanes
 
@@ -64,7 +63,7 @@ class Line:
         program = Program()
         symbol = program.define(copied, f"copied.{lanes}", inlined=False).symbol
         add_program(body.module, program)
-        steps = f"i64 {length}, i64 {self.step}, i64 {self.apart}"
+        steps = f"i64 {length}, i64 {self.step}, i64 {self.lane_stride}"
         body.do(f"call void @{symbol}(ptr {target}, ptr {self.address}, {steps})")
 
 
@@ -92,7 +91,7 @@ def load_rows(body: Body, pointer: str, size: int, first: int) -> list[str]:
 def store_rows(body: Body, pointer: str, size: int, first: int, columns: Sequence[str]) -> None:
     """Write ``columns`` as columns ``first`` … of the block of rows at ``pointer``.
 
-    There are ``lanes`` columns, or all ``size`` where that is less. Nothing outside the block is written.
+    There are ``lanes`` columns, or ``size`` if ``size`` is smaller. Nothing outside the block is written.
     """
     lanes = body.lanes
     if lanes == 1 or size == 1:
@@ -108,9 +107,9 @@ def store_rows(body: Body, pointer: str, size: int, first: int, columns: Sequenc
             continue
         done = 0
         while done < width:
-            piece = 1 << ((width - done).bit_length() - 1)
-            _store_piece(body, pointer, begin + done, value, range(done, done + piece))
-            done += piece
+            count = 1 << ((width - done).bit_length() - 1)
+            _store_part(body, pointer, begin + done, value, range(done, done + count))
+            done += count
 
 
 def transpose(body: Body, rows: Sequence[str]) -> list[str]:
@@ -151,11 +150,11 @@ def _store(body: Body, pointer: str, offset: int, value: str) -> None:
     body.do(f"store {body.real} {value}, ptr {address}, align 8")
 
 
-def _store_piece(body: Body, pointer: str, offset: int, value: str, lanes: range) -> None:
+def _store_part(body: Body, pointer: str, offset: int, value: str, lanes: range) -> None:
     address = body.let(f"getelementptr inbounds double, ptr {pointer}, i64 {offset}")
     if len(lanes) == 1:
         element = body.let(f"extractelement {body.real} {value}, i64 {lanes[0]}")
         body.do(f"store double {element}, ptr {address}, align 8")
         return
-    piece = shuffle(body, value, "poison", list(lanes))
-    body.do(f"store <{len(lanes)} x double> {piece}, ptr {address}, align 8")
+    part = shuffle(body, value, "poison", list(lanes))
+    body.do(f"store <{len(lanes)} x double> {part}, ptr {address}, align 8")

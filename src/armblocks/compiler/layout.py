@@ -34,6 +34,6 @@ class BatchLayout:
 
     @classmethod
     def of(cls, key: str) -> BatchLayout:
-        """The layout of a key."""
+        """The layout that a key identifies."""
         inputs, outputs = (tuple(Layout(letter) for letter in part) for part in key.split(">"))
         return cls(inputs=inputs, outputs=outputs)

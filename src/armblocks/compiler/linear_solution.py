@@ -3,8 +3,8 @@
 Gaussian elimination with row pivoting. Pivots are chosen relative to the largest entry of their row, so that
 scaling an equation does not change the choice (Golub, Van Loan, *Matrix Computations*, 4th ed., 3.5.2). One
 step of iterative refinement in working precision makes the residual of every equation as small as the
-rounding error of its terms (Skeel, *Math. Comp.* 35 (1980) 817-832). Each lane exchanges its own rows with
-selects. All lanes run the same instructions, and the results are bitwise those of one lane.
+rounding error of its terms (Skeel, *Math. Comp.* 35 (1980) 817-832). Each lane exchanges its rows by select
+instructions. All lanes run the same instructions, and the results are bitwise those of one lane.
 """
 
 from __future__ import annotations
@@ -24,11 +24,18 @@ from armblocks.routines.memory import NumberArray
 from armblocks.routines.routine import Program, Routine
 from armblocks.routines.values import Integer
 
-SHORTEST_BLOCK, SHORTEST_BLOCK_OF_LANES, FEWEST_OF_LARGE = 8, 256, 24
-"""Minimum number of neighbouring inputs that are copied as a block, with one lane and with several lanes.
-LLVM compares loads and stores pair by pair, so blocks compile faster. With several lanes, fewer inputs are
-read faster as whole registers. The last number is the number of unknowns from which on the elimination takes
-so long that the reading does not matter, and the limit for one lane applies."""
+MIN_BLOCK = 8
+"""Minimum number of neighbouring inputs that are copied as a block, with one lane.
+
+LLVM compares loads and stores pair by pair, so blocks compile faster.
+"""
+MIN_BLOCK_OF_LANES = 256
+"""The same minimum with several lanes. Fewer inputs are read faster as whole registers."""
+MIN_LARGE_SYSTEM = 24
+"""Minimum number of unknowns at which ``MIN_BLOCK`` applies to several lanes too.
+
+The elimination then takes so long that the time for reading is negligible.
+"""
 
 
 def emit_linear_solution(
@@ -47,10 +54,10 @@ def emit_linear_solution(
     symbol = f"linear_solution.{n}.{body.lanes}"
     _define(module, symbol, n, body.lanes)
     space = WorkSpace(body, _Solver.length(n))
-    few = body.lanes > 1 and n < FEWEST_OF_LARGE
-    shortest = SHORTEST_BLOCK_OF_LANES if few else SHORTEST_BLOCK
+    is_small = body.lanes > 1 and n < MIN_LARGE_SYSTEM
+    min_block = MIN_BLOCK_OF_LANES if is_small else MIN_BLOCK
     for index, length in _blocks(tape, operands):
-        if length >= shortest:
+        if length >= min_block:
             line(operands[index]).copy(body, space.row(index), length)
             continue
         for k in range(index, index + length):
@@ -76,8 +83,8 @@ def _blocks(tape: Tape, operands: Sequence[int]) -> Iterator[tuple[int, int]]:
     """Index and length of each run of contiguous inputs of one slot, and of each other operand."""
     start = 0
     for k in range(1, len(operands) + 1):
-        follows = k < len(operands) and operands[k] == operands[k - 1] + 1 < tape.first_constant
-        if follows and tape.input_position(operands[k])[1] > 0:
+        continues = k < len(operands) and operands[k] == operands[k - 1] + 1 < tape.first_constant
+        if continues and tape.input_position(operands[k])[1] > 0:
             continue
         yield start, k - start
         start = k
@@ -101,7 +108,7 @@ class _Solver:
         return 2 * n * n + 4 * n
 
     def write(self, r: Routine) -> None:
-        """Solve, then correct the solution once."""
+        """Solve the equations, and refine the solution once."""
         self.prepare(r)
         for k in r.range(0, self.n):
             self.pivot(r, k)
@@ -125,13 +132,12 @@ class _Solver:
                 index = self.matrix.index(i, j)
                 value = self.matrix.numbers[index]
                 self.factors.numbers[index] = value
-                size, known = abs(value), largest.value
-                largest.value = select(size > known, size, known)
+                size, previous = abs(value), largest.value
+                largest.value = select(size > previous, size, previous)
             self.weights[i] = 1.0 / largest.value
 
     def pivot(self, r: Routine, k: Integer) -> None:
-        """In each lane, exchange row ``k`` with the row that has the largest weighted entry in column
-        ``k``."""
+        """Exchange row ``k``, in each lane, with the row of the largest weighted entry in column ``k``."""
         for i in r.range(k + 1, self.n):
             larger = self.weighted(i, k) > self.weighted(k, k)
             with r.when(larger.any):

@@ -27,7 +27,7 @@ from armblocks.compiler.tape import Tape
 from armblocks.compiler.tape_operations import Inputs, Registers, emit_operations
 from armblocks.routines.llvm import number_text
 
-MANY_CONSTANTS = 32
+MIN_TABLE_CONSTANTS = 32
 """Minimum number of constants of an output that are copied from a table."""
 
 
@@ -77,16 +77,16 @@ def emit_function(module: Module, tape: Tape, name: str, *, linkage: str = "inte
         else:
             # Each result is stored as soon as it is computed. Thousands of results stored at the end would be
             # spilled and reloaded, and the compile time would grow with the square of their number.
-            known: set[int] = set()
+            stored: set[int] = set()
 
             def written(register: int, registers: Registers) -> None:
                 if register in outputs:
-                    known.add(register)
+                    stored.add(register)
                     store(body, registers, register)
 
             registers = emit_operations(body, tape, inputs_of(body), written)
             for register in outputs:
-                if register not in known:
+                if register not in stored:
                     store(body, registers, register)
         body.do("ret void")
         arguments = ", ".join(f"{kind} {pointer}" for kind, pointer in pointers)
@@ -103,7 +103,7 @@ def _copy_constants(body: Body, tape: Tape, members: Sequence[int], slot: int, s
     """
     span = range(tape.first_constant, tape.first_operation)
     values = [tape.constants[k - span.start] if k in span else 0.0 for k in members]
-    if sum(k in span for k in members) < MANY_CONSTANTS:
+    if sum(k in span for k in members) < MIN_TABLE_CONSTANTS:
         return False
     module = body.module
     numbers = ", ".join(f"double {number_text(value)}" for value in values)

@@ -24,15 +24,13 @@ from armblocks.routines.memory import NumberArray, Reals
 from armblocks.routines.routine import Program, Routine
 from armblocks.routines.values import Integer, NumberT
 
-SHORTEST_ROW = 8
+MIN_ROW_LENGTH = 8
 """Minimum number of products in a row; shorter chains are unchanged."""
-FEWEST_ENTRIES = 256
-"""Minimum number of entries; smaller matrices are unchanged, because LLVM keeps their vectors in
-registers."""
-MOST_ROWS = 256
-"""Maximum number of rows of a ``PRODUCT``. One function reads and stores its results; it should not be
-long."""
-ROWS_AT_ONCE = 8
+MIN_ENTRIES = 256
+"""Minimum number of entries of a matrix. LLVM keeps the vectors of smaller products in registers."""
+MAX_ROWS = 256
+"""Maximum number of rows of a ``PRODUCT``, which limits the length of the function that reads its results."""
+PARALLEL_ROWS = 8
 """Number of sums computed in parallel: a multiply-add takes 4 cycles, and two can start in each cycle."""
 
 
@@ -40,7 +38,7 @@ ROWS_AT_ONCE = 8
 class _Row:
     """``c + a1 x1 + … + an xn`` as the operations ``members`` of a tape, with ``a1`` in register ``first``.
 
-    ``start`` is the register of ``c``; ``None`` where there is none.
+    ``start`` is the register of ``c``, or ``None`` without ``c``.
     """
 
     first: int
@@ -60,8 +58,8 @@ def with_matrix_products(tape: Tape) -> Tape:
     # If the factors of both sides are contiguous in memory, the side that several rows share is the vector.
     shared = Counter(row.vector for rows in choices for row in rows)
     chosen = [max(rows, key=lambda row: shared[row.vector]) for rows in choices]
-    products = [group for group in _matrices(tape, chosen) if _entries(group) >= FEWEST_ENTRIES]
-    return _rewritten(tape, products) if products else tape
+    products = [group for group in _matrices(tape, chosen) if _entries(group) >= MIN_ENTRIES]
+    return _with_products(tape, products) if products else tape
 
 
 def _entries(rows: Sequence[_Row]) -> int:
@@ -69,8 +67,10 @@ def _entries(rows: Sequence[_Row]) -> int:
 
 
 def _chains(tape: Tape) -> Iterator[list[int]]:
-    """Chains of operations: each adds a product to the sum of the previous one, and no other operation reads
-    that sum."""
+    """Chains of operations, each of which adds a product to the sum of the previous operation.
+
+    No other operation reads these sums.
+    """
     first = tape.first_operation
     uses = [0] * tape.size
     for _, operands in tape.operations:
@@ -86,12 +86,12 @@ def _chains(tape: Tape) -> Iterator[list[int]]:
             inner = tape.operations[c - first].opcode if c >= first else None
             if inner in (Opcode.FMA, Opcode.MULTIPLY) and uses[c] == 1 and c not in (a, b):
                 following[c - first] = k
-    begun = set(following) - set(following.values())
-    for k in sorted(begun):
+    chain_starts = set(following) - set(following.values())
+    for k in sorted(chain_starts):
         chain = [k]
         while (after := following.get(chain[-1])) is not None:
             chain.append(after)
-        if len(chain) >= SHORTEST_ROW:
+        if len(chain) >= MIN_ROW_LENGTH:
             yield chain
 
 
@@ -104,7 +104,7 @@ def _rows(tape: Tape, chain: Sequence[int]) -> Iterator[list[_Row]]:
     while position < len(chain):
         runs = [_run(tape, chain, position, side) for side in (0, 1)]
         length = max(map(len, runs))
-        if length >= SHORTEST_ROW:
+        if length >= MIN_ROW_LENGTH:
             opcode, operands = tape.operations[chain[position]]
             yield [
                 _Row(
@@ -120,8 +120,10 @@ def _rows(tape: Tape, chain: Sequence[int]) -> Iterator[list[_Row]]:
 
 
 def _run(tape: Tape, chain: Sequence[int], position: int, side: int) -> list[tuple[int, int]]:
-    """Pairs of a matrix entry and its factor, starting with the entry on one side of the operation at
-    ``position``."""
+    """Pairs of a matrix entry and its factor, beginning with the operation at ``position``.
+
+    ``side`` is the operand of this operation that is the first entry.
+    """
     entry = tape.operations[chain[position]].operands[side]
     if entry >= tape.first_constant:
         return []
@@ -145,21 +147,21 @@ def _matrices(tape: Tape, rows: Sequence[_Row]) -> Iterator[list[_Row]]:
     for vector, rows_of_vector in by_vector.items():
         matrix: list[_Row] = []
         for row in sorted(rows_of_vector, key=lambda row: row.first):
-            together = [*matrix, row]
-            ready = tape.first_operation + min(row.last for row in together)
-            fits = not matrix or (
+            extended = [*matrix, row]
+            ready = tape.first_operation + min(row.last for row in extended)
+            belongs = not matrix or (
                 row.first == matrix[-1].first + len(vector)
                 and tape.input_position(row.first)[0] == tape.input_position(matrix[0].first)[0]
-                and len(matrix) < MOST_ROWS
-                and all(row.start is None or row.start < ready for row in together)
+                and len(matrix) < MAX_ROWS
+                and all(row.start is None or row.start < ready for row in extended)
             )
-            if not fits:
+            if not belongs:
                 yield matrix
-            matrix = together if fits else [row]
+            matrix = extended if belongs else [row]
         yield matrix
 
 
-def _rewritten(tape: Tape, products: Sequence[Sequence[_Row]]) -> Tape:
+def _with_products(tape: Tape, products: Sequence[Sequence[_Row]]) -> Tape:
     """The tape with a ``PRODUCT`` for each group of rows, at the position of the first of its results."""
     constants = list(tape.constants)
     known: dict[str, int] = {}
@@ -178,14 +180,14 @@ def _rewritten(tape: Tape, products: Sequence[Sequence[_Row]]) -> Tape:
         heads[min(row.last for row in rows)] = rows, sizes
         removed.update(member for row in rows for member in row.members)
     indices = [constant(float(k)) for k in range(max(len(rows) for rows in products))]
-    none = constant(-0.0)  # a b + -0 has the bits of a b
+    minus_zero = constant(-0.0)  # a b + -0 has the bits of a b
     register = list(range(tape.first_operation)) + [-1] * len(tape.operations)
     operations: list[Operation] = []
     first = tape.first_constant + len(constants)
     for k, (opcode, operands) in enumerate(tape.operations):
         if k in heads:
             rows, sizes = heads[k]
-            starts = [none if row.start is None else register[row.start] for row in rows]
+            starts = [minus_zero if row.start is None else register[row.start] for row in rows]
             vector = [register[x] for x in rows[0].vector]
             product = first + len(operations)
             operations.append(Operation(Opcode.PRODUCT, (rows[0].first, *sizes, *vector, *starts)))
@@ -215,22 +217,22 @@ def emit_matrix_product(
     m, n = product_shape(tape, operands)
     vector, starts = operands[3 : 3 + n], operands[3 + n :]
     matrix = line(first)
-    plain = matrix.is_plain_array(body.lanes)
+    is_plain = matrix.is_plain_array(body.lanes)
     program = Program(body.lanes)
-    if plain:
+    if is_plain:
         symbol = program.define(matrix_product, f"matrix_product.{body.lanes}", inlined=False).symbol
     else:
         name = f"matrix_product_in_each_lane.{body.lanes}"
         symbol = program.define(matrix_product_in_each_lane, name, inlined=False).symbol
     add_program(body.module, program)
-    space = WorkSpace(body, m + n if plain else m + n + m * n)
-    address = matrix.address if plain else space.row(m + n)
-    if not plain:  # every sample of a batch has its own matrix
+    space = WorkSpace(body, m + n if is_plain else m + n + m * n)
+    address = matrix.address if is_plain else space.row(m + n)
+    if not is_plain:  # every sample of a batch has its own matrix
         matrix.copy(body, address, m * n)
     for k, register in enumerate([*starts, *vector]):
         space.write(k, number(register))
-    ends = f"ptr {address}, ptr {space.row(m)}, ptr {space.address}"
-    body.do(f"call void @{symbol}({ends}, i64 {m}, i64 {n})")
+    pointers = f"ptr {address}, ptr {space.row(m)}, ptr {space.address}"
+    body.do(f"call void @{symbol}({pointers}, i64 {m}, i64 {n})")
     sums = [space.read(i) for i in range(m)]
     space.free()
     return sums
@@ -243,8 +245,7 @@ def product_shape(tape: Tape, operands: Sequence[int]) -> tuple[int, int]:
 
 
 def matrix_product(r: Routine, A: Reals, x: LaneArray, y: LaneArray, m: Integer, n: Integer) -> None:
-    """``y += A x`` in every lane, for ``A`` (m, n), stored by rows; each sum is evaluated from left to
-    right."""
+    """``y += A x`` in every lane, for ``A`` (m, n) stored by rows; sums are evaluated from left to right."""
     _add_product(r, A, in_all_lanes, x, y, m, n)
 
 
@@ -278,7 +279,7 @@ def _add_product(
             y[start + k] = total.value
         row.value = start + count
 
-    for count in (ROWS_AT_ONCE, 1):
+    for count in (PARALLEL_ROWS, 1):
         with r.loop() as iteration:
             iteration.leave_when(row.value + count > m)
             add_rows(count)

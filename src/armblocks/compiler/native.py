@@ -1,4 +1,4 @@
-"""IR text to machine code in this process, through the disk cache."""
+"""Machine code of IR text in this process, with the disk cache."""
 
 from __future__ import annotations
 
@@ -19,9 +19,8 @@ from armblocks.errors import InputError
 if TYPE_CHECKING:
     from llvmlite import binding as llvm
 
-LONG, VERY_LONG = 8_000, 100_000
-"""Number of IR lines above which optimisation is not worth its time, because such long code is limited by
-memory access."""
+LONG_MODULE, VERY_LONG_MODULE = 8_000, 100_000
+"""Numbers of IR lines from which on optimisation is reduced: memory access limits the speed of such code."""
 
 _LOCK = threading.Lock()  # LLVM's global context is not thread-safe
 
@@ -33,7 +32,7 @@ class NativeCode:
         self._engine = engine
 
     def address(self, symbol: str) -> int:
-        """Address of an external function or variable. Raises ``KeyError`` where there is none."""
+        """Address of an external function or variable. Raises ``KeyError`` for an unknown symbol."""
         with _LOCK:
             engine = self._engine
             address = engine.get_function_address(symbol) or engine.get_global_value_address(symbol)
@@ -90,12 +89,14 @@ def load_code(key: Sequence[str], write: Callable[[], str], effort: Effort = Eff
 
 
 def compile_object(text: str, target: Target, *, jit: bool = True, effort: Effort = Effort.FULL) -> bytes:
-    """Optimise IR text and give an object file for the target."""
+    """Optimise IR text and return an object file for the target."""
     from llvmlite import binding as llvm
 
     with _LOCK:
         lines = text.count("\n")
-        level = 0 if effort is Effort.LITTLE or lines >= VERY_LONG else 1 if lines >= LONG else 2
+        level = (
+            0 if effort is Effort.LITTLE or lines >= VERY_LONG_MODULE else 1 if lines >= LONG_MODULE else 2
+        )
         machine = target.machine(jit=jit, opt=level)
         module = llvm.parse_assembly(text)
         module.triple = target.triple
@@ -104,12 +105,12 @@ def compile_object(text: str, target: Target, *, jit: bool = True, effort: Effor
             module.verify()
             _optimise(module, machine)
         elif effort is Effort.FULL:
-            _tidy(module, machine)
+            _simplify(module, machine)
         return machine.emit_object(module)
 
 
 def _optimise(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
-    """All passes that make straight-line code faster."""
+    """Run all passes that make straight-line code faster."""
     from llvmlite import binding as llvm
 
     tuning = llvm.create_pipeline_tuning_options(speed_level=2)
@@ -121,9 +122,8 @@ def _optimise(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
     builder.getModulePassManager().run(module, builder)
 
 
-def _tidy(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
-    """The two passes with the largest effect on loops around long code: mem2reg and simplification of
-    jumps."""
+def _simplify(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
+    """Run the two passes with the largest effect on loops around long code: SROA and CFG simplification."""
     from llvmlite import binding as llvm
 
     builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=1))

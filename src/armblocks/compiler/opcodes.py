@@ -1,6 +1,7 @@
-"""The operations of a tape: their names, how many operands they take, and what kind of work they are.
+"""The operations of a tape: names, numbers of operands and categories.
 
-Every operation works on IEEE 754 doubles and rounds to nearest. Where languages differ, the definitions are:
+Every operation is defined on IEEE 754 doubles and rounds to nearest. Where languages differ, the definitions
+are:
 
 * ``FMA a b c`` is ``a b + c`` rounded once, ``FMS`` is ``a b - c``, ``FNMA`` is ``c - a b``.
 * ``MINIMUM`` and ``MAXIMUM`` return NaN if either operand is NaN (as ``numpy.minimum``; C's ``fmin`` and
@@ -32,7 +33,7 @@ from enum import IntEnum, auto
 
 
 class Opcode(IntEnum):
-    """One operation. The numbers are part of the tape's digest: append only."""
+    """One operation. The numbers are part of the digest of a tape, so new operations are appended."""
 
     ADD = auto()
     SUBTRACT = auto()
@@ -87,7 +88,7 @@ class Opcode(IntEnum):
 
     @property
     def arity(self) -> int:
-        """Count of operands; 0 where it varies."""
+        """Number of operands; 0 if it varies."""
         return _ARITY.get(self, 1)
 
 
@@ -112,7 +113,7 @@ ELEMENTARY = frozenset(opcode for opcode in Opcode if Opcode.SIN <= opcode <= Op
 
 
 def solution_length(operands: int) -> int:
-    """The count n of unknowns of a ``SOLVE`` with n (n + 1) operands."""
+    """The number n of unknowns of a ``SOLVE`` with n (n + 1) operands."""
     return math.isqrt(operands)
 
 

@@ -1,10 +1,10 @@
 """Long tapes divided into pieces, each of which becomes a function.
 
 LLVM's compile time grows faster than linearly with the length of a function, mainly because it compares loads
-and stores pairwise. Ten thousand operations take minutes in one function and seconds in pieces. Values that
-cross pieces are passed through memory. This is slow if many values are reused, as in the dynamics of an arm,
-and fast in a chain of blocks. In the length of a piece, reads and writes therefore have a higher weight than
-arithmetic. The operations and their order are unchanged, and so are the results.
+and stores pairwise. Ten thousand operations take minutes in one function and seconds in pieces. Values that a
+later piece reads are passed through memory. This is slow if many values are reused, as in the dynamics of an
+arm, and fast in a chain of blocks. In the length of a piece, reads and writes therefore have a higher weight
+than arithmetic. The operations and their order are unchanged, and so are the results.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from armblocks.compiler.tape import Tape
 from armblocks.compiler.tape_operations import Inputs, Registers, emit_operations
 from armblocks.compiler.work_space import WorkSpace
 
-LONGEST = 2600
+MAX_WEIGHT = 2600
 """Maximum weight of a function that is not divided."""
-LENGTH = 600
+PIECE_WEIGHT = 600
 """Approximate weight of a piece."""
 ACCESS_WEIGHT, FUNCTION_WEIGHT = 4, 8
 """Weights of a read or write, and of an elementary function, in operations."""
@@ -36,8 +36,8 @@ class Piece:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cut:
-    """A tape in pieces. ``slots`` maps registers that later pieces read to their slots in memory."""
+class DividedTape:
+    """A tape divided into pieces; ``slots`` are the memory slots of the registers that later pieces read."""
 
     pieces: tuple[Piece, ...]
     slots: dict[int, int]
@@ -46,50 +46,52 @@ class Cut:
 
 def is_long(tape: Tape) -> bool:
     """Whether a tape should be divided into pieces."""
-    # A vector's operands are copied in blocks, not read one by one.
+    # The operands of a vector operation are copied in blocks, not read one by one.
     read = {r for opcode, operands in tape.operations if opcode not in VECTORS for r in operands}
     accesses = sum(register < tape.first_constant for register in read) + sum(tape.output_sizes)
-    return len(tape.operations) + ACCESS_WEIGHT * accesses > LONGEST
+    return len(tape.operations) + ACCESS_WEIGHT * accesses > MAX_WEIGHT
 
 
 Stores = Mapping[int, Sequence[int]]
 """Groups of outputs that are stored together: the registers of each group, by its number."""
 
 
-def cut(tape: Tape, stores: Stores) -> Cut:
+def divide(tape: Tape, stores: Stores) -> DividedTape:
     """Divide a tape into pieces."""
     first = tape.first_operation
-    ready: dict[int, list[int]] = {}
+    groups_by_register: dict[int, list[int]] = {}
     for number, registers in stores.items():
-        ready.setdefault(max(registers, default=0), []).append(number)
+        groups_by_register.setdefault(max(registers, default=0), []).append(number)
     pieces: list[Piece] = []
     begin, weight = 0, 0
     pending: list[int] = []
     read: set[int] = set()
     for k, (opcode, operands) in enumerate(tape.operations):
-        done = ready.pop(first + k, [])
-        pending += done
+        complete = groups_by_register.pop(first + k, [])
+        pending += complete
         single = () if opcode in VECTORS else operands
         new = {register for register in single if register < tape.first_constant} - read
         read |= new
         weight += FUNCTION_WEIGHT if opcode in ELEMENTARY else 1
-        weight += ACCESS_WEIGHT * (len(done) + len(new))
+        weight += ACCESS_WEIGHT * (len(complete) + len(new))
         following = tape.operations[k + 1].opcode if k + 1 < len(tape.operations) else None
         # The members of a vector are in the piece that computes it.
-        if weight >= LENGTH and following is not Opcode.MEMBER:
+        if weight >= PIECE_WEIGHT and following is not Opcode.MEMBER:
             pieces.append(Piece(first=begin, last=k + 1, stores=tuple(pending)))
             begin, weight, pending = k + 1, 0, []
             read.clear()
-    pending += [number for numbers in ready.values() for number in numbers]  # only inputs and constants
-    end, limit = len(tape.operations), LENGTH // ACCESS_WEIGHT
+    pending += [
+        number for numbers in groups_by_register.values() for number in numbers
+    ]  # only inputs and constants
+    end, limit = len(tape.operations), PIECE_WEIGHT // ACCESS_WEIGHT
     for start in range(0, max(1, len(pending)), limit):
         pieces.append(Piece(first=begin, last=end, stores=tuple(pending[start : start + limit])))
         begin = end
     return _with_slots(tape, stores, pieces)
 
 
-def _with_slots(tape: Tape, stores: Stores, pieces: Sequence[Piece]) -> Cut:
-    """Assign memory to each register that crosses a boundary, reusable after the last piece that reads it."""
+def _with_slots(tape: Tape, stores: Stores, pieces: Sequence[Piece]) -> DividedTape:
+    """Assign memory to each register that a later piece reads, reusable after the last of these pieces."""
     first = tape.first_operation
     computed_in: dict[int, int] = {}
     last_read: dict[int, int] = {}
@@ -105,9 +107,9 @@ def _with_slots(tape: Tape, stores: Stores, pieces: Sequence[Piece]) -> Cut:
     slots: dict[int, int] = {}
     free: list[int] = []
     size = 0
-    crossing = sorted(register for register, piece in last_read.items() if piece > computed_in[register])
+    shared = sorted(register for register, piece in last_read.items() if piece > computed_in[register])
     starts: dict[int, list[int]] = {}
-    for register in crossing:
+    for register in shared:
         starts.setdefault(computed_in[register], []).append(register)
     for number in range(len(pieces)):
         for register in starts.get(number, []):
@@ -117,7 +119,7 @@ def _with_slots(tape: Tape, stores: Stores, pieces: Sequence[Piece]) -> Cut:
             slots[register] = free.pop()
             ends.setdefault(last_read[register], []).append(slots[register])
         free += ends.pop(number, [])
-    return Cut(pieces=tuple(pieces), slots=slots, size=size)
+    return DividedTape(pieces=tuple(pieces), slots=slots, size=size)
 
 
 def emit_pieces(
@@ -127,25 +129,25 @@ def emit_pieces(
     arguments: Sequence[tuple[str, str]],
     stores: Stores,
     inputs_of: Callable[[Body], Inputs],
-    storing: Callable[[Body, Registers, int], None],
+    store_group: Callable[[Body, Registers, int], None],
 ) -> str | None:
     """Add the functions of a tape's pieces, and to ``caller`` the calls of all of them.
 
     ``arguments`` are the types and names of the arguments that ``caller`` passes on. ``inputs_of(body)``
-    returns the functions with which a body reads the inputs, ``storing(body, registers, k)`` stores group
+    returns the functions with which a body reads the inputs, ``store_group(body, registers, k)`` stores group
     ``k`` of ``stores``. The result has a bit for each lane that must be evaluated with one lane; ``None`` if
     there are no such lanes.
     """
     module, lanes = caller.module, caller.lanes
-    tape_cut = cut(tape, stores)
-    memory = WorkSpace(caller, tape_cut.size)
+    divided = divide(tape, stores)
+    memory = WorkSpace(caller, divided.size)
     declared = ", ".join([f"{kind} {argument}" for kind, argument in arguments] + ["ptr noalias %memory"])
     passed = [f"{kind.split()[0]} {argument}" for kind, argument in arguments] + [f"ptr {memory.address}"]
     bits = f"i{lanes}"
     undecided: str | None = None
-    for number, piece in enumerate(tape_cut.pieces):
+    for number, piece in enumerate(divided.pieces):
         body = Body(module, lanes)
-        _emit_piece(body, tape, tape_cut, piece, inputs_of(body), storing)
+        _emit_piece(body, tape, divided, piece, inputs_of(body), store_group)
         symbol, result = f"{name}.{number}", "void" if body.undecided is None else bits
         call = f"call {result} @{symbol}({', '.join(passed)})"
         if body.undecided is None:
@@ -164,13 +166,13 @@ def emit_pieces(
 def _emit_piece(
     body: Body,
     tape: Tape,
-    tape_cut: Cut,
+    divided: DividedTape,
     piece: Piece,
     inputs: Inputs,
-    storing: Callable[[Body, Registers, int], None],
+    store_group: Callable[[Body, Registers, int], None],
 ) -> None:
     def address(register: int) -> str:
-        offset = tape_cut.slots[register] * body.lanes
+        offset = divided.slots[register] * body.lanes
         return body.let(f"getelementptr inbounds double, ptr %memory, i64 {offset}")
 
     def load(register: int) -> str:
@@ -178,10 +180,12 @@ def _emit_piece(
             return inputs.load(register)
         return body.let(f"load {body.real}, ptr {address(register)}, align {8 * body.lanes}")
 
-    registers = emit_operations(body, tape, Inputs(load, inputs.line), some=range(piece.first, piece.last))
+    registers = emit_operations(
+        body, tape, Inputs(load, inputs.line), selection=range(piece.first, piece.last)
+    )
     for store in piece.stores:
-        storing(body, registers, store)
+        store_group(body, registers, store)
     for register in range(tape.first_operation + piece.first, tape.first_operation + piece.last):
-        if register in tape_cut.slots:
+        if register in divided.slots:
             value = registers.number(register)
             body.do(f"store {body.real} {value}, ptr {address(register)}, align {8 * body.lanes}")

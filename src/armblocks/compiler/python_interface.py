@@ -1,7 +1,8 @@
 """Functions of CPython and NumPy that the builtin of a kernel calls.
 
 Each process sets their addresses by the names in :data:`~armblocks.compiler.entry.TABLE_ENTRIES`. Python
-objects are addresses."""
+objects are given as addresses.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +13,12 @@ from armblocks.routines.values import Int32, Integer
 
 @external
 def reference(r: Routine, item: Address) -> None:
-    """``Py_IncRef``: take another reference, unless the address is null."""
+    """``Py_IncRef``: add a reference, unless the address is null."""
 
 
 @external
 def release(r: Routine, item: Address) -> None:
-    """``Py_DecRef``: give a reference back, unless the address is null."""
+    """``Py_DecRef``: release a reference, unless the address is null."""
 
 
 @external

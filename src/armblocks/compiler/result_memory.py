@@ -1,9 +1,9 @@
 """Reuse of the memory of large results that no array refers to any more.
 
-The C library takes the memory of a large array from the system and returns it with the array. The system
-clears each page at its first write, which takes longer than most kernels: 58 MB take 4.7 ms, the evaluation
-3.9 ms (puma560 ``jacob0``, 200 000 samples, AMD EPYC, pages of 2 MB). The C library itself reuses at most 32
-MB. Reused pages need no clearing.
+The C library takes the memory of a large array from the system, and returns it when the array is deleted. The
+system clears each page at its first write, which takes longer than most kernels: 58 MB take 4.7 ms, the
+evaluation 3.9 ms (puma560 ``jacob0``, 200 000 samples, AMD EPYC, pages of 2 MB). The C library itself reuses
+at most 32 MB. Reused pages need no clearing.
 """
 
 from __future__ import annotations
@@ -22,27 +22,27 @@ from armblocks.equations import Shape
 
 Array = NDArray[np.float64]
 
-LARGE = 1 << 19
+MIN_REUSED = 1 << 19
 """Minimum number of doubles (4 MiB) of memory that is reused. The C library reuses smaller blocks itself."""
-MOST_IDLE = 128 * 1024 * 1024
+MAX_IDLE_BYTES = 128 * 1024 * 1024
 """Maximum number of bytes that a process keeps for later results."""
 
 
 def new_result(shape: Shape) -> Array:
-    """A new array for a result; its numbers are arbitrary."""
-    return np.empty(shape) if math.prod(shape) < LARGE else result_memory().new_array(shape)
+    """A new array for a result, with undefined numbers."""
+    return np.empty(shape) if math.prod(shape) < MIN_REUSED else result_memory().new_array(shape)
 
 
 @cache
 def result_memory() -> ResultMemory:
-    """The pool of this process. A full garbage collection (``gc.collect()``) frees what it keeps."""
-    memory = ResultMemory(MOST_IDLE)
+    """The pool of this process. A full garbage collection (``gc.collect()``) empties it."""
+    memory = ResultMemory(MAX_IDLE_BYTES)
 
-    def collected(phase: str, info: Mapping[str, int]) -> None:
+    def clear_after_collection(phase: str, info: Mapping[str, int]) -> None:
         if phase == "stop" and info["generation"] == 2:
             memory.clear()
 
-    gc.callbacks.append(collected)
+    gc.callbacks.append(clear_after_collection)
     return memory
 
 
@@ -63,7 +63,7 @@ class ResultMemory:
         return sum(memory.nbytes for memory in tuple(self._idle))
 
     def new_array(self, shape: Shape) -> Array:
-        """An array of this shape; its numbers are arbitrary."""
+        """An array of this shape, with undefined numbers."""
         return np.asarray(_Lease(self, self._take(math.prod(shape)), shape))
 
     def give_back(self, memory: Array) -> None:
@@ -87,12 +87,12 @@ class ResultMemory:
                 break
             if count <= memory.size <= 2 * count:
                 return memory
-            self._idle.appendleft(memory)  # too small: this block is freed first
-        return np.empty(count + count // 8)  # some extra, for a slightly larger next result
+            self._idle.appendleft(memory)  # of another size: it becomes the next block to be freed
+        return np.empty(count + count // 8)  # larger, so that a slightly larger result can reuse the block
 
 
 class _Lease:
-    """Owner of one result's memory: an array that is made from it keeps it alive."""
+    """The owner of the memory of one result; arrays that are views of it keep it alive."""
 
     __slots__ = ("_memory", "_pool", "_shape")
 

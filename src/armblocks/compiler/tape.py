@@ -1,9 +1,9 @@
-"""A function as a flat scalar program: inputs, constants, operations, outputs. Independent of CasADi and
-LLVM.
+"""A function as a flat scalar program, independent of CasADi and LLVM.
 
-Every value has a register, and a register is written once. Registers are numbered consecutively: first the
-inputs (slot after slot), then the constants, then one for each operation. Operation ``k`` therefore writes
-register ``size of inputs + number of constants + k``.
+A tape consists of inputs, constants, operations and outputs. Every value has a register, and a register is
+written once. Registers are numbered consecutively: first the inputs (slot after slot), then the constants,
+then one for each operation. Operation ``k`` therefore writes register ``size of inputs + number of constants
++ k``.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Operation(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class OperationCount:
-    """Floating-point work of one evaluation. ``functions`` counts sin, cos, exp, atan2 … each by name."""
+    """Numbers of operations of one evaluation; ``functions``: name and number of each elementary function."""
 
     multiplies: int = 0
     adds: int = 0
@@ -51,7 +51,7 @@ class OperationCount:
 
     @property
     def function_calls(self) -> int:
-        """Count of elementary functions."""
+        """Number of calls of elementary functions."""
         return sum(count for _, count in self.functions)
 
     def __str__(self) -> str:
@@ -114,24 +114,24 @@ class Tape:
 
     @property
     def size(self) -> int:
-        """Count of registers."""
+        """Number of registers."""
         return self.first_operation + len(self.operations)
 
     @property
     def output_sizes(self) -> tuple[int, ...]:
-        """Count of scalars of each output slot."""
+        """Number of scalars of each output slot."""
         return tuple(len(registers) for registers in self.outputs)
 
     @cached_property
     def digest(self) -> str:
         """SHA-256 of the program, hexadecimal: the same on every machine."""
-        import hashlib  # loads OpenSSL, which would slow down importing armblocks
+        import hashlib  # imported here because it loads OpenSSL, which is slow
 
         return hashlib.sha256(self.to_bytes()).hexdigest()
 
     @cached_property
     def count(self) -> OperationCount:
-        """The work of one evaluation."""
+        """The numbers of operations of one evaluation."""
         counts: dict[Opcode, int] = {}
         for operation in self.operations:
             counts[operation.opcode] = counts.get(operation.opcode, 0) + 1
@@ -151,12 +151,12 @@ class Tape:
             (opcode.name.lower(), counts[opcode]) for opcode in sorted(ELEMENTARY) if opcode in counts
         )
         counted = total(Opcode.PRODUCT) + sum(count for _, count in functions)
-        rest = len(self.operations) + self._products_in_matrices - sum(named.values()) - counted
-        return OperationCount(**named, others=rest, functions=functions)
+        others = len(self.operations) + self._products_in_matrices - sum(named.values()) - counted
+        return OperationCount(**named, others=others, functions=functions)
 
     @property
     def _products_in_matrices(self) -> int:
-        """Multiply-adds of all matrices times vectors."""
+        """Number of multiply-adds of all matrix products."""
         products = (operands for opcode, operands in self.operations if opcode is Opcode.PRODUCT)
         sizes = (operands[1:3] for operands in products)
         return sum(math.prod(int(self.constants[r - self.first_constant]) for r in pair) for pair in sizes)
@@ -172,7 +172,7 @@ class Tape:
         return "\n".join(lines)
 
     def to_bytes(self) -> bytes:
-        """A portable binary form (little-endian), read back by :meth:`from_bytes`."""
+        """The tape in a portable binary form (little-endian), which :meth:`from_bytes` reads."""
         flat = [value for slot in self.outputs for value in slot]
         code = [
             number
@@ -196,7 +196,7 @@ class Tape:
             numbers: list[int] = np.frombuffer(data, "<i8", -1, start + 8 * lengths[2]).tolist()
             n_in, n_out, _, n_code, n_flat = lengths
             if len(numbers) != n_in + n_out + n_code + n_flat:
-                raise ValueError("cut short")
+                raise ValueError("incomplete data")
             input_sizes = tuple(numbers[:n_in])
             output_sizes = numbers[n_in : n_in + n_out]
             operations = _decode(numbers[n_in + n_out : n_in + n_out + n_code])
@@ -204,12 +204,12 @@ class Tape:
         except (ValueError, KeyError, IndexError, struct.error) as error:
             raise CompileError(
                 f"these bytes are not a tape: {error}",
-                allowed="what Tape.to_bytes gave",
+                allowed="bytes from Tape.to_bytes",
                 where="tape",
                 fix="write the tape again with Tape.to_bytes",
             ) from error
-        ends = np.cumsum(output_sizes).tolist()
-        outputs = tuple(tuple(flat[end - size : end]) for end, size in zip(ends, output_sizes))
+        offsets = np.cumsum(output_sizes).tolist()
+        outputs = tuple(tuple(flat[end - size : end]) for end, size in zip(offsets, output_sizes))
         return cls(input_sizes, tuple(constants.tolist()), operations, outputs)
 
 
@@ -221,7 +221,7 @@ def _decode(code: list[int]) -> tuple[Operation, ...]:
         first = position + (1 if opcode.arity else 2)
         end = first + (opcode.arity or code[position + 1])
         if end > len(code):
-            raise ValueError("cut short")
+            raise ValueError("incomplete data")
         operations.append(Operation(opcode, tuple(code[first:end])))
         position = end
     return tuple(operations)

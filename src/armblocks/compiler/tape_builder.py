@@ -1,4 +1,4 @@
-"""Builds tapes: folds constants, finds common subexpressions, fuses multiply-adds, drops dead code.
+"""Builds tapes: folds constants, shares common subexpressions, fuses multiply-adds, removes dead code.
 
 Only rewritings with identical results for every input (except the sign of a NaN) are applied, with one
 exception: ``a b + c`` becomes a fused multiply-add if the product has no other use and the traced function
@@ -31,7 +31,7 @@ class TapeBuilder:
         self._starts = [0, *np.cumsum(self._input_sizes).tolist()]
         # None for an input, float for a constant, else the operation.
         self._nodes: list[_Node | float | None] = [None] * self._starts[-1]
-        self._known: dict[_Node | bytes, int] = {}
+        self._handles: dict[_Node | bytes, int] = {}
         self._rules: dict[Opcode, Callable[..., int | None]] = {
             Opcode.ADD: self._simplify_add,
             Opcode.SUBTRACT: self._simplify_subtract,
@@ -51,9 +51,9 @@ class TapeBuilder:
         return self._number(struct.pack("<d", value), float(value))
 
     def _number(self, key: bytes | _Node, node: float | _Node) -> int:
-        handle = self._known.get(key)
+        handle = self._handles.get(key)
         if handle is None:
-            handle = self._known[key] = len(self._nodes)
+            handle = self._handles[key] = len(self._nodes)
             self._nodes.append(node)
         return handle
 
@@ -88,7 +88,7 @@ class TapeBuilder:
     def _simplify_add(self, a: int, b: int) -> int | None:
         for x, y in ((a, b), (b, a)):
             number = self.value(y)
-            if number is not None and _is_zero(number, -1.0):  # x + -0 is x; x + 0 is not when x is -0
+            if number is not None and _is_zero(number, -1.0):  # x + -0 is x; x + 0 differs if x is -0
                 return x
             if negated := self.operands_of(y, Opcode.NEGATE):
                 return self.add(Opcode.SUBTRACT, x, negated[0])
@@ -96,8 +96,7 @@ class TapeBuilder:
         return self._merge_branches(b, a) if merged is None else merged
 
     def _merge_branches(self, a: int, b: int) -> int | None:
-        """CasADi represents a conditional as (c ? yes : 0) + (not c ? no : 0), here (c ? yes : 0) + (c ? 0 :
-        no)."""
+        """The conditional ``c ? yes : no`` for the sum ``(c ? yes : 0) + (c ? 0 : no)`` of CasADi."""
         first, second = self.operands_of(a, Opcode.SELECT), self.operands_of(b, Opcode.SELECT)
         if first is None or second is None or first[0] != second[0]:
             return None
@@ -189,8 +188,7 @@ class TapeBuilder:
         )
 
     def _fuse(self, outputs: Sequence[Sequence[int]], rounded: frozenset[int]) -> list[_Node | float | None]:
-        """Fuse each product that is used once with the sum that uses it, except products that must be
-        rounded."""
+        """Fuse each product that is used once, and need not be rounded, with the sum that uses it."""
         nodes = list(self._nodes)
         results = [handle for slot in outputs for handle in slot]
         uses = [0] * len(nodes)

@@ -1,4 +1,4 @@
-"""The operations of a tape as LLVM IR, for function bodies with one lane or many, whole or in pieces."""
+"""The operations of a tape, or of a piece of it, as LLVM IR for function bodies with one or more lanes."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Registers:
         self._numbers: dict[int, str] = {}
         self._conditions: dict[int, str] = {}
         self.vectors: dict[int, list[str]] = {}
-        """The numbers of the registers with several numbers."""
+        """The results of operations with several results, by register."""
 
     def set_number(self, register: int, value: str) -> None:
         """Write a register with a number."""
@@ -80,18 +80,18 @@ def emit_operations(
     tape: Tape,
     inputs: Inputs,
     written: Callable[[int, Registers], None] | None = None,
-    some: range | None = None,
+    selection: range | None = None,
 ) -> Registers:
     """Emit all operations of the tape into ``body``; return the registers, from which outputs are read.
 
-    ``written(register, registers)`` is called after each operation. If only ``some`` of the operations are
-    emitted, ``inputs.load`` also returns registers that other pieces have written.
+    ``written(register, registers)`` is called after each operation. If only the operations
+    ``selection`` are emitted, ``inputs.load`` also returns registers that other pieces have written.
     """
     from armblocks.compiler import elementary  # not needed if the code comes from the disk cache
 
     registers = Registers(body, tape, inputs.load)
     partners = tape.sine_cosine_pairs
-    for k in range(len(tape.operations)) if some is None else some:
+    for k in range(len(tape.operations)) if selection is None else selection:
         opcode, operands = tape.operations[k]
         target = tape.first_operation + k
         if opcode in COMPARISONS:
@@ -103,8 +103,8 @@ def emit_operations(
         elif opcode is Opcode.READ:
             first, count, index = operands
             size = int(tape.constants[count - tape.first_constant])
-            behind = body.held_index(registers.number(index), size)
-            registers.set_number(target, inputs.line(first).read(body, behind))
+            position = body.limited_index(registers.number(index), size)
+            registers.set_number(target, inputs.line(first).read(body, position))
         elif opcode is Opcode.SOLVE:
             members = emit_linear_solution(body, tape, operands, registers.number, inputs.line)
             registers.vectors[target] = members

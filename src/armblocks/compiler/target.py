@@ -1,4 +1,4 @@
-"""The processor that code is compiled for: its name, its features, the number of lanes of its registers."""
+"""The processor for which code is compiled: name, features, number of lanes of a vector register."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ _LOCK = threading.Lock()
 
 @dataclass(frozen=True, kw_only=True)
 class Target:
-    """The properties of a processor for the code generator. All of them are part of the key of cached
-    code."""
+    """The properties of a processor for the code generator, all part of the key of cached code."""
 
     triple: str
     cpu: str
@@ -27,7 +26,7 @@ class Target:
 
     @property
     def key(self) -> str:
-        """Identifies the target: code compiled for one key runs on all machines with the same key."""
+        """The text that identifies the target; code for this key runs on all machines with the same key."""
         return "|".join((self.triple, self.cpu, self.features, str(self.lanes), self.llvm_version))
 
     def machine(self, *, jit: bool = True, opt: int = 2) -> llvm.TargetMachine:

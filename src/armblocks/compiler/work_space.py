@@ -8,21 +8,21 @@ from __future__ import annotations
 
 from armblocks.compiler.ir_text import Body
 
-MOST_ON_STACK = 128 * 1024
-"""Bytes of one work space that come from the stack."""
+MAX_STACK_BYTES = 128 * 1024
+"""Maximum number of bytes of a work space on the stack."""
 
 
 class WorkSpace:
     """Rows of one double for each lane of a body, aligned to the size of a row; not initialised.
 
-    It must be freed in the same body. ``address`` is that of the first row.
+    The memory must be freed in the same body. ``address`` is that of the first row.
     """
 
     def __init__(self, body: Body, rows: int) -> None:
         self._body = body
         self._align = 8 * body.lanes
         size = self._align * max(1, rows)
-        self._on_stack = size <= MOST_ON_STACK
+        self._on_stack = size <= MAX_STACK_BYTES
         # The value that releases the memory: the top of the stack, or the address from the C library.
         self._mark, self.address = self._from_stack(size) if self._on_stack else self._from_heap(size)
 
@@ -41,9 +41,9 @@ class WorkSpace:
 
     def free(self) -> None:
         """Release the memory."""
-        give_back = "llvm.stackrestore.p0" if self._on_stack else "free"
-        self._body.module.declare("void", give_back, "ptr")
-        self._body.do(f"call void @{give_back}(ptr {self._mark})")
+        release = "llvm.stackrestore.p0" if self._on_stack else "free"
+        self._body.module.declare("void", release, "ptr")
+        self._body.do(f"call void @{release}(ptr {self._mark})")
 
     def _from_stack(self, size: int) -> tuple[str, str]:
         body = self._body
@@ -57,5 +57,5 @@ class WorkSpace:
         body.module.declare("ptr", "llvm.ptrmask.p0.i64", "ptr", "i64")
         memory = body.let(f"call ptr @malloc(i64 {size + self._align - 8})")
         # The C library aligns to at least 8 bytes.
-        behind = body.let(f"getelementptr inbounds i8, ptr {memory}, i64 {self._align - 8}")
-        return memory, body.let(f"call ptr @llvm.ptrmask.p0.i64(ptr {behind}, i64 {-self._align})")
+        aligned_end = body.let(f"getelementptr inbounds i8, ptr {memory}, i64 {self._align - 8}")
+        return memory, body.let(f"call ptr @llvm.ptrmask.p0.i64(ptr {aligned_end}, i64 {-self._align})")

@@ -2,6 +2,7 @@
 
 from armblocks.diagram.block import Block, Shapes, Signals
 from armblocks.diagram.block_equations import BlockEquations, block_equations
+from armblocks.diagram.bookmarks import Bookmark
 from armblocks.diagram.builder import BlockHandle, DiagramBuilder
 from armblocks.diagram.bus import Bus, Carried
 from armblocks.diagram.check import check_diagram
@@ -80,6 +81,7 @@ __all__ = [
     "BlockEquations",
     "BlockHandle",
     "BlockLibrary",
+    "Bookmark",
     "Bus",
     "BusAssignment",
     "BusCreator",

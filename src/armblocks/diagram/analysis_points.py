@@ -96,22 +96,23 @@ def with_analysis_points(
 
     An input or opening is an output port ``block/port`` (all its connections), an input port (its
     connection), or a block with a single output. An input may also be a tunable parameter,
-    ``block.parameter``, or that of a mask, for which :func:`~armblocks.diagram.mask_tuning.added_parameter`
-    makes the equations. Where a signal is both, the perturbation is inserted after the opening. Raises
-    ``UnknownNameError`` for unknown names and ``InputError`` for duplicate or unsuitable ones.
+    ``block.parameter``, or a mask parameter, for which :func:`~armblocks.diagram.mask_tuning.added_parameter`
+    adds the equations. Where a signal is an input and an opening, the perturbation is inserted after the
+    opening. Raises ``UnknownNameError`` for unknown names and ``InputError`` for duplicate or unsuitable
+    names.
     """
     form = flatten_hierarchy(diagram)
     hierarchy, diagram = diagram, form.diagram
     parameters: dict[str, str] = {}
     perturbed: dict[PortRef, str] = {}
     masked = mask_parameters(hierarchy)
-    for name in _unique(inputs, "input"):
+    for name in _checked_unique(inputs, "input"):
         path = name if name in masked and name not in diagram.blocks else _parameter(diagram, name)
         if path is None:
             perturbed[_port(form, name, "input")] = name
         else:
             parameters[name] = path
-    opened = {_port(form, name, "opening") for name in _unique(openings, "opening")}
+    opened = {_port(form, name, "opening") for name in _checked_unique(openings, "opening")}
     if not perturbed and not opened:
         return PreparedDiagram(diagram=hierarchy, inputs=parameters, levels={})
     shapes = infer_shapes(hierarchy)
@@ -135,7 +136,7 @@ def with_analysis_points(
     )
 
 
-def _unique(names: Sequence[str], kind: str) -> Sequence[str]:
+def _checked_unique(names: Sequence[str], kind: str) -> Sequence[str]:
     for index, name in enumerate(names):
         if name in names[:index]:
             raise InputError(

@@ -40,7 +40,7 @@ class Block(ABC):
 
     A *sampled* block (``sampled = True``, parameter ``sample_time``) is active at the ticks of its clock
     only. At a tick its outputs are computed from the previous discrete states and then held; ``updates``
-    gives the next discrete states. Its equations find the period (s) as ``p["T"]``.
+    gives the next discrete states. Its equations read the period (s) as ``p["T"]``.
 
     A block with *modes* switches between equations at *events*. A mode is constant between events, so that
     the continuous equations are smooth. ``guards`` gives the functions whose zeros are events and ``resets``
@@ -135,7 +135,7 @@ class Block(ABC):
     def parameters_behind_inputs(self) -> tuple[str, ...]:
         """Parameters that the equations replace by run inputs computed from them.
 
-        Such a run input is not a parameter of the block but an attribute of the same name.
+        The run input is an attribute of the block, not a parameter, and has the same name.
         """
         return ()
 
@@ -168,7 +168,7 @@ class Block(ABC):
         return (cls.__doc__ or "").strip().splitlines()[0]
 
     def own_parameters(self) -> tuple[Parameter, ...]:
-        """The parameters of this block: those of its type, and of a diagram inside those of its mask."""
+        """The parameters of this block: those of its type and, for a subsystem, those of its mask."""
         return self.parameters()
 
     def parameter_value(self, name: str) -> Value:
@@ -216,10 +216,9 @@ class Block(ABC):
         return dataclasses.replace(self, **values)
 
     def check(self) -> None:  # noqa: B027 - optional, most blocks have no such checks
-        """Raise ``InputError`` for inconsistent parameters; each value alone is already checked."""
+        """Raise ``InputError`` for inconsistent parameters. Each single parameter is already checked."""
 
-    # -- ports and states
-    # --------------------------------------------------------------------------------------------
+    # -- ports and states --------------------------------------------------------------------------------
 
     def input_ports(self) -> tuple[Port, ...]:
         """The input ports, in order."""
@@ -230,7 +229,7 @@ class Block(ABC):
         return ()
 
     def bus_inputs(self) -> tuple[str, ...]:
-        """Inputs that may be buses with equal elements, for blocks that pass signals on unchanged.
+        """Inputs that may be buses with equal elements, for blocks that select, delay or hold signals.
 
         The block is then copied for each signal, and every output is a bus of the copies' outputs.
         """
@@ -264,23 +263,23 @@ class Block(ABC):
         return ()
 
     def delay_lines(self, inputs: Shapes) -> tuple[DelayLine, ...]:
-        """Delayed inputs that the equations read, each in ``differentiated_inputs`` too."""
+        """Delayed inputs that the equations read; each must be in ``differentiated_inputs`` too."""
         return ()
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         """Shapes of the outputs whose port does not declare one, from the shapes of all inputs.
 
-        By default it is the broadcast shape of the inputs without a declared shape and of the parameters in
-        ``broadcast_parameters``. Raises ``InputError`` where the shapes do not fit.
+        By default, this is the broadcast shape of the parameters in ``broadcast_parameters`` and of the
+        inputs without a declared shape. Raises ``InputError`` where the shapes do not fit.
         """
-        ends = [port.name for port in self.output_ports() if port.shape is None]
-        if self.virtual or not ends:
+        names = [port.name for port in self.output_ports() if port.shape is None]
+        if self.virtual or not names:
             return {}
         own = {port.name for port in self.input_ports() if port.shape is not None}
         wide = {name: shape for name, shape in inputs.items() if name not in own}
         for name in self.broadcast_parameters:
             wide[f"parameter {name}" if name in wide else name] = shape_of(self.parameter_value(name))
-        return dict.fromkeys(ends, broadcast(wide))
+        return dict.fromkeys(names, broadcast(wide))
 
     def assumed_output_shapes(self) -> Shapes:
         """Shapes to assume for outputs in a loop before the inputs are known (an integrator's initial value).
@@ -304,7 +303,7 @@ class Block(ABC):
     # -- equations ---------------------------------------------------------------------------------------
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        """Value of every output port (but those of ``time_derivatives``)."""
+        """Value of every output port (except those of ``time_derivatives``)."""
         return {}
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
@@ -361,8 +360,9 @@ class Block(ABC):
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         """The consistent value of every mode at the present time.
 
-        It is computed from the present values. For a stateful mode ``x`` has the present mode, for a
-        hysteresis mode the previous mode: the mode before the instant, or before the latest event at it.
+        The mode is computed from the present values. For a stateful mode, ``x`` contains its present value.
+        For a hysteresis mode, ``x`` contains its previous value: before the instant, or before the latest
+        event at this instant.
         """
         return {}
 
@@ -383,7 +383,7 @@ class Block(ABC):
 
         ``e``, by guard: +1 or -1 where it triggered upwards or downwards, else 0. If all are 0, the event
         belongs to another block; the result must then equal the old values, unless the present inputs or
-        states require others.
+        states require other values.
         """
         return {}
 
@@ -394,7 +394,7 @@ class Block(ABC):
     def breakpoints(self, p: Signals) -> tuple[SX, ...]:
         """Times (s) at which an output or its derivative jumps, as far as they follow from parameters.
 
-        At such a time ``outputs`` gives the right limit. Its condition ``t >= time`` must use the same
+        At a breakpoint, ``outputs`` gives the right limit. Its condition ``t >= time`` must use the same
         expression as here, because another expression may be rounded to another time.
         """
         return ()
@@ -403,10 +403,10 @@ class Block(ABC):
 @cache
 def _parameters_of(kind: type[Block]) -> tuple[Parameter, ...]:
     fields = [entry for entry in dataclasses.fields(kind) if "formulas" not in entry.metadata]
-    return tuple(dataclasses.replace(_declared(entry), name=entry.name) for entry in fields)
+    return tuple(dataclasses.replace(_declaration(entry), name=entry.name) for entry in fields)
 
 
-def _declared(field: dataclasses.Field[Any]) -> Parameter:
+def _declaration(field: dataclasses.Field[Any]) -> Parameter:
     # A plain field would be missing in files and dialogs: an error of the block's author.
     if "parameter" not in field.metadata:
         raise TypeError(f"field '{field.name}' of a block must be declared with parameter(...)")

@@ -19,7 +19,7 @@ from casadi import SX, Function, densify, jtimes, vertcat
 from armblocks.diagram.block import Block, Shapes, Signals
 from armblocks.diagram.conditional_equations import FIRE, conditional
 from armblocks.diagram.features import Arguments, Features, SlotKind, features_of
-from armblocks.diagram.flat_values import natural, spread, tunable_slots
+from armblocks.diagram.flat_values import broadcast_column, named_values, tunable_slots
 from armblocks.diagram.generated_modes import (
     evaluated_conditions,
     with_modes_of_conditions,
@@ -51,8 +51,8 @@ class Group:
 
     ``expression`` is the flat column of all slots over ``t``, the flat column ``p`` of the block's tunable
     parameters, and ``z``: the flat continuous states, discrete states and modes, inputs, and events, that the
-    group depends on. An input ``u'`` is the time derivative of the input ``u``. ``timed``: whether it depends
-    on time explicitly.
+    group depends on. An input ``u'`` is the time derivative of the input ``u``. ``timed``: whether the
+    group depends on time explicitly.
     """
 
     slots: tuple[BlockSlot, ...]
@@ -83,17 +83,17 @@ class Group:
     def rate(self, order: int) -> Function:
         """The ``order``-th time derivative as a function of ``t, p, z, z', …`` up to that order of z.
 
-        f' = df/dt + df/dz z' + df/dz' z'' + …: exact, by CasADi's forward differentiation. It is cached
-        here, because it is a pure function of the group.
+        f' = df/dt + df/dz z' + df/dz' z'' + …: exact, by CasADi's forward differentiation. The
+        result is cached in the group.
         """
         if not self._rates:
             self._rates.append((self.expression, (self.z,)))
         while len(self._rates) <= order:
             expression, orders = self._rates[-1]
-            following = SX.sym(f"z{len(orders)}", self.z.numel())
-            along = vertcat(self.t, *orders)
-            seeds = vertcat(1.0, *orders[1:], following)
-            self._rates.append((densify(jtimes(expression, along, seeds)), (*orders, following)))
+            next_order = SX.sym(f"z{len(orders)}", self.z.numel())
+            variables = vertcat(self.t, *orders)
+            seeds = vertcat(1.0, *orders[1:], next_order)
+            self._rates.append((densify(jtimes(expression, variables, seeds)), (*orders, next_order)))
         if order not in self._functions:
             expression, orders = self._rates[order]
             self._functions[order] = Function("f", [self.t, self.p, *orders], [expression])
@@ -105,7 +105,7 @@ class BlockEquations:
     """All equations of one block: its states and its groups of slots."""
 
     features: Features
-    """What the block declares, gated by the subsystem that contains it."""
+    """The features of the block, gated by the conditional subsystem that contains it."""
     states: tuple[State, ...]
     discrete: tuple[State, ...]
     """Discrete states, then delayed values, then their derivatives (``name'``), then modes."""
@@ -149,8 +149,10 @@ def block_equations(
 ) -> BlockEquations:
     """Trace a block whose inputs have these shapes; equal structures are traced once.
 
-    ``period`` s: of a sampled block's clock. ``consistent_modes``: with modes computed from the present
-    values instead of by events. ``hidden``: the hidden inputs of a block in a conditional subsystem."""
+    ``period``: period of a sampled block's clock, s. ``consistent_modes``: whether modes are computed from
+    the present values instead of at events. ``hidden``: the hidden inputs of a block in a conditional
+    subsystem.
+    """
     clocked = block.sampled and FIRE not in hidden
     inputs = block.inputs_of_the_run()
     return _trace(
@@ -176,14 +178,14 @@ def _trace(structure: _Structure) -> BlockEquations:
         own = conditional(
             own, structure.hidden, clocked=structure.clocked, ticking=structure.consistent_modes
         )
-    # Conditions whose change is an event are modes; the others are evaluated directly.
+    # Conditions whose change is an event become modes; all others are evaluated directly.
     located = () if structure.consistent_modes else tuple(entry for entry in own.conditions if entry.located)
     requested = tuple(entry for entry in own.conditions if entry not in located)
     features = with_modes_of_conditions(with_previous_modes(own, clocked=structure.clocked), located)
     delayed = tuple(
         State(f"{line.name}{mark}", line.shape, line.doc) for mark in ("", "'") for line in features.delays
     )
-    ends = {
+    layout = {
         "x": [Slot(state.name, state.shape) for state in features.states],
         "z": [Slot(state.name, state.shape) for state in (*features.discrete, *delayed, *features.modes)],
         "u": [Slot(name, shape) for name, shape in features.inputs.items()]
@@ -191,9 +193,9 @@ def _trace(structure: _Structure) -> BlockEquations:
         "e": [Slot(guard.name, guard.shape) for guard in features.guards],
         "p": list(tunable_slots(structure.block)),
     }
-    symbols = {letter: SX.sym(letter, sum(slot.size for slot in slots)) for letter, slots in ends.items()}
+    symbols = {letter: SX.sym(letter, sum(slot.size for slot in slots)) for letter, slots in layout.items()}
     t = SX.sym("t")
-    x, z, u, e, p = (dict(natural(slots, symbols[letter])) for letter, slots in ends.items())
+    x, z, u, e, p = (dict(named_values(slots, symbols[letter])) for letter, slots in layout.items())
     if structure.clocked:
         p["T"] = SX(structure.period)
     at = Arguments(t, {**x, **z}, u, p, e)
@@ -212,8 +214,8 @@ def _trace(structure: _Structure) -> BlockEquations:
     slots = [
         BlockSlot(kind, name, shape) for kind, named in required.items() for name, shape in named.items()
     ]
-    flat = [spread(SX(results[slot.kind][slot.name]), slot.shape) for slot in slots]
-    groups = _grouped(slots, flat, t, symbols, ends)
+    flat = [broadcast_column(SX(results[slot.kind][slot.name]), slot.shape) for slot in slots]
+    groups = _grouped(slots, flat, t, symbols, layout)
     return BlockEquations(
         features=own,
         states=features.states,
@@ -262,10 +264,10 @@ def _variable_delays(groups: Sequence[Group]) -> frozenset[str]:
 
 
 def _grouped(
-    slots: list[BlockSlot], flat: list[SX], t: SX, symbols: dict[str, SX], ends: dict[str, list[Slot]]
+    slots: list[BlockSlot], flat: list[SX], t: SX, symbols: dict[str, SX], layout: dict[str, list[Slot]]
 ) -> tuple[Group, ...]:
-    letters = [(letter, slot.name) for letter in "xzue" for slot in ends[letter]]
-    parts = [part for letter in "xzue" for part in _parts(symbols[letter], ends[letter])]
+    letters = [(letter, slot.name) for letter in "xzue" for slot in layout[letter]]
+    parts = [part for letter in "xzue" for part in _parts(symbols[letter], layout[letter])]
     dependence = Function("f", [t, symbols["p"], *parts], flat) if slots else None
     members: dict[tuple[bool, ...], list[int]] = {}
     timed: set[int] = set()
@@ -277,8 +279,10 @@ def _grouped(
         members.setdefault(pattern, []).append(index)
     groups: list[Group] = []
     for pattern, indices in members.items():
-        on = [part for part in range(len(parts)) if pattern[part]]
-        names = {letter: tuple(letters[k][1] for k in on if letters[k][0] == letter) for letter in "xzue"}
+        dependencies = [part for part in range(len(parts)) if pattern[part]]
+        names = {
+            letter: tuple(letters[k][1] for k in dependencies if letters[k][0] == letter) for letter in "xzue"
+        }
         groups.append(
             Group(
                 slots=tuple(slots[index] for index in indices),
@@ -290,7 +294,7 @@ def _grouped(
                 expression=vertcat(*[flat[index] for index in indices]),
                 t=t,
                 p=symbols["p"],
-                z=vertcat(*[parts[part] for part in on], SX(0, 1)),
+                z=vertcat(*[parts[part] for part in dependencies], SX(0, 1)),
             )
         )
     return tuple(groups)

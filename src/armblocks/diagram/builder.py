@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from armblocks.diagram.block import Block
+from armblocks.diagram.bookmarks import Bookmark, check_bookmark_name
 from armblocks.diagram.check import check_diagram
 from armblocks.diagram.comments import Comment, check_comment
 from armblocks.diagram.diagram import Connection, Diagram, Note, Placement, block_in_scope
@@ -36,7 +37,7 @@ class BlockHandle:
         self.block = block
 
     def __getitem__(self, port: str) -> PortRef:
-        """The port of this name; raises ``UnknownNameError`` with the nearest."""
+        """The port of this name; raises ``UnknownNameError`` with the nearest name."""
         known = [entry.name for entry in (*self.block.output_ports(), *self.block.input_ports())]
         if port not in known:
             raise UnknownNameError("port", port, known, where=_where(self.name, self.block))
@@ -67,8 +68,8 @@ class DiagramBuilder:
             inner.output("force", inner.add("gain", Gain(gain=5.0), error))
         builder.connect(builder["controller"], motor["force"])
 
-    It may declare parameters, its *mask*, which have the paths ``"controller.kp"`` outside. Parameters of
-    blocks inside can be formulas of them::
+    The inner diagram may declare parameters, its *mask*. In the outer diagram they have the paths
+    ``"controller.kp"``. Parameters of the inner blocks can be formulas of the mask parameters::
 
         with builder.subsystem("controller", …) as inner:
             kp = inner.parameter("kp", 5.0, unit="N/m", doc="stiffness")
@@ -98,6 +99,7 @@ class DiagramBuilder:
         self._layout: dict[str, Placement] = {}
         self._bends: dict[Connection, tuple[float, ...]] = {}
         self._notes: dict[str, Note] = {}
+        self._bookmarks: dict[str, Bookmark] = {}
         self._logged: dict[PortRef, None] = {}
         self._commented: dict[str, Comment] = {}
         self._signal_names: dict[PortRef, str] = {}
@@ -112,7 +114,7 @@ class DiagramBuilder:
         """Declare a parameter of this diagram, and return the formula that is its name.
 
         ``rules`` are those of a block's parameter: ``minimum``, ``above``, ``maximum``, ``choices``, …
-        ``value`` is its present value, if that is not the default; inside a ``with builder.subsystem(…)`` it
+        ``value`` is the present value, by default ``default``. Inside a ``with builder.subsystem(…)`` it
         may be a formula of the parameters of the enclosing diagram. Raises ``InputError``.
         """
         return self.declare(mask_parameter(name, default, doc=doc, unit=unit, **rules), value)
@@ -156,7 +158,7 @@ class DiagramBuilder:
                 f"{len(inputs)} inputs are given",
                 where=_where(name, block),
                 allowed=f"{len(ports)}: {', '.join(port.name for port in ports)}" if ports else "no inputs",
-                fix="remove the last ones",
+                fix="remove the last inputs",
             )
         self._used_names[folded(name)] = name
         self._blocks[name] = block
@@ -172,15 +174,15 @@ class DiagramBuilder:
         return handle
 
     def __getitem__(self, name: str) -> BlockHandle:
-        """The block of this name; raises ``UnknownNameError`` with the nearest."""
+        """The block of this name; raises ``UnknownNameError`` with the nearest name."""
         return BlockHandle(name, self._known(name))
 
     def input(self, name: str, **parameters: Any) -> BlockHandle:
-        """Add an In block: the next input of the subsystem that this diagram is inside."""
+        """Add an In block: the next input port of the enclosing subsystem."""
         return self.add(name, Inport(**parameters))
 
     def output(self, name: str, source: Source, **parameters: Any) -> BlockHandle:
-        """Add an Out block: the next output of the subsystem that this diagram is inside."""
+        """Add an Out block: the next output port of the enclosing subsystem."""
         return self.add(name, Outport(**parameters), source)
 
     @contextmanager
@@ -243,6 +245,14 @@ class DiagramBuilder:
         """Add an annotation to the sheet under a unique ``name``."""
         self._notes[name] = note
 
+    def bookmark(self, name: str, part: Bookmark) -> None:
+        """Store a part of the sheet under a name, to which the studio can return.
+
+        Raises ``DiagramError`` for an invalid name.
+        """
+        check_bookmark_name(name, self._bookmarks, f"diagram '{self.name}'")
+        self._bookmarks[name] = part
+
     def log(self, source: Source) -> None:
         """Log an output without a Scope: reports and the studio show its traces.
 
@@ -278,7 +288,7 @@ class DiagramBuilder:
         self.comment(self._commentable(block, "out"), "out")
 
     def comment_through(self, block: BlockHandle | str) -> None:
-        """Comment a block through: each output equals the input of the same index, as if it were a wire.
+        """Comment a block through: each output equals the input of the same index.
 
         ``build`` checks that their shapes agree. Raises ``UnknownNameError``, and ``DiagramError`` for blocks
         with fewer inputs than outputs, for those without outputs, and for In and Out blocks.
@@ -286,7 +296,7 @@ class DiagramBuilder:
         self.comment(self._commentable(block, "through"), "through")
 
     def comment(self, name: str, comment: Comment) -> None:
-        """Comment a block out or through without a check; ``build`` checks it. For readers of files."""
+        """Comment a block out or through without a check; ``build`` checks it. File readers use it."""
         self._known(name)
         self._commented[name] = comment
 
@@ -316,6 +326,7 @@ class DiagramBuilder:
             layout=self._layout,
             bends=self._bends,
             notes=self._notes,
+            bookmarks=self._bookmarks,
             settings=self.settings,
             extras=self._extras,
             description=self.description,

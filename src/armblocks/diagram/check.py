@@ -6,7 +6,7 @@ from armblocks.diagram.comments import active_levels, check_connected
 from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.levels import levels_of
 from armblocks.diagram.model import diagram_model
-from armblocks.diagram.structure import Inport, Outport, ends
+from armblocks.diagram.structure import Inport, Outport, port_blocks
 from armblocks.diagram.virtual_wiring import From, Goto
 
 
@@ -14,11 +14,11 @@ def check_diagram(diagram: Diagram) -> None:
     """Raise ``DiagramError`` for a diagram that cannot be traced.
 
     Reasons are unconnected inputs, shapes or sample times that do not fit, and unsolvable algebraic loops.
-    For a part of a larger diagram only connections and ends are checked, because its inputs are unknown.
+    In a part of a larger diagram, only connections and port numbers are checked: its inputs are unknown.
     """
     if _is_part(diagram):
-        ends(diagram, Inport)
-        ends(diagram, Outport)
+        port_blocks(diagram, Inport)
+        port_blocks(diagram, Outport)
         check_connected(levels_of(diagram))
     else:
         diagram_model(diagram)

@@ -2,8 +2,8 @@
 
 A block that is commented *out* has no states, events, views or logged signals. Its outputs are zeros, with
 the shapes that they have in the model without comments, and its inputs are unused. A block that is commented
-*through* is replaced by wires: each output equals the input of the same index. A commented subsystem hides
-all blocks inside. The replacement is the pass :mod:`armblocks.diagram.passes.comments`.
+*through* is replaced by connections: each output equals the input of the same index. A commented subsystem
+hides all blocks inside. The replacement is the pass :mod:`armblocks.diagram.passes.comments`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ MAX_LISTED = 20
 
 
 def check_comment(name: str, block: Block, comment: str) -> Comment:
-    """The comment of a block. Raises ``DiagramError`` for a block that cannot be commented in this way."""
+    """The checked comment of a block. Raises ``DiagramError`` for an invalid comment."""
     where = f"block '{name}' ({block.title})"
     if comment != "out" and comment != "through":
         raise DiagramError(
@@ -58,7 +58,7 @@ def data_inputs(block: Block) -> tuple[Port, ...]:
 
 
 def passed_ports(block: Block) -> tuple[tuple[str, str], ...]:
-    """The input and the output of every wire that replaces a block that is commented through."""
+    """The pairs (input, output) of a block that is commented through; each becomes a direct connection."""
     return tuple((into.name, out.name) for into, out in zip(data_inputs(block), block.output_ports()))
 
 
@@ -91,9 +91,9 @@ def active_levels(levels: Mapping[str, Diagram]) -> dict[str, Diagram]:
 
 
 def open_inputs(levels: Mapping[str, Diagram]) -> Iterator[PortRef]:
-    """The inputs of a hierarchy that need a driver and have none, by path.
+    """The unconnected inputs of a hierarchy, by path.
 
-    The inputs of blocks that are commented out need no driver, nor do those inside commented subsystems.
+    Inputs of blocks that are commented out, and inputs inside commented subsystems, need no driver.
     """
     for level, diagram in active_levels(levels).items():
         drivers = diagram.drivers
@@ -108,7 +108,7 @@ def open_inputs(levels: Mapping[str, Diagram]) -> Iterator[PortRef]:
 
 
 def check_connected(levels: Mapping[str, Diagram]) -> None:
-    """Raise ``DiagramError`` that lists the inputs that nothing drives, of all diagrams of a hierarchy."""
+    """Raise ``DiagramError`` with a list of the unconnected inputs of all diagrams of a hierarchy."""
     unconnected = [str(ref) for ref in open_inputs(levels)]
     if unconnected:
         shown = ", ".join(unconnected[:MAX_LISTED])

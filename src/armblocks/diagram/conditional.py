@@ -54,8 +54,9 @@ class EnabledSubsystem(DiagramBlock):
 class TriggeredSubsystem(DiagramBlock):
     """A triggered subsystem: it executes once whenever its input trigger fires; outputs are held in between.
 
-    The trigger fires where it becomes positive (rising), stops being positive (falling), or either. Sampled
-    blocks inside take one step at each trigger event; their period is the time since the last one.
+    The trigger fires where it becomes positive (rising), stops being positive (falling), or at both (either).
+    Sampled blocks inside take one step at each trigger event; their period is the time since the previous
+    event.
     """
 
     title: ClassVar[str] = "Triggered Subsystem"
@@ -152,7 +153,7 @@ class Merge(Block):
 
     inputs: int = parameter(2, minimum=1, doc="number of inputs")
     initial: ArrayLike = parameter(
-        0.0, kind=ParameterKind.ARRAY, doc="the output before any of them has been active"
+        0.0, kind=ParameterKind.ARRAY, doc="the output before any subsystem has been active"
     )
 
     def input_ports(self) -> tuple[Port, ...]:

@@ -21,10 +21,13 @@ from armblocks.diagram.port import Guard, State, name_before
 
 ON, RESTART, FIRE, ELAPSED = "?on", "?restart", "?fire", "?elapsed"
 """Hidden inputs: whether the block is active; whether its states are reset now; whether the trigger fires
-now; and the time since it fired before, s."""
-_DONE, _BEGUN, _WORKS, _TURNED = "?done", "?begun", "?works", "?turned"
-"""Hidden states: whether this tick, and whether this instant has restarted the block. A hidden mode: whether
-the block's modes are consistent since the control is on. A hidden guard: the control itself."""
+now; the time since the previous trigger event, s."""
+_TICK_RESET, _INSTANT_RESET = "?done", "?begun"
+"""Hidden states: whether the present tick has reset the block, and whether the present instant has."""
+_MODES_CONSISTENT = "?works"
+"""Hidden mode: whether the control is on and the modes of the block are consistent."""
+_CONTROL_GUARD = "?turned"
+"""Hidden guard: the control crosses 0.5."""
 
 
 def conditional(features: Features, gate: Collection[str], *, clocked: bool, ticking: bool) -> Features:
@@ -32,7 +35,7 @@ def conditional(features: Features, gate: Collection[str], *, clocked: bool, tic
 
     ``clocked``: the block is active at the ticks of a clock. ``ticking``: the equations are those of a tick,
     where a restart acts before all equations. At an event a restart acts through the resets, one iteration
-    after the control has changed; the hidden state ``?done`` prevents a second restart after that of a tick.
+    after the control has changed. The hidden state ``?done`` prevents a second restart after that of a tick.
     """
     own = with_hidden_inputs(features, gate)
     if ON in gate and clocked:
@@ -53,9 +56,9 @@ def conditional(features: Features, gate: Collection[str], *, clocked: bool, tic
 
 
 def with_hidden_inputs(features: Features, gate: Collection[str]) -> Features:
-    """With hidden inputs and states, which the block's own equations do not see.
+    """Add hidden inputs. The block's own equations read neither hidden inputs nor hidden states.
 
-    A triggered block finds the time since it fired before as its period ``T``.
+    In a triggered block, the period ``T`` is the time since the previous trigger event.
     """
 
     def own(at: Arguments) -> Arguments:
@@ -68,17 +71,19 @@ def with_hidden_inputs(features: Features, gate: Collection[str]) -> Features:
 
 
 def while_on(features: Features, kinds: Iterable[SlotKind]) -> Features:
-    """With equations of these roles that hold while the control is on; see ``SlotKind.while_off``.
+    """Apply equations of these roles only while the control is on; see ``SlotKind.while_off``.
 
-    Where the control turns off at an instant, a hysteresis mode may have changed in an iteration in which the
-    control was still on. It returns to its previous value.
+    A hysteresis mode may change in an iteration in which the control is still on, before the control turns
+    off at the same instant. The mode then returns to its previous value.
     """
     previous = {mode.name: mode.before for mode in features.modes if mode.hysteresis}
 
     def off_value(kind: SlotKind, name: str, at: Arguments) -> SX | float:
+        if kind is SlotKind.MODE:
+            return at.x[previous.get(name, name)]
         if kind is SlotKind.CONTRADICTION and name in previous:
             return at.x[name] != at.x[previous[name]]
-        return at.x[previous.get(name, name)] if kind.while_off is WhileOff.KEPT else 0.0
+        return at.x[name] if kind.while_off is WhileOff.KEPT else 0.0
 
     def gated(kind: SlotKind, equation: Equation) -> Equation:
         return lambda at: {
@@ -96,23 +101,25 @@ def while_on(features: Features, kinds: Iterable[SlotKind]) -> Features:
 
 
 def restarted_before_a_tick(features: Features) -> Features:
-    """With equations that see the initial states wherever the block is restarted; the previous values of its
-    modes are 0."""
+    """Evaluate equations at the initial states where the block is restarted.
+
+    The previous values of its modes are then 0.
+    """
     zeros = {mode.name: SX(0.0) for mode in features.modes}
 
-    def begun(at: Arguments, modes: Signals) -> Arguments:
-        starts = {**_starts(features, at), **modes}
+    def at_start(at: Arguments, modes: Signals) -> Arguments:
+        starts = {**_initial_states(features, at), **modes}
         return at.with_states(
             {name: if_else(at.u[RESTART] != 0.0, start, at.x[name]) for name, start in starts.items()}
         )
 
-    changed = features.at_arguments(lambda at: begun(at, {}))
+    changed = features.at_arguments(lambda at: at_start(at, {}))
     modes = features.equations[SlotKind.MODE]
-    return changed.with_equations({SlotKind.MODE: lambda at: modes(begun(at, zeros))})
+    return changed.with_equations({SlotKind.MODE: lambda at: modes(at_start(at, zeros))})
 
 
 def executed_when_fired(features: Features) -> Features:
-    """With updates that are made when the trigger fires, in place of a tick."""
+    """Apply the updates when the trigger fires, instead of at ticks."""
     resets, updates = features.equations[SlotKind.RESET], features.equations[SlotKind.UPDATE]
 
     def fired(at: Arguments) -> Signals:
@@ -127,10 +134,10 @@ def executed_when_fired(features: Features) -> Features:
 
 
 def restarted(features: Features, *, clocked: bool) -> Features:
-    """With states and modes that are reset at a restart, and guards that are silent until its instant ends.
+    """Reset states and modes at a restart, and silence the guards until the end of that instant.
 
-    Modes are reset as at the start of a run: to their consistent values, to 0 while the control is off.
-    ``clocked``: the block works at the ticks of a clock. After a restart by a tick, discrete states keep
+    Modes are reset as at the start of a run: to their consistent values, or to 0 while the control is off.
+    ``clocked``: the block is active at the ticks of a clock. After a restart by a tick, discrete states keep
     their values after the tick; continuous states and modes are reset.
     """
     resets, updates = features.equations[SlotKind.RESET], features.equations[SlotKind.UPDATE]
@@ -140,72 +147,79 @@ def restarted(features: Features, *, clocked: bool) -> Features:
     def reset(at: Arguments) -> Signals:
         after = dict(resets(at))
         restarts = at.u[RESTART] != 0.0
-        starts = _starts(features, at)
+        starts = _initial_states(features, at)
         if clocked:
-            after[_DONE] = if_else(restarts, 0.0, at.x[_DONE])
-            done = at.x[_DONE] != 0.0
+            after[_TICK_RESET] = if_else(restarts, 0.0, at.x[_TICK_RESET])
+            done = at.x[_TICK_RESET] != 0.0
             after_tick = {name: after.get(name, at.x[name]) for name in ticked}
             starts |= {name: if_else(done, value, starts[name]) for name, value in after_tick.items()}
-        begins = {**starts, **_first_modes(modes, at.with_states(starts))}
-        for name, value in begins.items():
+        initial_values = {**starts, **_initial_modes(modes, at.with_states(starts))}
+        for name, value in initial_values.items():
             after[name] = if_else(restarts, value, after.get(name, at.x[name]))
         if features.guards:
-            after[_BEGUN] = if_else(at.u[RESTART] != 0.0, 1.0, at.x[_BEGUN])
+            after[_INSTANT_RESET] = if_else(at.u[RESTART] != 0.0, 1.0, at.x[_INSTANT_RESET])
         return after
 
     def update(at: Arguments) -> Signals:
-        after = {**updates(at), _DONE: at.u[RESTART]}
+        after = {**updates(at), _TICK_RESET: at.u[RESTART]}
         if features.guards:
-            after[_BEGUN] = if_else(at.u[RESTART] != 0.0, 1.0, at.x[_BEGUN])
+            after[_INSTANT_RESET] = if_else(at.u[RESTART] != 0.0, 1.0, at.x[_INSTANT_RESET])
         return after
 
     equations: dict[SlotKind, Equation] = {SlotKind.RESET: reset}
     added: list[State] = []
     if clocked:
         equations[SlotKind.UPDATE] = update
-        added.append(State(_DONE, (), "whether this tick has reset the block"))
+        added.append(State(_TICK_RESET, (), "whether this tick has reset the block"))
     if features.guards:
-        added.append(State(_BEGUN, (), "1 from a restart to the end of its instant", momentary=True))
+        added.append(State(_INSTANT_RESET, (), "1 from a restart to the end of its instant", momentary=True))
     return dataclasses.replace(
         features.with_equations(equations),
         discrete=(*features.discrete, *added),
-        guards=tuple(dataclasses.replace(guard, silenced_by=_BEGUN) for guard in features.guards),
+        guards=tuple(dataclasses.replace(guard, silenced_by=_INSTANT_RESET) for guard in features.guards),
     )
 
 
 def with_consistent_modes(features: Features) -> Features:
-    """With modes that become consistent when the control turns on, before any guard is evaluated.
+    """Make the modes consistent when the control turns on, before any guard is evaluated.
 
-    Until then previous modes, and the values captured with them, are those from before the instant.
+    Until then, previous modes and the values captured with them are left limits of the instant.
     """
     equations = features.equations
     captured_with_modes = {state.name for state in features.discrete if state.hysteresis}
 
     def modes(at: Arguments) -> Signals:
-        return {**equations[SlotKind.MODE](at), _WORKS: at.u[ON] != 0.0}
+        return {**equations[SlotKind.MODE](at), _MODES_CONSISTENT: at.u[ON] != 0.0}
 
     def contradictions(at: Arguments) -> Signals:
         # Modes are constant while the control is off; `reset` computes all of them when it turns on.
-        return {**equations[SlotKind.CONTRADICTION](at), _WORKS: (at.u[ON] != 0.0) != at.x[_WORKS]}
+        return {
+            **equations[SlotKind.CONTRADICTION](at),
+            _MODES_CONSISTENT: (at.u[ON] != 0.0) != at.x[_MODES_CONSISTENT],
+        }
 
     def guards(at: Arguments) -> Signals:
         values = equations[SlotKind.GUARD](at)
-        consistent = {name: if_else(at.x[_WORKS] != 0.0, value, 0.0) for name, value in values.items()}
-        return {**consistent, _TURNED: at.u[ON] - 0.5}
+        consistent = {
+            name: if_else(at.x[_MODES_CONSISTENT] != 0.0, value, 0.0) for name, value in values.items()
+        }
+        return {**consistent, _CONTROL_GUARD: at.u[ON] - 0.5}
 
     def reset(at: Arguments) -> Signals:
         after = dict(equations[SlotKind.RESET](at))
-        begins = logic_and(at.u[ON] != 0.0, at.x[_WORKS] == 0.0)
+        turns_on = logic_and(at.u[ON] != 0.0, at.x[_MODES_CONSISTENT] == 0.0)
         present = {**at.x, **after}
         earlier = {name: present[name_before(name)] for name in present if name_before(name) in present}
         for name, value in modes(dataclasses.replace(at, x={**present, **earlier})).items():
-            after[name] = if_else(begins, value, after.get(name, at.x[name]))
-        after[_WORKS] = at.u[ON] != 0.0
+            after[name] = if_else(turns_on, value, after.get(name, at.x[name]))
+        after[_MODES_CONSISTENT] = at.u[ON] != 0.0
         return after
 
     def captures(at: Arguments) -> Signals:
         return {
-            name: if_else(at.x[_WORKS] != 0.0, value, at.x[name]) if name in captured_with_modes else value
+            name: if_else(at.x[_MODES_CONSISTENT] != 0.0, value, at.x[name])
+            if name in captured_with_modes
+            else value
             for name, value in equations[SlotKind.CAPTURE](at).items()
         }
 
@@ -222,28 +236,28 @@ def with_consistent_modes(features: Features) -> Features:
         changed,
         modes=(
             *(
-                dataclasses.replace(mode, stored_while=_WORKS) if mode.hysteresis else mode
+                dataclasses.replace(mode, stored_while=_MODES_CONSISTENT) if mode.hysteresis else mode
                 for mode in features.modes
             ),
-            State(_WORKS, (), "whether the modes are consistent"),
+            State(_MODES_CONSISTENT, (), "whether the modes are consistent"),
         ),
-        guards=(*features.guards, Guard(_TURNED, (), "the control")),
+        guards=(*features.guards, Guard(_CONTROL_GUARD, (), "the control")),
     )
 
 
 def _plain(values: Signals) -> dict[str, SX]:
-    """The values that the block itself has declared."""
+    """The values without those of hidden names."""
     return {name: value for name, value in values.items() if not name.startswith("?")}
 
 
-def _starts(features: Features, at: Arguments) -> dict[str, SX]:
+def _initial_states(features: Features, at: Arguments) -> dict[str, SX]:
     """The initial states after a restart; the previous values of modes are 0."""
     before = {name_before(name) for name in at.x} & set(at.x)
-    starts = {name: SX(value) for name, value in features.starts(at.p).items()}
+    starts = {name: SX(value) for name, value in features.initial_states(at.p).items()}
     return starts | {name: SX(0.0) for name in sorted(before)}
 
 
-def _first_modes(modes: Equation, at: Arguments) -> Signals:
+def _initial_modes(modes: Equation, at: Arguments) -> Signals:
     """The consistent modes at a restart, with present modes 0 as at the start of a run."""
     zero = {name: SX(at.x[name]) * 0.0 for name in modes(at)}
     return modes(at.with_states(zero))

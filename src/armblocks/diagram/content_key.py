@@ -1,9 +1,10 @@
 """A hash key of everything that a diagram's equations depend on: equal keys mean equal equations.
 
-With it the disk cache finds a diagram that an earlier process compiled, so that it is not traced again. The
-key covers all blocks by class with the exact values of all parameters (tables, robots, inner diagrams and the
-code of Python functions by content), the connections, comments of blocks, and the versions of the libraries.
-The cache adds the sources of this package. Layout, descriptions and run settings are not part of the key.
+The disk cache uses the key to find a diagram that an earlier process compiled, without tracing it again. The
+key covers the class of each block and the exact values of all parameters: tables, robots, inner diagrams and
+the code of Python functions by content. It also covers connections, comments, and the versions of the
+libraries. The cache adds the sources of this package. Layout, descriptions and run settings are not part of
+the key.
 
 A diagram with unknown content (an external block class, a function that imports a user's module) has no key
 and is traced each time.
@@ -28,7 +29,7 @@ from armblocks.diagram.levels import levels_of
 from armblocks.diagram.port import PortRef
 from armblocks.diagram.user_function import UserFunction
 
-_OWN = "armblocks."
+_PACKAGE_PREFIX = "armblocks."
 
 
 def content_key(diagram: Diagram) -> str | None:
@@ -56,7 +57,7 @@ class _Content:
         return hashlib.sha256("\n".join(self._texts).encode()).hexdigest()
 
     def add(self, value: object) -> None:
-        """A value by its content. Raises ``UnknownContentError``."""
+        """Add a value by its content. Raises ``UnknownContentError``."""
         if value is None or isinstance(value, bool | int | float | complex):
             # repr of a float is exact, and distinguishes -0.0 from 0.0.
             self._texts.append(f"{type(value).__name__} {value!r}")
@@ -101,10 +102,8 @@ class _Content:
             part = _Content()
             part._known = self._known
             part._add_fields(value)
-            known = self._known[id(value)] = (
-                value,
-                part.digest,
-            )  # the reference keeps the value alive, so that its id stays unique
+            # The reference keeps the value alive, so that its id stays unique.
+            known = self._known[id(value)] = (value, part.digest)
         self._texts.append(f"object {known[1]}")
 
     def _add_fields(self, value: object) -> None:
@@ -115,7 +114,7 @@ class _Content:
             self._add_diagram(value)
             return
         name = _class_name(value)
-        if not dataclasses.is_dataclass(value) or not name.startswith(_OWN):
+        if not dataclasses.is_dataclass(value) or not name.startswith(_PACKAGE_PREFIX):
             raise UnknownContentError(name)
         if isinstance(value, Block):
             self._texts.append(f"block {name}")

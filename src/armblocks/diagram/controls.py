@@ -2,8 +2,8 @@
 
 They are not in the library and never in a file. An event has two iterations. In the first, the control's mode
 follows its signal, and ``restart`` or ``fire`` becomes 1. In the second, the guard ``acts`` triggers: the
-blocks inside are reset or executed, and the control stores that it has acted. At a tick the modes follow
-immediately, so that one iteration is sufficient."""
+blocks inside are reset or executed, and the state ``seen`` stores the new value of the control. At a tick the
+modes follow immediately, so that one iteration is sufficient."""
 
 from __future__ import annotations
 
@@ -20,34 +20,35 @@ from armblocks.diagram.port import Guard, Port, State
 from armblocks.diagram.shape_rules import broadcast
 
 THRESHOLD_OFFSET = 1e-300
-"""An offset below any signal resolution: it assigns zero itself to one side."""
+"""Offset below the resolution of all signals. With it, a signal of exactly zero has a definite sign."""
 _STATES = ("held", "reset")
-_ANEW = Port("anew", "whether the enclosing subsystem is reset", "", ())
+_RESET_PORT = Port("anew", "whether the enclosing subsystem is reset", "", ())
 _EDGES = ("rising", "falling", "either")
 
 
-def _inside(block: EnableControl | TriggerControl) -> tuple[Port, ...]:
+def _outer_ports(block: EnableControl | TriggerControl) -> tuple[Port, ...]:
     ports = (
         (block.outer, Port("outer", "whether the enclosing subsystem is active", "", ())),
-        (block.anew, _ANEW),
+        (block.resettable, _RESET_PORT),
     )
-    return tuple(port for there, port in ports if there)
+    return tuple(port for needed, port in ports if needed)
 
 
-def _held(block: HeldOutput | MergedOutput, x: Signals, u: Signals, p: Signals) -> SX:
-    """The value that an output holds; a reset of the enclosing subsystem sets it to the initial one."""
-    return if_else(u["anew"], p["initial"], x["held"]) if block.anew else x["held"]
+def _held_value(block: HeldOutput | MergedOutput, x: Signals, u: Signals, p: Signals) -> SX:
+    """The held value of an output; a reset of the enclosing subsystem sets it to the initial value."""
+    return if_else(u["anew"], p["initial"], x["held"]) if block.resettable else x["held"]
 
 
-def _outer(u: Signals) -> SX:
+def _outer_active(u: Signals) -> SX:
     return u.get("outer", SX(1.0))
 
 
-def _side(u: SX) -> SX:
+def _is_positive(u: SX) -> SX:
+    """1 where a control signal is positive, else 0."""
     return if_else(u > 0.0, 1.0, 0.0)
 
 
-def _begins(on: SX, x: Signals) -> SX:
+def _start_pending(on: SX, x: Signals) -> SX:
     """Whether a control has turned on at this instant, and the blocks inside have not started yet."""
     return logic_and(on, x["seen"] == 0.0)
 
@@ -56,23 +57,25 @@ def _begins(on: SX, x: Signals) -> SX:
 class EnableControl(Block):
     """Whether an enabled subsystem is active, and whether its states are reset at this time: on = u > 0.
 
-    ``works`` follows ``on`` once the blocks inside have consistent modes and initial states, so
-    that no event outside of the subsystem acts on the outputs of old modes and states.
+    ``works`` follows ``on`` after the blocks inside have consistent modes and initial states. Events outside
+    the subsystem therefore never read outputs of old modes and states.
     """
 
     title: ClassVar[str] = "Enable"
 
-    outer: bool = parameter(False, doc="whether it is inside a subsystem that can be inactive")
-    anew: bool = parameter(False, doc="whether it is inside a subsystem whose states can be reset")
-    restarts: bool = parameter(False, doc="whether states are reset when it is enabled")
+    outer: bool = parameter(False, doc="whether the block is inside a subsystem that can be inactive")
+    resettable: bool = parameter(
+        False, doc="whether the block is inside a subsystem whose states can be reset"
+    )
+    restarts: bool = parameter(False, doc="whether states are reset when the subsystem is enabled")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the control signal", "", ()), *_inside(self))
+        return (Port("u", "the control signal", "", ()), *_outer_ports(self))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (
-            Port("on", "1 while it is on", "", ()),
-            Port("works", "1 while it is on and the blocks inside have started", "", ()),
+            Port("on", "1 while the subsystem is active", "", ()),
+            Port("works", "1 while the subsystem is active and its blocks have started", "", ()),
             Port("restart", "1 where states are reset", "", ()),
         )
 
@@ -80,7 +83,7 @@ class EnableControl(Block):
         return (State("seen", (), "value of on at the last action; -1 before the first"),)
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        works = State("works", (), "1 while it is on and the blocks inside have started", follows=True)
+        works = State("works", (), "1 while on is 1 and the blocks inside have started", follows=True)
         return (State("side", (), "1 where u is positive, else 0", follows=True), works)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
@@ -90,65 +93,70 @@ class EnableControl(Block):
         return {"seen": SX(-1.0)}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        on, anew = x["side"] * _outer(u), u.get("anew", SX(0.0))
-        begins = _begins(on, x) if self.restarts else SX(0.0)
-        return {"on": on, "works": x["works"], "restart": logic_or(begins, anew)}
+        on, outer_reset = x["side"] * _outer_active(u), u.get("anew", SX(0.0))
+        start = _start_pending(on, x) if self.restarts else SX(0.0)
+        return {"on": on, "works": x["works"], "restart": logic_or(start, outer_reset)}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        changed = fabs(x["side"] * _outer(u) - x["seen"])
+        changed = fabs(x["side"] * _outer_active(u) - x["seen"])
         return {"side": u["u"] - THRESHOLD_OFFSET, "acts": if_else(x["seen"] < 0.0, 0.0, changed) - 0.5}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        side = _side(u["u"])
-        return {"side": side, "works": side * _outer(u)}
+        side = _is_positive(u["u"])
+        return {"side": side, "works": side * _outer_active(u)}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        on = x["side"] * _outer(u)
-        inconsistent = logic_and(x["works"] != on, logic_not(_begins(on, x)))
-        return {"side": x["side"] != _side(u["u"]), "works": inconsistent}
+        on = x["side"] * _outer_active(u)
+        inconsistent = logic_and(x["works"] != on, logic_not(_start_pending(on, x)))
+        return {"side": x["side"] != _is_positive(u["u"]), "works": inconsistent}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         side = if_else(e["side"] == 0.0, x["side"], if_else(e["side"] > 0.0, 1.0, 0.0))
-        start = _side(u["u"]) * _outer(u)
-        seen = if_else(e["acts"] == 0.0, x["seen"], x["side"] * _outer(u))
+        start = _is_positive(u["u"]) * _outer_active(u)
+        seen = if_else(e["acts"] == 0.0, x["seen"], x["side"] * _outer_active(u))
         return {
             "side": side,
             "seen": if_else(logic_or(x["seen"] < 0.0, t <= 0.0), start, seen),
-            "works": if_else(e["acts"] == 0.0, x["works"], x["side"] * _outer(u)),
+            "works": if_else(e["acts"] == 0.0, x["works"], x["side"] * _outer_active(u)),
         }
 
 
 @dataclass(frozen=True, kw_only=True)
 class TriggerControl(Block):
-    """Whether a trigger fires at this time, and the time since it fired before.
+    """Whether a trigger fires at this time, and the time since the previous trigger event.
 
-    It does not fire at an instant at which the enclosing subsystem is reset: ``begun`` is 1 from then to its
-    end.
+    The trigger does not fire at an instant at which the enclosing subsystem is reset: ``begun`` is 1 from the
+    reset to the end of the instant.
     """
 
     title: ClassVar[str] = "Trigger"
 
-    outer: bool = parameter(False, doc="whether it is inside a subsystem that can be inactive")
-    anew: bool = parameter(False, doc="whether it is inside a subsystem whose states can be reset")
-    edge: str = parameter("rising", choices=_EDGES, doc="when it fires")
+    outer: bool = parameter(False, doc="whether the block is inside a subsystem that can be inactive")
+    resettable: bool = parameter(
+        False, doc="whether the block is inside a subsystem whose states can be reset"
+    )
+    edge: str = parameter("rising", choices=_EDGES, doc="when the trigger fires")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the trigger", "", ()), *_inside(self))
+        return (Port("u", "the trigger", "", ()), *_outer_ports(self))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (
-            Port("fire", "1 at the time at which it fires", "", ()),
+            Port("fire", "1 when the trigger fires", "", ()),
             Port(
                 "restart", "1 where states are reset, by this trigger or by the enclosing subsystem", "", ()
             ),
-            Port("elapsed", "time since it fired before, or since the start or a reset", "s", ()),
+            Port("elapsed", "time since the previous trigger event, the start or a reset", "s", ()),
         )
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         return (
             State("seen", (), "sign of u at the last action; -1 before the first"),
-            State("last", (), "time at which it fired last, or at which it was reset", "s"),
-            *((State("begun", (), "1 from a reset to the end of its instant", momentary=True),) * self.anew),
+            State("last", (), "time of the last trigger event or reset", "s"),
+            *(
+                (State("begun", (), "1 from a reset to the end of its instant", momentary=True),)
+                * self.resettable
+            ),
         )
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
@@ -163,15 +171,15 @@ class TriggerControl(Block):
     def initial_states(self, p: Signals) -> Signals:
         return {"seen": SX(-1.0), "last": SX(0.0)}
 
-    def _begins(self, x: Signals, u: Signals) -> SX:
+    def _outer_reset(self, x: Signals, u: Signals) -> SX:
         """Whether the enclosing subsystem is or was reset at this instant."""
-        return logic_or(u["anew"], x["begun"]) if self.anew else SX(0.0)
+        return logic_or(u["anew"], x["begun"]) if self.resettable else SX(0.0)
 
     def _fires(self, x: Signals, u: Signals) -> SX:
         rises = logic_and(x["side"] == 1.0, x["seen"] == 0.0)
         falls = logic_and(x["side"] == 0.0, x["seen"] == 1.0)
         fires = {"rising": rises, "falling": falls, "either": logic_or(rises, falls)}[self.edge]
-        return logic_and(logic_and(fires, _outer(u)), logic_not(self._begins(x, u)))
+        return logic_and(logic_and(fires, _outer_active(u)), logic_not(self._outer_reset(x, u)))
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         fires = self._fires(x, u)
@@ -182,7 +190,7 @@ class TriggerControl(Block):
         return {"side": u["u"] - THRESHOLD_OFFSET, "acts": if_else(changed, 0.5, -0.5)}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"side": _side(u["u"])}
+        return {"side": _is_positive(u["u"])}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         side = if_else(e["side"] == 0.0, x["side"], if_else(e["side"] > 0.0, 1.0, 0.0))
@@ -191,10 +199,10 @@ class TriggerControl(Block):
         starts = logic_or(logic_and(acts, self._fires(x, u)), u.get("anew", SX(0.0)))
         after = {
             "side": side,
-            "seen": if_else(logic_or(x["seen"] < 0.0, t <= 0.0), _side(u["u"]), seen),
+            "seen": if_else(logic_or(x["seen"] < 0.0, t <= 0.0), _is_positive(u["u"]), seen),
             "last": if_else(starts, t, x["last"]),
         }
-        return {**after, "begun": self._begins(x, u)} if self.anew else after
+        return {**after, "begun": self._outer_reset(x, u)} if self.resettable else after
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -206,8 +214,10 @@ class HeldOutput(Block):
 
     title: ClassVar[str] = "Out"
 
-    anew: bool = parameter(False, doc="whether it is inside a subsystem whose states can be reset")
-    fires: bool = parameter(False, doc="whether works is 1 at single times only")
+    resettable: bool = parameter(
+        False, doc="whether the block is inside a subsystem whose states can be reset"
+    )
+    pulsed: bool = parameter(False, doc="whether works is 1 at single instants only")
     when_off: str = parameter("held", choices=_STATES, doc="whether y is held or reset to initial")
     initial: ArrayLike = parameter(
         0.0, kind=ParameterKind.ARRAY, doc="y before the subsystem has been active"
@@ -217,7 +227,7 @@ class HeldOutput(Block):
         return (
             Port("u", "the output inside the subsystem"),
             Port("works", "1 while or when the subsystem is active", "", ()),
-            *((_ANEW,) * self.anew),
+            *((_RESET_PORT,) * self.resettable),
         )
 
     def bus_inputs(self) -> tuple[str, ...]:
@@ -242,31 +252,35 @@ class HeldOutput(Block):
         return {"held": p["initial"]}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        held = self.fires or self.when_off == "held"
-        return {"y": if_else(u["works"], u["u"], _held(self, x, u, p) if held else p["initial"])}
+        held = self.pulsed or self.when_off == "held"
+        return {"y": if_else(u["works"], u["u"], _held_value(self, x, u, p) if held else p["initial"])}
 
     def captures(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {} if self.fires else {"held": if_else(u["works"], u["u"], x["held"])}
+        return {} if self.pulsed else {"held": if_else(u["works"], u["u"], x["held"])}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        held = _held(self, x, u, p)
-        if self.fires:
+        held = _held_value(self, x, u, p)
+        if self.pulsed:
             return {"held": if_else(u["works"], u["u"], held)}
-        return {"held": held} if self.anew else {}
+        return {"held": held} if self.resettable else {}
 
 
 @dataclass(frozen=True, kw_only=True)
 class MergedOutput(Block):
-    """Merged outputs of conditional subsystems: y is the output of the one that is or was active last.
+    """Merged outputs of conditional subsystems: y is the output of the subsystem that was active last.
 
     A reset of the enclosing subsystem sets y to ``initial``, as at the start of a run.
     """
 
     title: ClassVar[str] = "Merge"
 
-    anew: bool = parameter(False, doc="whether it is inside a subsystem whose states can be reset")
+    resettable: bool = parameter(
+        False, doc="whether the block is inside a subsystem whose states can be reset"
+    )
     inputs: int = parameter(2, minimum=1, doc="number of inputs")
-    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="y before any of them has been active")
+    initial: ArrayLike = parameter(
+        0.0, kind=ParameterKind.ARRAY, doc="y before any subsystem has been active"
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         numbers = range(1, self.inputs + 1)
@@ -276,7 +290,7 @@ class MergedOutput(Block):
                 Port(f"works{number}", "1 while or when its subsystem is active", "", ())
                 for number in numbers
             ),
-            *((_ANEW,) * self.anew),
+            *((_RESET_PORT,) * self.resettable),
         )
 
     def bus_inputs(self) -> tuple[str, ...]:
@@ -298,17 +312,17 @@ class MergedOutput(Block):
     def initial_states(self, p: Signals) -> Signals:
         return {"held": p["initial"]}
 
-    def _chosen(self, x: Signals, u: Signals, p: Signals) -> SX:
-        chosen = _held(self, x, u, p)
+    def _selected_output(self, x: Signals, u: Signals, p: Signals) -> SX:
+        chosen = _held_value(self, x, u, p)
         for number in range(self.inputs, 0, -1):
             chosen = if_else(u[f"works{number}"], u[f"u{number}"], chosen)
         return chosen
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": self._chosen(x, u, p)}
+        return {"y": self._selected_output(x, u, p)}
 
     def captures(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"held": self._chosen(x, u, p)}
+        return {"held": self._selected_output(x, u, p)}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        return {"held": self._chosen(x, u, p)}
+        return {"held": self._selected_output(x, u, p)}

@@ -1,4 +1,4 @@
-"""A checked, frozen diagram: blocks by name, connections, and how it is to be drawn and run."""
+"""A checked, frozen diagram: blocks by name, connections, layout and simulation settings."""
 
 from __future__ import annotations
 
@@ -6,17 +6,19 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from operator import itemgetter
 from types import MappingProxyType
 from typing import Any, TypeVar, cast
 
 from armblocks.diagram.block import Block
+from armblocks.diagram.bookmarks import Bookmark
 from armblocks.diagram.mask import Scope, checked_mask, values_of
 from armblocks.diagram.names import check_signal_names
 from armblocks.diagram.parameter import Parameter, Value
 from armblocks.diagram.port import PortRef
 from armblocks.equations import SimulationOptions
 from armblocks.errors import ArmblocksError, DiagramError, UnknownNameError
-from armblocks.lazy_exports import shown_by
+from armblocks.lazy_exports import display_method
 
 _Result = TypeVar("_Result")
 
@@ -53,7 +55,7 @@ class Placement:
 
     def __post_init__(self) -> None:
         if self.rotation in ROTATIONS and self.name_side in NAME_SIDES and self.colour in BLOCK_COLOURS:
-            return  # placements are made for every block at every edit
+            return  # fast path: every edit creates the placements of all blocks
         for name, allowed in _APPEARANCE.items():
             value = getattr(self, name)
             if value not in allowed:
@@ -79,17 +81,33 @@ ROTATIONS = (0, 90, 180, 270)
 NAME_SIDES = ("auto", "below", "above", "left", "right", "hidden")
 """Allowed sides of a block's name."""
 BLOCK_COLOURS = ("none", "red", "orange", "yellow", "green", "cyan", "blue", "purple", "grey")
-"""Allowed backgrounds of a block; ``none`` is that of all other blocks."""
+"""Allowed backgrounds of a block; ``none`` is the default."""
 _APPEARANCE = {"rotation": ROTATIONS, "name_side": NAME_SIDES, "colour": BLOCK_COLOURS}
 
-_READ_ONLY = ("blocks", "layout", "bends", "notes", "extras", "mask_values", "commented", "signal_names")
-"""The fields of a diagram that are read-only mappings."""
+_READ_ONLY = {
+    **dict.fromkeys(
+        (
+            *("blocks", "layout", "bends", "notes", "bookmarks"),
+            *("extras", "mask_values", "commented", "signal_names"),
+        ),
+        1,
+    ),
+    "parameter_sets": 2,
+}
+"""The fields of a diagram that are read-only mappings, each with its number of levels."""
 
 
-def _read_only_sets(sets: Mapping[str, Mapping[str, Value]]) -> Mapping[str, Mapping[str, Value]]:
+def _read_only(mapping: Mapping[Any, Any], levels: int) -> Mapping[Any, Any]:
+    """A read-only copy of a mapping, sorted by key; with two levels, its values are copied likewise."""
+    ordered = sorted(mapping.items(), key=itemgetter(0))
     return MappingProxyType(
-        {name: MappingProxyType(dict(sorted(values.items()))) for name, values in sorted(sets.items())}
+        {key: value if levels == 1 else _read_only(value, levels - 1) for key, value in ordered}
     )
+
+
+def _copied(mapping: Mapping[Any, Any], levels: int) -> dict[Any, Any]:
+    """The mapping as nested dictionaries, which can be pickled."""
+    return {key: value if levels == 1 else _copied(value, levels - 1) for key, value in mapping.items()}
 
 
 Gate = Mapping[str, PortRef]
@@ -113,16 +131,16 @@ def block_in_scope(name: str, block: Block, scope: Scope) -> Block:
 
 @dataclass(frozen=True, kw_only=True)
 class Diagram:
-    """Blocks and connections. Only ``DiagramBuilder.build`` creates diagrams, and it checks them.
+    """An immutable diagram of blocks and connections. ``DiagramBuilder.build`` creates and checks it.
 
     ``blocks`` is sorted by name and ``connections`` by ends, so that equal diagrams compare equal. ``layout``
     may name only some blocks, and ``bends`` only some connections: those with a user-drawn route, see
-    :func:`armblocks.drawing.wires.bent`; ``notes`` are annotations by name. ``mask`` has the
-    parameters that it declares (see :mod:`armblocks.diagram.mask`) and ``mask_values`` their values (by
-    default the default values). Block parameters that are formulas have the values computed from these.
+    :func:`armblocks.drawing.wires.bent`. ``notes`` are annotations by name. ``mask`` has the parameters that
+    the diagram declares (see :mod:`armblocks.diagram.mask`) and ``mask_values`` their values (by default the
+    default values). The values of block parameters that are formulas are computed from ``mask_values``.
     ``link`` names the entry of a library file from which the diagram comes, ``servos.json#JointServo``, or is
     empty. ``extras`` preserves unknown keys of a file: it has the keys ``""`` (the document), ``"blocks"``
-    (by block name), and whatever else a file format puts there.
+    (by block name), and further keys that a file format adds.
     """
 
     name: str
@@ -143,13 +161,15 @@ class Diagram:
     mask_values: Mapping[str, Value] = field(default_factory=dict[str, Value])
     link: str = ""
     commented: Mapping[str, str] = field(default_factory=dict[str, str])
-    """Blocks that take no part in the model, by name: ``"out"`` or ``"through"``, see
+    """Commented blocks, by name: ``"out"`` or ``"through"``, see
     :mod:`armblocks.diagram.comments`."""
     signal_names: Mapping[PortRef, str] = field(default_factory=dict[PortRef, str])
     """Names of the signals at outputs, see :mod:`armblocks.diagram.signal_names`."""
     parameter_sets: Mapping[str, Mapping[str, Value]] = field(default_factory=dict[str, Mapping[str, Value]])
     """Values of parameters by path, under the name of their set, see
     :mod:`armblocks.diagram.parameter_sets`."""
+    bookmarks: Mapping[str, Bookmark] = field(default_factory=dict[str, Bookmark])
+    """Parts of this sheet by name, see :mod:`armblocks.diagram.bookmarks`."""
     shares: Mapping[str, str] = field(default_factory=dict[str, str])
     """For a flat diagram: blocks that share the parameters of the block of the given name."""
     _cache: dict[str, object] = field(
@@ -176,22 +196,18 @@ class Diagram:
             named = {ref: name for ref, name in self.signal_names.items() if ref.block in self.blocks}
             object.__setattr__(self, "signal_names", named)
             check_signal_names(self.blocks, named, where)
-        for name in _READ_ONLY:
-            ordered = dict(sorted(getattr(self, name).items()))
-            object.__setattr__(self, name, MappingProxyType(ordered))
-        object.__setattr__(self, "parameter_sets", _read_only_sets(self.parameter_sets))
+        for name, levels in _READ_ONLY.items():
+            object.__setattr__(self, name, _read_only(getattr(self, name), levels))
         object.__setattr__(self, "connections", tuple(sorted(self.connections)))
         object.__setattr__(self, "logged", tuple(sorted(self.logged)))
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state for pickling and copying: the fields without cached results."""
         state = {entry.name: getattr(self, entry.name) for entry in dataclasses.fields(self) if entry.init}
-        sets = {name: dict(values) for name, values in self.parameter_sets.items()}
-        return state | {name: dict(state[name]) for name in _READ_ONLY} | {"parameter_sets": sets}
+        return state | {name: _copied(state[name], levels) for name, levels in _READ_ONLY.items()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        read_only: dict[str, Any] = {name: MappingProxyType(state[name]) for name in _READ_ONLY}
-        read_only["parameter_sets"] = _read_only_sets(state["parameter_sets"])
+        read_only = {name: _read_only(state[name], levels) for name, levels in _READ_ONLY.items()}
         for name, value in (state | read_only).items():
             object.__setattr__(self, name, value)
         object.__setattr__(self, "_cache", {})
@@ -206,7 +222,7 @@ class Diagram:
             return self
         return dataclasses.replace(self, mask_values={**self.mask_values, **cast("Any", values)})
 
-    _repr_svg_ = shown_by("armblocks.face.notebook_views", "diagram_svg")
+    _repr_svg_ = display_method("armblocks.face.notebook_views", "diagram_svg")
 
     def __hash__(self) -> int:
         return hash((self.name, tuple(self.blocks.items()), self.connections, self.settings))
@@ -219,11 +235,11 @@ class Diagram:
         return self.blocks[name].sampled and "?fire" not in self.gates.get(name, {})
 
     def owner(self, name: str) -> str:
-        """The prefix of a block's parameter paths: its name, or that of the owner of shared parameters."""
+        """The prefix of a block's parameter paths: its name, or the owner's name for shared parameters."""
         return self.shares.get(name, name)
 
     def source(self, name: str, port: str) -> PortRef:
-        """The output port that feeds an input port of a flat diagram, a hidden one included."""
+        """The output port that drives an input port of a flat diagram; the input may be hidden."""
         if port.startswith("?"):
             return self.gates[name][port]
         return self.drivers[PortRef(name, port)]
@@ -234,7 +250,7 @@ class Diagram:
         return {wire.target: wire.source for wire in self.connections}
 
     def block(self, name: str) -> Block:
-        """The block of this name; raises ``UnknownNameError`` with the nearest."""
+        """The block of this name; raises ``UnknownNameError`` with the nearest name."""
         if name not in self.blocks:
             raise UnknownNameError("block", name, self.blocks, where=f"diagram '{self.name}'")
         return self.blocks[name]

@@ -38,8 +38,8 @@ class Renaming:
 class ValueChange:
     """A changed value.
 
-    ``path`` is the path of the block, or of the subsystem for settings, descriptions and notes (``""`` for
-    the top level), with the names of the later diagram. ``None``: one side has no such value.
+    ``path`` is the path of the block, with the names of the later diagram. For settings, descriptions and
+    notes it is the path of the subsystem (``""`` for the top level). ``None``: one diagram has no such value.
     """
 
     path: str
@@ -109,10 +109,10 @@ def diagram_difference(before: Diagram, after: Diagram) -> DiagramDifference:
     """The changes that lead from ``before`` to ``after``.
 
     Compared are blocks with their types, parameters and comments, connections, logged outputs, settings,
-    descriptions and the text of annotations, including subsystems. Not compared are the layout, the name of
-    the diagram (a file without one is named after the file) and unknown keys of a file. A removed and an
-    added block count as one renamed block if type, parameters and all connections agree, even if blocks at
-    the other ends are renamed too.
+    descriptions and the text of annotations, including subsystems. Not compared are the layout, the
+    bookmarks, the name of the diagram (a file without one is named after the file) and unknown keys of a
+    file. A removed and an added block count as one renamed block if type, parameters and all connections
+    agree. The connected blocks may be renamed too.
     """
     for diagram in (before, after):
         check_type(diagram, Diagram, "a Diagram", where="diagram_difference")
@@ -127,6 +127,8 @@ def diagram_difference(before: Diagram, after: Diagram) -> DiagramDifference:
 
 @dataclass
 class _Findings:
+    """The differences found so far, by field of :class:`DiagramDifference`."""
+
     added: list[PlacedBlock] = field(default_factory=list[PlacedBlock])
     removed: list[PlacedBlock] = field(default_factory=list[PlacedBlock])
     renamed: list[Renaming] = field(default_factory=list[Renaming])
@@ -192,7 +194,7 @@ def _compare_levels(before: Diagram, after: Diagram, path: str, findings: _Findi
 
 
 def _compare_sheets(before: Diagram, after: Diagram, path: str, findings: _Findings) -> None:
-    """The differences of two diagrams of the hierarchy themselves, without their blocks."""
+    """Compare settings, masks, parameter sets, descriptions and notes of two diagrams of a hierarchy."""
     for name in _SETTINGS:
         old_value, new_value = getattr(before.settings, name), getattr(after.settings, name)
         if old_value != new_value:
@@ -253,7 +255,7 @@ def _rules(block: Block) -> Mapping[str, Parameter]:
     return {rule.name: rule for rule in block.own_parameters()}
 
 
-# -- blocks under other names --------------------------------------------------------------------------------
+# -- renamed blocks ------------------------------------------------------------------------------------------
 
 
 _Colours = dict[str, int]
@@ -265,10 +267,10 @@ _Ends = list[tuple[str, str, PortRef]]
 def _renamings(before: Diagram, after: Diagram) -> dict[str, str]:
     """Later names of blocks by earlier names (colour refinement).
 
-    A block that only one side has starts with a colour of its content. Each round refines the colours by
-    those of its neighbours. A block that both sides have keeps a unique colour. Equal colours on both sides
-    are the same block. Where several blocks have equal colours, one pair is matched and refinement continues;
-    any choice is valid.
+    A block that only one diagram has starts with a colour of its content. Each round refines its colour by
+    those of its neighbours. A block that both diagrams have keeps a unique colour. Blocks of equal colour in
+    both diagrams are the same block. Where several blocks have equal colours, one pair is matched and
+    refinement continues; any choice is valid.
     """
     removed = {
         name: hash(_content(block)) for name, block in before.blocks.items() if name not in after.blocks
@@ -279,7 +281,7 @@ def _renamings(before: Diagram, after: Diagram) -> dict[str, str]:
     while removed and added:
         paired = {later: hash(("paired", later)) for later in pairs.values()}
         removed_paired = {old: paired[later] for old, later in pairs.items()}
-        old_colours, new_colours = _refined(
+        old_colours, new_colours = _refined_colours(
             removed, added, (removed_ends, removed_paired), (added_ends, paired)
         )
         old_names, new_names = _by_colour(old_colours), _by_colour(new_colours)
@@ -314,18 +316,18 @@ def _by_colour(colours: _Colours) -> dict[int, list[str]]:
 _Surroundings = tuple[dict[str, _Ends], _Colours]
 
 
-def _refined(
+def _refined_colours(
     old: _Colours, new: _Colours, old_surroundings: _Surroundings, new_surroundings: _Surroundings
 ) -> tuple[_Colours, _Colours]:
-    """The stable colours of both sides, after equally many rounds."""
+    """The stable colours of both diagrams, after equally many rounds."""
     count = 0
     while (colour_count := len({*old.values(), *new.values()})) > count:
         count = colour_count
-        old, new = _one_round(old, *old_surroundings), _one_round(new, *new_surroundings)
+        old, new = _refinement_round(old, *old_surroundings), _refinement_round(new, *new_surroundings)
     return old, new
 
 
-def _one_round(colours: _Colours, ends: Mapping[str, _Ends], paired: _Colours) -> _Colours:
+def _refinement_round(colours: _Colours, ends: Mapping[str, _Ends], paired: _Colours) -> _Colours:
     known = {**paired, **colours}
 
     def colour_of(end: PortRef) -> object:

@@ -20,41 +20,41 @@ def entry_names(diagram: Diagram, shapes: Mapping[str, Shape]) -> Mapping[str, t
     names has none. ``shapes`` are those of all signals. Names are for display only.
     """
     flat = flat_diagram(diagram)
-    if not any(_may_state_names(block) for block in flat.blocks.values()):
+    if not any(_may_declare_names(block) for block in flat.blocks.values()):
         return {}
     groups = _Groups()
-    stated: list[tuple[str, tuple[str, ...]]] = []
+    declared: list[tuple[str, tuple[str, ...]]] = []
     for name, block in flat.blocks.items():
         inputs = {port: str(flat.drivers[PortRef(name, port.name)]) for port in block.input_ports()}
         outputs = {port: f"{name}/{port.name}" for port in block.output_ports()}
-        for one, other in _alike(block, inputs, outputs):
+        for one, other in _signal_pairs(block, inputs, outputs):
             if shapes.get(one) == shapes.get(other) and len(shapes.get(one, ())) == 1:
                 groups.join(one, other)
-        stated += [(path, port.names) for port, path in {**inputs, **outputs}.items() if port.names]
+        declared += [(path, port.names) for port, path in {**inputs, **outputs}.items() if port.names]
     names_of: dict[str, set[tuple[str, ...]]] = {}
-    for path, names in stated:
+    for path, names in declared:
         if shapes.get(path) == (len(names),):
             names_of.setdefault(groups.of(path), set()).add(names)
     named = {path: names_of.get(groups.of(path), set()) for path in shapes}
     return {path: next(iter(rows)) for path, rows in named.items() if len(rows) == 1}
 
 
-def _may_state_names(block: Block) -> bool:
+def _may_declare_names(block: Block) -> bool:
     return any(rule.kind in (ParameterKind.ROBOT, ParameterKind.TABLE) for rule in block.parameters())
 
 
-def _alike(
+def _signal_pairs(
     block: Block, inputs: Mapping[Port, str], outputs: Mapping[Port, str]
 ) -> Iterator[tuple[str, str]]:
-    """Pairs of signals at a block whose entries belong together, if they have one shape."""
+    """Pairs of signals of a block that share their entry names, if their shapes agree."""
     by_name = {port.name: path for port, path in outputs.items()}
     yield from ((by_name[one], by_name[other]) for one, other in block.output_rates.items())
     yield from ((by_name[one], by_name.get(other, "")) for one, other in block.time_derivatives.items())
     if type(block).output_shapes is Block.output_shapes and not block.virtual:
         # A block without its own shape rule is elementwise.
-        ends = [path for port, path in outputs.items() if port.shape is None]
-        ends += [path for port, path in inputs.items() if port.shape is None]
-        yield from ((ends[0], end) for end in ends[1:])
+        paths = [path for port, path in outputs.items() if port.shape is None]
+        paths += [path for port, path in inputs.items() if port.shape is None]
+        yield from ((paths[0], other) for other in paths[1:])
 
 
 class _Groups:

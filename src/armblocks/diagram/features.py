@@ -1,12 +1,12 @@
-"""The features of a block as one value: what it declares, and its equations by role.
+"""The features of a block as one value: its declarations, and its equations by role.
 
-``features_of`` collects what a block declares by its methods: states, modes, guards, conditions, delays and
-equations. Functions from features to features change them: for a conditional subsystem
+``features_of`` collects the declarations of a block: states, modes, guards, conditions, delays and equations.
+Functions from features to features change them: for a conditional subsystem
 (:mod:`~armblocks.diagram.conditional_equations`), for conditions that become modes, for modes with hysteresis
 (:mod:`~armblocks.diagram.generated_modes`). Tracing reads the result.
 
-A new feature is a new :class:`SlotKind` with its value while a conditional subsystem is off, its equation in
-``features_of``, and its use in tracing. Conditional subsystems then treat it like the others.
+A new feature needs a new :class:`SlotKind` with its value while a conditional subsystem is off, an equation
+in ``features_of``, and a use in tracing. Conditional subsystems then need no change.
 """
 
 from __future__ import annotations
@@ -87,11 +87,10 @@ Equation = Callable[[Arguments], Signals]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Features:
-    """What a block declares, and its equations by role.
+    """The declarations of a block, and its equations by role.
 
-    The functions of the parameters alone are those of :class:`~armblocks.diagram.block.Block`: ``starts`` is
-    ``initial_states``, ``history`` is ``initial_history``, ``held`` is ``initial_outputs``, ``guesses`` is
-    ``initial_guesses``.
+    The fields from ``initial_states`` on depend on parameters only; see the methods of
+    :class:`~armblocks.diagram.block.Block` with the same names.
     """
 
     inputs: Shapes
@@ -107,10 +106,10 @@ class Features:
     delays: tuple[DelayLine, ...]
     equations: Mapping[SlotKind, Equation]
     sampled: bool
-    starts: Callable[[Signals], Signals]
-    history: Callable[[Signals], Signals]
-    held: Callable[[Signals], Signals]
-    guesses: Callable[[Signals], Signals]
+    initial_states: Callable[[Signals], Signals]
+    initial_history: Callable[[Signals], Signals]
+    initial_outputs: Callable[[Signals], Signals]
+    initial_guesses: Callable[[Signals], Signals]
     delay_bounds: Callable[[Signals], Mapping[str, tuple[SX, SX]]]
     breakpoints: Callable[[Signals], tuple[SX, ...]]
 
@@ -162,10 +161,10 @@ def features_of(block: Block, inputs: Shapes) -> Features:
             SlotKind.CAPTURE: lambda at: block.captures(at.t, at.x, at.u, at.p),
             SlotKind.CONDITION: lambda at: block.condition_values(at.t, at.x, at.u, at.p),
         },
-        starts=block.initial_states,
-        history=block.initial_history,
-        held=block.initial_outputs,
-        guesses=block.initial_guesses,
+        initial_states=block.initial_states,
+        initial_history=block.initial_history,
+        initial_outputs=block.initial_outputs,
+        initial_guesses=block.initial_guesses,
         delay_bounds=block.delay_bounds,
         breakpoints=block.breakpoints,
     )
@@ -174,7 +173,7 @@ def features_of(block: Block, inputs: Shapes) -> Features:
 def _output_shapes(block: Block, inputs: Shapes) -> dict[str, Shape]:
     if block.virtual:
         return {}
-    stated = {port.name: port.shape for port in block.output_ports() if port.shape is not None}
-    shapes = {**stated, **block.output_shapes(inputs)}
+    declared = {port.name: port.shape for port in block.output_ports() if port.shape is not None}
+    shapes = {**declared, **block.output_shapes(inputs)}
     names = [port.name for port in block.output_ports() if port.name not in block.time_derivatives]
     return {name: shapes[name] for name in names}

@@ -20,11 +20,11 @@ class FlatForm:
     """A flat diagram, and its relation to the hierarchy. Names are paths from the top level.
 
     ``levels``: the diagram of every subsystem by its path, with ``""`` for the top. ``carried``: the signal
-    or bus at output ports of the hierarchy, where it is not their own signal. ``aliases``: other names of
-    signals, such as a subsystem's ports. ``views``: the views, by block. ``stated``: ports with a declared
-    shape. ``origins``: for blocks that are not blocks of the hierarchy, such as the control of a conditional
-    subsystem, the block of the hierarchy that they come from. All except ``levels`` are empty for a diagram
-    that is already flat.
+    or bus at output ports that pass on signals of other ports. ``aliases``: other names of signals, such as a
+    subsystem's ports. ``views``: the views, by block. ``declared_shapes``: ports with a declared shape.
+    ``origins``: for blocks that the passes add, such as the control of a conditional subsystem, the block of
+    the hierarchy from which each is derived. All except ``levels`` are empty for a diagram that is already
+    flat.
     """
 
     diagram: Diagram
@@ -32,7 +32,7 @@ class FlatForm:
     carried: Mapping[PortRef, Carried] = field(default_factory=dict[PortRef, Carried])
     views: tuple[tuple[str, View], ...] = ()
     aliases: Mapping[str, PortRef] = field(default_factory=dict[str, PortRef])
-    stated: Mapping[PortRef, tuple[PortRef, Shape]] = field(
+    declared_shapes: Mapping[PortRef, tuple[PortRef, Shape]] = field(
         default_factory=dict[PortRef, tuple[PortRef, Shape]]
     )
     origins: Mapping[str, str] = field(default_factory=dict[str, str])
@@ -40,8 +40,8 @@ class FlatForm:
     def original_port(self, ref: PortRef) -> PortRef:
         """The port of the hierarchy for an input port of a flat block.
 
-        The control ``enabled/enable`` of a subsystem stands for its port: ``enabled/enable/u`` becomes
-        ``enabled/enable``.
+        The control ``enabled/enable`` represents a port of the subsystem ``enabled``: ``enabled/enable/u``
+        becomes ``enabled/enable``.
         """
         origin = self.origins.get(ref.block, ref.block)
         if ref.block.startswith(f"{origin}/"):
@@ -50,7 +50,7 @@ class FlatForm:
 
 
 def flat_form(net: Netlist) -> FlatForm:
-    """The flat form of a netlist before all passes. Raises ``DiagramError``."""
+    """Apply all passes to a netlist and return the flat form. Raises ``DiagramError``."""
     levels, net = net.levels, resolved(net)
     return FlatForm(
         diagram=_as_diagram(net),
@@ -58,7 +58,7 @@ def flat_form(net: Netlist) -> FlatForm:
         carried=net.carried,
         views=net.views,
         aliases=net.aliases,
-        stated=net.stated,
+        declared_shapes=net.declared_shapes,
         origins=net.origins,
     )
 
@@ -67,12 +67,13 @@ def _as_diagram(net: Netlist) -> Diagram:
     """The diagram of a netlist without virtual blocks."""
     return dataclasses.replace(
         net.top,
-        # Values without the masks from which they were computed.
-        blocks={path: _plain(block) for path, block in net.blocks.items()},
+        # The flat diagram has no masks: blocks keep the computed values without their formulas.
+        blocks={path: _without_formulas(block) for path, block in net.blocks.items()},
         connections=tuple(Connection(source, target) for target, source in net.drivers.items()),
         layout={},
         bends={},
         notes={},
+        bookmarks={},
         extras={},
         gates=net.gates,
         mask=(),
@@ -83,5 +84,5 @@ def _as_diagram(net: Netlist) -> Diagram:
     )
 
 
-def _plain(block: Block) -> Block:
+def _without_formulas(block: Block) -> Block:
     return dataclasses.replace(block, formulas=()) if block.formulas else block

@@ -19,8 +19,8 @@ def tunable_slots(block: Block) -> tuple[Slot, ...]:
     )
 
 
-def natural(slots: Sequence[Slot], flat: SX) -> Signals:
-    """Split a flat column into named values of natural shape."""
+def named_values(slots: Sequence[Slot], flat: SX) -> Signals:
+    """The values in a flat column by name: scalars 1x1, vectors as columns, matrices unchanged."""
     values: dict[str, SX] = {}
     start = 0
     for slot in slots:
@@ -29,7 +29,7 @@ def natural(slots: Sequence[Slot], flat: SX) -> Signals:
     return values
 
 
-def spread(value: SX, shape: Shape) -> SX:
+def broadcast_column(value: SX, shape: Shape) -> SX:
     """The flat column of a value; a scalar is broadcast to the shape."""
     slot = Slot("", shape)
     if value.numel() == 1:

@@ -31,7 +31,7 @@ _PURE_BUILTINS = frozenset(
 )
 _KNOWN_MODULES = ("math", "cmath", "numpy", "casadi", "armblocks")
 """Modules whose content is identified by their versions."""
-_READING = frozenset(
+_IMPURE_NAMES = frozenset(
     ("fromfile", "fromregex", "genfromtxt", "load", "loadtxt", "memmap", "open_memmap", "random")
 )
 """Names in those modules whose results depend on files, or differ at each call."""
@@ -42,17 +42,18 @@ class UnknownContentError(Exception):
 
 
 def function_parts(function: Callable[..., object]) -> list[object]:
-    """Values that identify the function: numbers, lists, arrays, texts.
+    """Values that identify the function: numbers, lists, arrays and texts.
 
-    They cover code, default values, closure variables, and the content of the global names that it uses,
-    including functions. Raises ``UnknownContentError`` where the content of a name cannot be determined.
+    The values cover code, default values, closure variables, and the content of the global names that it
+    uses, including functions. Raises ``UnknownContentError`` where the content of a name cannot be
+    determined.
     """
     return _parts(function, [])
 
 
-def _parts(function: object, above: list[object]) -> list[object]:
-    if any(function is other for other in above):
-        return ["calls itself", next(k for k, other in enumerate(above) if other is function)]
+def _parts(function: object, callers: list[object]) -> list[object]:
+    if any(function is other for other in callers):
+        return ["calls itself", next(k for k, other in enumerate(callers) if other is function)]
     module = str(getattr(function, "__module__", None) or "")
     if _is_known_module(module) and isinstance(
         function, FunctionType | BuiltinFunctionType | np.ufunc | type
@@ -62,40 +63,40 @@ def _parts(function: object, above: list[object]) -> list[object]:
         return ["known", "numpy", function.__name__]
     if not isinstance(function, FunctionType):
         raise UnknownContentError(f"{function!r}")
-    above = [*above, function]
+    callers = [*callers, function]
     try:
         cells = [cell.cell_contents for cell in function.__closure__ or ()]
     except ValueError:
         raise UnknownContentError("a closure variable without a value") from None
-    outside = cast("dict[str, object]", function.__globals__)
+    module_globals = cast("dict[str, object]", function.__globals__)
     parts: list[object] = ["code", *_code_parts(function.__code__)]
-    parts += [_value(value, above) for value in function.__defaults__ or ()]
-    parts += [[name, _value(value, above)] for name, value in (function.__kwdefaults__ or {}).items()]
-    parts += [_value(value, above) for value in cells]
+    parts += [_value(value, callers) for value in function.__defaults__ or ()]
+    parts += [[name, _value(value, callers)] for name, value in (function.__kwdefaults__ or {}).items()]
+    parts += [_value(value, callers) for value in cells]
     for name in sorted(_global_names(function.__code__)):
-        if name in outside:
-            parts.append([name, _value(outside[name], above)])
+        if name in module_globals:
+            parts.append([name, _value(module_globals[name], callers)])
         elif name not in _PURE_BUILTINS:
             raise UnknownContentError(name)
     return parts
 
 
-def _value(value: object, above: list[object]) -> object:
-    """The object of a global name."""
+def _value(value: object, callers: list[object]) -> object:
+    """The content of a default value, a closure variable or the value of a global name."""
     if isinstance(value, ModuleType):
         if not _is_known_module(value.__name__):
             raise UnknownContentError(value.__name__)
         return ["module", value.__name__]
     if isinstance(value, tuple | list):
-        return [_value(entry, above) for entry in cast("tuple[object, ...]", value)]
+        return [_value(entry, callers) for entry in cast("tuple[object, ...]", value)]
     if isinstance(value, dict):
         entries = cast("dict[object, object]", value)
-        return ["dict", *([_value(key, above), _value(entry, above)] for key, entry in entries.items())]
+        return ["dict", *([_value(key, callers), _value(entry, callers)] for key, entry in entries.items())]
     if value is None or isinstance(value, bool | int | float | complex | str | bytes):
         return value
     if isinstance(value, np.ndarray | np.generic) and not cast("Any", value).dtype.hasobject:
         return cast("object", value)
-    return _parts(cast("object", value), above)
+    return _parts(cast("object", value), callers)
 
 
 def _code_parts(code: CodeType) -> list[object]:
@@ -128,8 +129,8 @@ def _global_names(code: CodeType) -> set[str]:
             names.add(str(instruction.argval))
         elif instruction.opname == "IMPORT_NAME" and not _is_known_module(str(instruction.argval)):
             raise UnknownContentError(str(instruction.argval))
-    if _READING.intersection(code.co_names):
-        raise UnknownContentError(", ".join(_READING.intersection(code.co_names)))
+    if _IMPURE_NAMES.intersection(code.co_names):
+        raise UnknownContentError(", ".join(_IMPURE_NAMES.intersection(code.co_names)))
     for entry in code.co_consts:
         if isinstance(entry, CodeType):
             names |= _global_names(entry)

@@ -51,7 +51,7 @@ def run_source(source: bytes, file: Path, path: str, name: str) -> Callable[...,
 
 
 class _Source(SourceLoader):
-    """Loads a module from given bytes; no byte code beside the file is read or written."""
+    """Loads a module from given bytes; bytecode files are neither read nor written."""
 
     def __init__(self, source: bytes, file: Path) -> None:
         self._source = source
@@ -107,7 +107,7 @@ def _no_function(reference: str) -> FormatError:
 
 
 def line_of(error: BaseException, file: str) -> int:
-    """The last line of a file that led to an error, 0 if there is none."""
+    """The line of a file at which an error occurred, 0 if the file is not part of the traceback."""
     line = 0
     if isinstance(error, SyntaxError) and error.filename == file:
         line = error.lineno or 0
@@ -121,7 +121,7 @@ def line_of(error: BaseException, file: str) -> int:
 
 @dataclass(frozen=True)
 class FunctionOutline:
-    """A function at the top level of a file, as written there: arguments, line and first line of its text."""
+    """A function at the top level of a file: name, arguments, line number and first line of its docstring."""
 
     name: str
     arguments: Signature
@@ -175,7 +175,7 @@ def _arguments(declared: ast.arguments) -> Iterator[inspect.Parameter]:
 
 @dataclass(frozen=True, eq=False)
 class UnloadedFunction:
-    """Stands for a function of a file whose code has not been run; calling it raises ``fault``.
+    """Placeholder for a function of a file whose code has not been run; a call raises ``fault``.
 
     ``source`` is ``/folder/file.py:name``, ``shown`` the same with the path that user interfaces show.
     """
@@ -208,5 +208,5 @@ class UnloadedFunction:
 
 
 def unloaded(function: object) -> UnloadedFunction | None:
-    """The stand-in of a function that is not loaded, or ``None``."""
+    """The placeholder itself if the function is not loaded, else ``None``."""
     return function if isinstance(function, UnloadedFunction) else None

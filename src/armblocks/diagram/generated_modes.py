@@ -12,7 +12,7 @@ from casadi import SX, densify, if_else, substitute
 
 from armblocks.diagram.block import Signals
 from armblocks.diagram.features import Arguments, Features, SlotKind
-from armblocks.diagram.flat_values import spread
+from armblocks.diagram.flat_values import broadcast_column
 from armblocks.diagram.port import Condition, Guard, State
 from armblocks.equations import Slot, unflatten
 
@@ -20,8 +20,8 @@ from armblocks.equations import Slot, unflatten
 def with_previous_modes(features: Features, *, clocked: bool) -> Features:
     """Add a discrete state for every mode with hysteresis: its value before the event time.
 
-    Such a mode follows from this value, not from values during mode iteration. ``clocked``: the block
-    works at the ticks of a clock, which do not change this value.
+    The mode is computed from this value, not from values during the mode iteration. ``clocked``: the block is
+    active at the ticks of a clock; a tick does not change the previous value.
     """
     hysteresis_modes = [mode for mode in features.modes if mode.hysteresis]
     if not hysteresis_modes:
@@ -49,7 +49,7 @@ def with_modes_of_conditions(features: Features, located: Sequence[Condition]) -
 
     def guards(at: Arguments) -> Signals:
         quantities = equations[SlotKind.CONDITION](at)
-        sides = {entry.name: _sided(quantities[entry.name], entry.closed) for entry in located}
+        sides = {entry.name: _with_offset(quantities[entry.name], entry.closed) for entry in located}
         return {**equations[SlotKind.GUARD](at), **sides}
 
     def evaluated(at: Arguments) -> dict[str, SX]:
@@ -81,7 +81,7 @@ def with_modes_of_conditions(features: Features, located: Sequence[Condition]) -
 
 
 def evaluated_conditions(features: Features, requested: Sequence[Condition], at: Arguments) -> Signals:
-    """The conditions at the present values, each substituted into those after it."""
+    """The conditions at the present values; the value of each is substituted into the conditions after it."""
     if not requested:
         return {}
     unknown = {
@@ -95,7 +95,7 @@ def evaluated_conditions(features: Features, requested: Sequence[Condition], at:
         for name, value in values.items():
             quantity = substitute(quantity, unknown[name], value)
         truth = densify(SX(_positive(quantity, entry.closed)))
-        values[entry.name] = unflatten(spread(truth, entry.shape), entry.shape)
+        values[entry.name] = unflatten(broadcast_column(truth, entry.shape), entry.shape)
     return values
 
 
@@ -103,6 +103,6 @@ def _positive(quantity: SX, closed: bool) -> SX:
     return quantity >= 0.0 if closed else quantity > 0.0
 
 
-def _sided(quantity: SX, closed: bool) -> SX:
-    """The quantity with an offset below any signal resolution, which assigns zero to one side."""
+def _with_offset(quantity: SX, closed: bool) -> SX:
+    """The quantity with an offset below the resolution of all signals; zero then has a definite sign."""
     return quantity + 1e-300 if closed else quantity - 1e-300

@@ -29,8 +29,8 @@ class Grounded(Block):
         return cls(shapes=json.dumps({port: list(shape) for port, shape in shapes.items()}))
 
     def output_ports(self) -> tuple[Port, ...]:
-        stated: dict[str, list[int]] = json.loads(self.shapes)
-        return tuple(Port(name, "zero", "", tuple(shape)) for name, shape in stated.items())
+        shape_of_port: dict[str, list[int]] = json.loads(self.shapes)
+        return tuple(Port(name, "zero", "", tuple(shape)) for name, shape in shape_of_port.items())
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {port.name: SX.zeros(*(port.shape or (1,))) for port in self.output_ports()}
@@ -48,7 +48,7 @@ class Bypass(Block):
 
     @classmethod
     def of(cls, inputs: Sequence[str], outputs: Sequence[str]) -> Self:
-        """The stand-in with these ports."""
+        """A bypass with these ports."""
         return cls(inputs=json.dumps(list(inputs)), passed=json.dumps(list(outputs)))
 
     def input_ports(self) -> tuple[Port, ...]:

@@ -18,31 +18,31 @@ from armblocks.errors import AlgebraicLoopError
 def solve_affine(w: SX, residual: SX) -> tuple[SX, list[int], list[tuple[list[int], SX]]]:
     """Eliminate the unknowns ``w (n,)`` of ``residual(w) = 0`` that can be solved symbolically.
 
-    Returns all unknowns as functions of the remaining ones, the indices of the remaining ones, and the solved
-    subsystems: the indices of their unknowns and the Jacobian of their residual. The subsystems are the
-    strongly connected components of the dependency graph, in dependency order. A component whose residual is
-    not linear in its unknowns remains.
+    Returns all unknowns as functions of the remaining unknowns, the indices of the remaining unknowns, and
+    the solved subsystems: the indices of their unknowns and the Jacobian of their residual. The subsystems
+    are the strongly connected components of the dependency graph, in dependency order. A component whose
+    residual is not linear in its unknowns remains.
     """
     solution, remaining = SX(w), list[int]()
     loops: list[tuple[list[int], SX]] = []
     derivatives = jacobian(residual, w)
-    needs = _needs(residual, w)
+    needs = _dependencies(residual, w)
     for loop in strongly_connected(needs):
         unknowns, derivative = w[loop], derivatives[loop, loop]
-        if depends_on(derivative, unknowns) or steps_with(residual[loop], unknowns):
+        if depends_on(derivative, unknowns) or has_discontinuity(residual[loop], unknowns):
             remaining.extend(loop)
             continue
         loops.append((loop, densify(derivative)))
         constant = substitute(residual[loop], unknowns, SX.zeros(len(loop)))
-        solved = -_divided(densify(constant), derivative)
+        solved = -_linear_solve(densify(constant), derivative)
         # Earlier solutions are substituted last, into a small expression, so that the work grows linearly.
         before = sorted({index for row in loop for index in needs[row]} - set(loop))
         solution[loop] = substituted(solved, w[before], solution[before]) if before else solved
     return solution, sorted(remaining), loops
 
 
-def _divided(right: SX, matrix: SX) -> SX:
-    """``matrix^-1 right``. Up to 2 x 2 by Cramer's rule, which needs no pivots; beyond, with pivots."""
+def _linear_solve(right: SX, matrix: SX) -> SX:
+    """``matrix^-1 right``: up to 2 x 2 by Cramer's rule, without pivots, else by pivoted elimination."""
     if matrix.numel() == 1:
         return right / densify(matrix)
     if matrix.numel() == 4:
@@ -54,7 +54,7 @@ def _divided(right: SX, matrix: SX) -> SX:
     return linear_solution(densify(matrix), right)
 
 
-_STEPS = frozenset(
+_DISCONTINUOUS = frozenset(
     getattr(casadi, name)
     for name in (
         *("OP_LT", "OP_LE", "OP_EQ", "OP_NE", "OP_NOT", "OP_AND", "OP_OR"),
@@ -64,7 +64,7 @@ _STEPS = frozenset(
 """Discontinuous operations: the derivative does not show a dependence through one of them."""
 
 
-def steps_with(expression: SX, unknowns: SX) -> bool:
+def has_discontinuity(expression: SX, unknowns: SX) -> bool:
     """Whether a discontinuous operation depends on the unknowns, as in ``if(u > 0, -1, 1)``."""
     function = _function_of(expression, unknowns)
     depends = [False] * function.sz_w()
@@ -77,7 +77,7 @@ def steps_with(expression: SX, unknowns: SX) -> bool:
             depends[output] = inputs[0] == 0
             continue
         depends[output] = operation != casadi.OP_CONST and any(depends[i] for i in inputs)
-        if depends[output] and operation in _STEPS:
+        if depends[output] and operation in _DISCONTINUOUS:
             return True
     return False
 
@@ -89,8 +89,8 @@ def _function_of(expression: SX, unknowns: SX) -> Function:
     return Function("f", [unknowns, vertcat(*others, SX(0, 1))], [expression])
 
 
-def _needs(residual: SX, w: SX) -> list[list[int]]:
-    """The unknowns in each residual, including those that occur in comparisons only."""
+def _dependencies(residual: SX, w: SX) -> list[list[int]]:
+    """The indices of the unknowns in each residual, including those that occur in comparisons only."""
     sparsity = _function_of(residual, w).jac_sparsity(0, 0)
     needs: list[list[int]] = [[] for _ in range(residual.shape[0])]
     for row, column in zip(sparsity.row(), sparsity.get_col()):
@@ -108,11 +108,11 @@ def check_solvable(
     """
     derivatives = jacobian(residual, w)
     parameters = _symbols_in(p)
-    for loop in strongly_connected(_needs(residual, w)):
+    for loop in strongly_connected(_dependencies(residual, w)):
         unknowns, own, derivative = w[loop], residual[loop], derivatives[loop, loop]
         if not _symbols_in(derivative) <= parameters:
             continue
-        matrix = _number(derivative, p, values)
+        matrix = _evaluated(derivative, p, values)
         scale = np.abs(matrix).max(initial=0.0)
         if not np.isfinite(scale) or np.linalg.matrix_rank(_equilibrated(matrix)) == len(loop):
             continue
@@ -128,9 +128,9 @@ def check_solvable(
             )
         why = "with no solution or infinitely many"
         if others <= parameters:
-            right = _number(substitute(own, unknowns, SX.zeros(len(loop))), p, values).ravel()
-            widened = np.linalg.matrix_rank(np.column_stack([matrix, right]))
-            solvable = widened == np.linalg.matrix_rank(matrix)
+            right = _evaluated(substitute(own, unknowns, SX.zeros(len(loop))), p, values).ravel()
+            augmented_rank = np.linalg.matrix_rank(np.column_stack([matrix, right]))
+            solvable = augmented_rank == np.linalg.matrix_rank(matrix)
             why = "with infinitely many solutions" if solvable else "with no solution"
         raise AlgebraicLoopError(
             loops[loop[0]],
@@ -157,6 +157,6 @@ def _equilibrated(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     return matrix
 
 
-def _number(expression: SX, p: SX, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _evaluated(expression: SX, p: SX, values: NDArray[np.float64]) -> NDArray[np.float64]:
     (number,) = Function("f", [p], [densify(expression)]).call([values])
     return np.asarray(number)

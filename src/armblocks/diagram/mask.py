@@ -1,13 +1,13 @@
 """Parameters of a diagram, its *mask*, and formulas of them as parameter values of its blocks.
 
 A diagram declares parameters as a block does: name, default, unit, meaning, bounds. Inside it, a block's
-parameter may be a formula over these names, ``2*pi*f`` or ``[1 2; 3 4]*gain``. Nothing else is in scope:
-neither the parameters of outer diagrams nor signals. Outside, the mask parameters are parameters of the
-subsystem block, ``servo.stiffness``, and may be formulas of the parameters of the enclosing diagram.
+parameter may be a formula over these names, ``2*pi*f`` or ``[1 2; 3 4]*gain``. Only these
+names are in scope: neither parameters of outer diagrams nor signals. In the enclosing diagram, the mask
+parameters are parameters of the subsystem block, ``servo.stiffness``. Their values may be formulas of the
+parameters of the enclosing diagram.
 
-The blocks of a diagram always have evaluated formulas: the text is kept beside the value. All other code
-finds numbers in blocks, and a diagram with masks gives exactly the same results as one with the numbers typed
-in.
+A diagram evaluates the formulas of its blocks and stores the values beside the texts. All other code reads
+the values only. A diagram with masks therefore gives exactly the same results as a diagram with numbers.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ def parameters_read(text: str, known: Iterable[str], where: str = "") -> frozens
 
 
 def formula_number(text: str, where: str) -> float | list[Any]:
-    """The number, vector or matrix that a formula without parameters gives; a row or a column is a vector.
+    """The value of a formula without parameters: a number, vector or matrix; a row or a column is a vector.
 
     Raises ``UnknownNameError`` for a name that is not a constant, ``InputError`` where the text is not a
     formula.
@@ -142,18 +142,18 @@ def formula_value(rule: Parameter, text: str, scope: Scope, where: str) -> Value
         if name in parsed.unknown_functions:
             raise UnknownNameError("function or mask parameter", name, {*scope, *TABLE}, where=location)
         raise UnknownNameError("mask parameter", name, scope, where=location)
-    bare = text.strip()
-    if bare in scope:
-        return rule.check(scope[bare], location)
+    stripped = text.strip()
+    if stripped in scope:
+        return rule.check(scope[stripped], location)
     if rule.kind not in _NUMBERS:
         raise InputError(
             f"the formula '{text[:60]}' gives numbers",
             where=location,
             allowed="the name of a mask parameter, as the value is " + rule.describe(),
-            fix="use the name of a mask parameter with such a value",
+            fix="use the name of a mask parameter of this kind",
         )
     used = tuple((name, scope[name]) for name in sorted(parameters_read(text, scope, location)))
-    return rule.check(_of_kind(rule.kind, _evaluated(text, used, location)), location)
+    return rule.check(_converted(rule.kind, _evaluated(text, used, location)), location)
 
 
 def formula_symbols(text: str, names: Mapping[str, SX]) -> SX:
@@ -193,8 +193,8 @@ def _evaluated(text: str, used: tuple[tuple[str, Value], ...], where: str) -> fl
     return array.reshape(-1).tolist() if 1 in array.shape else array.tolist()
 
 
-def _of_kind(kind: ParameterKind, value: float | list[Any]) -> float | list[Any]:
-    """Integers and booleans are numbers in formulas."""
+def _converted(kind: ParameterKind, value: float | list[Any]) -> float | list[Any]:
+    """The value as an integer or boolean where the kind requires it; formulas compute with floats."""
     if not isinstance(value, float):
         return value
     if kind is ParameterKind.INTEGER and value.is_integer():

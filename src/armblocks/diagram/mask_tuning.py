@@ -63,8 +63,8 @@ def dependent_parameters(diagram: Diagram, path: str, symbol: SX | None = None) 
 def added_parameter(diagram: Diagram, path: str) -> AddedParameter:
     """A mask parameter as a parameter of the equations: its change, and the changes of dependent parameters.
 
-    Raises ``UnknownNameError`` for a path that is not a mask parameter, ``InputError`` for one that is not a
-    number or on which a structural parameter depends.
+    Raises ``UnknownNameError`` for a path that is not a mask parameter, ``InputError`` for a parameter that
+    is not a number or on which a structural parameter depends.
     """
     known = mask_parameters(diagram)
     if path not in known:
@@ -130,7 +130,7 @@ def _add_dependents(
                     inner[parameter] = SX.sym(parameter)  # a choice or a robot: the only formula is its name
                 else:
                     inner[parameter] = formula_symbols(text, {**constants, **perturbed})
-            elif _stays_input(block, parameter):
+            elif _is_run_input(block, parameter):
                 dependents.tunable[f"{joined(path, name)}.{parameter}"] = formula_symbols(
                     text, {**constants, **perturbed}
                 )
@@ -140,7 +140,7 @@ def _add_dependents(
             _add_dependents(joined(path, name), block.diagram, inner, dependents)
 
 
-def _stays_input(block: Block, parameter: str) -> bool:
+def _is_run_input(block: Block, parameter: str) -> bool:
     return any(rule.name == parameter for rule in block.inputs_of_the_run())
 
 

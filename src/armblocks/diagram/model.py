@@ -12,7 +12,7 @@ from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.hierarchy import flatten_hierarchy
 from armblocks.diagram.ordering import Evaluation, Network, evaluation_order
 from armblocks.diagram.sampling import Sampling, check_triggered, moving_blocks, resolve_sampling
-from armblocks.diagram.shapes import DiagramShapes, check_stated, infer_shapes
+from armblocks.diagram.shapes import DiagramShapes, check_declared_shapes, infer_shapes
 from armblocks.diagram.sums_on_loops import sums_on_loops
 from armblocks.errors import ArmblocksError, DiagramError
 
@@ -33,13 +33,13 @@ def diagram_model(diagram: Diagram) -> Model:
     """Analyse the flat form of a diagram.
 
     Raises ``DiagramError`` for unconnected inputs, for shapes and sample times that do not fit, and for
-    blocks whose parameters allow no equations (a robot without mass), ``AlgebraicLoopError`` for loops
+    blocks whose parameters allow no equations (a robot without mass). Raises ``AlgebraicLoopError`` for loops
     without an evaluation order.
     """
     shapes = infer_shapes(diagram)
     form = flatten_hierarchy(diagram)
     diagram = form.diagram
-    check_stated(form, shapes)
+    check_declared_shapes(form, shapes)
     free = [name for name in diagram.blocks if not diagram.clocked(name)]
     equations = {name: _equations(diagram, name, shapes) for name in free}
     check_triggered(diagram, equations)

@@ -11,7 +11,7 @@ from armblocks.errors import DiagramError
 MAX_NAME_LENGTH = 200
 """Characters."""
 NOT_SIGNALS = ("time", "run")
-"""Names that no signal has: data files have the times of the rows and the description of the run there."""
+"""Names that signals must not have: data files use them for the times and the description of the run."""
 
 
 def check_block_name(name: str, where: str, noun: str = "block") -> None:
@@ -44,13 +44,39 @@ def check_printable(name: str, where: str, noun: str, allowed: str, *, without: 
             )
 
 
+def check_new_name(name: str, others: Iterable[str], where: str, *, noun: str, max_count: int) -> None:
+    """Raise ``DiagramError`` for a name that is blank, too long, not printable, or used by one of ``others``,
+    of which a diagram has at most ``max_count``.
+    """
+    allowed = (
+        f"1 to {MAX_NAME_LENGTH} characters, other than those of another {noun.split()[-1]} "
+        "regardless of capitalisation"
+    )
+    check_printable(name, where, noun, allowed)
+    used_names = {folded(other): other for other in others}
+    if folded(name) in used_names:
+        raise DiagramError(
+            f"a {noun} is already named '{used_names[folded(name)]}'",
+            where=where,
+            allowed=allowed,
+            fix="choose another name",
+        )
+    if len(used_names) >= max_count:
+        raise DiagramError(
+            f"the diagram has {len(used_names)} {noun}s",
+            where=where,
+            allowed=f"at most {max_count}",
+            fix="remove one of them",
+        )
+
+
 def folded(name: str) -> str:
     """The form in which names are compared: ignores case and Unicode composition."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFKD", name).casefold())
 
 
 class FreeNames:
-    """The names that no block and no signal of a sheet has yet."""
+    """Chooses names that no block and no signal of a sheet uses."""
 
     def __init__(self, used_names: Iterable[str]) -> None:
         self._used = {folded(name) for name in used_names}
@@ -65,8 +91,9 @@ class FreeNames:
 
 
 def check_signal_names(blocks: Iterable[str], names: Mapping[PortRef, str], where: str) -> None:
-    """Raise ``DiagramError`` for a name that another signal or a block of the sheet has, or that data files
-    do not allow: columns of a vector are named ``signal[0]``.
+    """Raise ``DiagramError`` for a signal name that is used twice or that data files do not allow.
+
+    In data files, columns of a vector are named ``signal[0]``, so that brackets are not allowed.
     """
     used_names = {folded(name): f"the block '{name}'" for name in blocks}
     for ref, name in sorted(names.items()):

@@ -91,8 +91,7 @@ class Network:
                     yield self.state_rate(node.block, state, order).node, (f"{node.block}/{state}'",)
 
     def roots(self) -> Iterator[Node]:
-        """All required nodes: all groups and those of derivative ports; at a tick, those of sampled
-        blocks."""
+        """The required nodes: all groups and derivative ports; at a tick, only those of sampled blocks."""
         for name, block in self.diagram.blocks.items():
             clocked = self.diagram.clocked(name)
             if clocked and not self.ticking:
@@ -127,16 +126,15 @@ class Evaluation:
 
 
 def evaluation_order(network: Network, sums: Mapping[Node, tuple[str, ...]] | None = None) -> Evaluation:
-    """The evaluation order of the nodes; equal diagrams have equal orders, however they were built.
+    """The evaluation order of the nodes. It does not depend on the order in which a diagram was built.
 
     ``sums`` are nodes at which loops are cut first, each with its loop; remaining loops are cut where they
     close.
 
     The search is depth-first and iterative, so that chains may be long.
 
-    Raises ``AlgebraicLoopError`` for a loop with unbounded orders of differentiation (a group depends on
-    itself in a higher order), and at a tick for a loop through a sampled block without delay, whose output is
-    not defined.
+    Raises ``AlgebraicLoopError`` for a loop with unbounded orders of differentiation: a group depends on
+    itself in a higher order. At a tick, also raises it for a loop through a sampled block without delay.
     """
     order: list[Node] = []
     loops: dict[Node, tuple[str, ...]] = {}

@@ -51,10 +51,10 @@ class RobotHolder(Protocol):
 class Parameter:
     """One parameter of a block type.
 
-    ``tunable``: its value stays an input of the compiled system (numbers and arrays only; an array's shape is
+    ``tunable``: the value is an input of the compiled system (numbers and arrays only; an array's shape is
     constant). ``dimensions``: the allowed numbers of axes of an array (0 is a scalar). ``minimum``,
     ``above``, ``maximum`` bound every entry; ``finite`` rejects infinities (NaN is always rejected).
-    ``roots``: an array of zeros or poles, which may be empty; complex ones become rows (real, imaginary).
+    ``roots``: an array of zeros or poles, which may be empty; complex roots become rows (real, imaginary).
     ``of_type``: the class that an object of kind ``ROBOT``, ``DIAGRAM``, ``TABLE`` or ``FUNCTION`` must have.
     """
 
@@ -124,10 +124,10 @@ def parameter(
     kind = kind or kind_of(default, rules)
     if tunable is None:
         tunable = kind in (ParameterKind.NUMBER, ParameterKind.ARRAY)
-    stated = Parameter(name="", kind=kind, doc=doc, default=default, unit=unit, tunable=tunable, **rules)
+    declaration = Parameter(name="", kind=kind, doc=doc, default=default, unit=unit, tunable=tunable, **rules)
     if default is REQUIRED:
-        return dataclasses.field(metadata={"parameter": stated})
-    return dataclasses.field(default=default, metadata={"parameter": stated})
+        return dataclasses.field(metadata={"parameter": declaration})
+    return dataclasses.field(default=default, metadata={"parameter": declaration})
 
 
 def shape_of(value: object) -> Shape:
@@ -148,7 +148,7 @@ def kind_of(default: object, rules: dict[str, Any]) -> ParameterKind:
     return ParameterKind.ARRAY
 
 
-def _refuse(rule: Parameter, value: Any, where: str) -> InputError:
+def _invalid_value(rule: Parameter, value: Any, where: str) -> InputError:
     shown = repr(value)
     shown = shown if len(shown) <= 80 else shown[:77] + "..."
     return InputError(f"the value is {shown}", where=where, allowed=rule.describe(), fix=f"give {rule.doc}")
@@ -161,14 +161,14 @@ def _check_bounds(rule: Parameter, values: np.ndarray[Any, Any], value: object, 
     if rule.finite:
         inside &= np.isfinite(values)
     if not bool(np.all(inside)):
-        raise _refuse(rule, value, where)
+        raise _invalid_value(rule, value, where)
 
 
 def _check_number(rule: Parameter, value: object, where: str) -> float:
     if isinstance(value, np.ndarray) and cast("np.ndarray[Any, Any]", value).ndim == 0:
         value = cast("np.ndarray[Any, Any]", value).item()
     if not isinstance(value, numbers.Real) or isinstance(value, bool | np.bool):
-        raise _refuse(rule, value, where)
+        raise _invalid_value(rule, value, where)
     number = float(value)
     _check_bounds(rule, np.asarray(number), value, where)
     return number
@@ -178,12 +178,12 @@ def _check_array(rule: Parameter, value: object, where: str) -> Value:
     try:
         array: np.ndarray[Any, Any] = np.asarray(cast("Any", value))
     except ValueError:  # rows of different lengths
-        raise _refuse(rule, value, where) from None
+        raise _invalid_value(rule, value, where) from None
     if rule.roots and array.dtype.kind == "c" and array.ndim == 1:
         array = np.column_stack([np.real(array), np.imag(array)])
     empty = array.size == 0 and not rule.roots
     if array.dtype.kind not in "iuf" or array.ndim not in rule.dimensions or empty:
-        raise _refuse(rule, value, where)
+        raise _invalid_value(rule, value, where)
     array = array.astype(np.float64)
     _check_bounds(rule, array, value, where)
     return _as_tuples(array.tolist())
@@ -197,7 +197,7 @@ def _as_tuples(value: Any) -> Value:
 
 def _check_integer(rule: Parameter, value: object, where: str) -> int:
     if isinstance(value, bool) or not isinstance(value, numbers.Integral):
-        raise _refuse(rule, value, where)
+        raise _invalid_value(rule, value, where)
     number = int(value)
     _check_bounds(rule, np.asarray(float(number)), value, where)
     return number
@@ -205,25 +205,25 @@ def _check_integer(rule: Parameter, value: object, where: str) -> int:
 
 def _check_choice(rule: Parameter, value: object, where: str) -> str:
     if not isinstance(value, str) or value not in rule.choices:
-        raise _refuse(rule, value, where)
+        raise _invalid_value(rule, value, where)
     return value
 
 
 def _check_string(rule: Parameter, value: object, where: str) -> str:
     if not isinstance(value, str):
-        raise _refuse(rule, value, where)
+        raise _invalid_value(rule, value, where)
     return value
 
 
 def _check_boolean(rule: Parameter, value: object, where: str) -> bool:
     if not isinstance(value, bool):
-        raise _refuse(rule, value, where)
+        raise _invalid_value(rule, value, where)
     return value
 
 
 def _check_object(rule: Parameter, value: object, where: str) -> object:
     if rule.of_type is not None and not isinstance(value, rule.of_type):
-        raise _refuse(rule, value, where)
+        raise _invalid_value(rule, value, where)
     return value
 
 
@@ -237,7 +237,7 @@ def _check_table(rule: Parameter, value: object, where: str) -> TimeTable:
     try:
         rows = np.asarray(cast("Any", value), dtype=np.float64)
     except (TypeError, ValueError):
-        raise _refuse(rule, value, where) from None
+        raise _invalid_value(rule, value, where) from None
     return TimeTable(rows)
 
 
@@ -245,7 +245,7 @@ def _check_function(rule: Parameter, value: object, where: str) -> UserFunction:
     if isinstance(value, UserFunction):
         return value
     if not callable(value):
-        raise _refuse(rule, value, where)
+        raise _invalid_value(rule, value, where)
     return UserFunction(value)
 
 

@@ -11,15 +11,15 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.mask_tuning import dependent_parameters
-from armblocks.diagram.names import MAX_NAME_LENGTH, check_printable, folded
+from armblocks.diagram.names import check_new_name
 from armblocks.diagram.parameter import Parameter, ParameterKind, Value
 from armblocks.diagram.variation import check_settable, found_block, with_parameters
 from armblocks.errors import ArmblocksError, DiagramError, UnknownNameError
 
 MAX_SETS = 1000
-"""Largest number of parameter sets of a diagram."""
+"""Maximum number of parameter sets of a diagram."""
 MAX_SET_VALUES = 1000
-"""Largest number of parameters of a set."""
+"""Maximum number of parameters of a set."""
 _KINDS = (
     ParameterKind.NUMBER,
     ParameterKind.ARRAY,
@@ -115,25 +115,7 @@ def checked_entry(diagram: Diagram, path: str, value: object, where: str) -> Val
 
 def check_set_name(name: str, others: Iterable[str], where: str) -> None:
     """Raise ``DiagramError`` for a name that is empty, too long, not printable, or used by another set."""
-    allowed = (
-        f"1 to {MAX_NAME_LENGTH} characters, other than those of another set regardless of capitalisation"
-    )
-    check_printable(name, where, "parameter set", allowed)
-    used_names = {folded(other): other for other in others}
-    if folded(name) in used_names:
-        raise DiagramError(
-            f"a parameter set is already named '{used_names[folded(name)]}'",
-            where=where,
-            allowed=allowed,
-            fix="choose another name",
-        )
-    if len(used_names) >= MAX_SETS:
-        raise DiagramError(
-            f"the diagram has {len(used_names)} parameter sets",
-            where=where,
-            allowed=f"at most {MAX_SETS}",
-            fix="remove one of them",
-        )
+    check_new_name(name, others, where, noun="parameter set", max_count=MAX_SETS)
 
 
 def check_parameter_sets(diagram: Diagram) -> None:

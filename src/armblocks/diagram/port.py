@@ -13,8 +13,8 @@ class Port:
     """One input or output of a block.
 
     ``shape`` is the only allowed shape, or ``None`` if it follows from the connections. ``unit`` is SI, or
-    ``""`` if the port has no unit or that of its signal. ``names`` are the names of the entries of a vector,
-    such as joints, where the block knows them.
+    ``""`` if the port has no unit or the unit of its signal. ``names`` are the names of the entries of a
+    vector, such as joints, where the block knows them.
     """
 
     name: str
@@ -31,9 +31,9 @@ class State:
     ``follows``: whether a mode is a following mode, that is, a function of the present signals. Following
     modes are made consistent before any event (an edge, a trigger, a reset) is processed. Other modes are
     stateful. ``hysteresis``: whether a following mode also depends on its previous value: the value before
-    the instant, or before the latest event at it. A discrete state with ``hysteresis`` is captured at the
-    same times. ``stored_while``: the mode of the same block without which the previous value is kept.
-    ``momentary``: whether a discrete state becomes 0 at the end of every instant.
+    the instant, or before the latest event at this instant. A discrete state with ``hysteresis`` is captured
+    at the same times. ``stored_while``: a mode of the same block; while it is 0, the previous value does not
+    change. ``momentary``: whether a discrete state becomes 0 at the end of every instant.
     """
 
     name: str
@@ -62,8 +62,8 @@ class Guard:
 
     ``direction``: +1 for upward crossings, -1 for downward, 0 for both. ``action``: effect on the run where
     it is positive: ``stop`` ends the run, ``fail`` is an error, ``warn`` is reported at the end. ``locates``:
-    whether its zero only locates a change of a mode that follows the signals. ``silenced_by``: the momentary
-    state that disables the guard while it is not 0. At the end of the instant the guard is initialised again,
+    whether a zero crossing only locates a change of a following mode. ``silenced_by``: the momentary
+    state that disables the guard while it is not 0. At the end of the instant, the guard is initialised again
     with its sign at that time.
     """
 
@@ -91,7 +91,7 @@ class Condition:
     """A boolean function of a block's values, by element: 1 where a quantity is positive, else 0.
 
     ``closed``: whether 0 itself counts as positive. ``located``: whether a change of the condition is an
-    event; if not, the condition is evaluated with the equations, at the times at which these are evaluated.
+    event; if not, the condition is evaluated together with the equations.
     """
 
     name: str
@@ -122,7 +122,7 @@ class ViewKind(Enum):
     VALUE = "value"
     """The value at the end or at the selected time (Display)."""
     ROBOT = "robot"
-    """A moving robot: the one signal holds the poses of its links, shape (L+2, 4, 4)."""
+    """A moving robot: the only signal is the poses of its links, shape (L+2, 4, 4)."""
     SPECTRUM = "spectrum"
     """Every signal over the frequency (Spectrum); ``subject`` is a ``SpectrumSettings``."""
     DATA = "data"
@@ -158,9 +158,10 @@ class FileSettings:
 class View:
     """One view of a block; report and studio draw it without knowledge of the block's class.
 
-    ``signals`` names ports or records of the block itself, so that ``f"{block}/{signal}"`` is a name that a
-    simulation result knows. ``labels`` gives a text for each (``""``: the signal's own name). ``subject`` is
-    the ``Robot`` to draw where the kind is ``ROBOT``, and the settings where a kind has some.
+    ``signals`` names ports or records of the block itself, so that ``f"{block}/{signal}"`` is the name of a
+    signal of the simulation result. ``labels`` gives a text for each (``""``: the signal's own name).
+    ``subject`` is the ``Robot`` to draw for the kind ``ROBOT``, and the settings for ``SPECTRUM`` and
+    ``FILE``.
     """
 
     kind: ViewKind

@@ -21,10 +21,10 @@ from armblocks.equations.clock_ratios import exact_clocks
 from armblocks.errors import DiagramError, InputError
 
 INHERITED = -1.0
-"""The sample time of a block that inherits the sample time of its inputs, as in Simulink."""
+"""The sample time of a block that inherits the clock of other blocks, see :func:`resolve_sampling`."""
 
 Source = SampleClock | None
-"""When a signal changes: at the ticks of a clock, or (``None``) continuously."""
+"""The times at which a signal changes: the ticks of a clock, or (``None``) all times."""
 
 
 def sample_time_parameter(default: float = INHERITED) -> Any:
@@ -35,12 +35,12 @@ def sample_time_parameter(default: float = INHERITED) -> Any:
         dimensions=(0, 1),
         tunable=False,
         unit="s",
-        doc="the period, or (period, offset); -1 inherits that of the inputs",
+        doc="the period, or (period, offset); -1 inherits it from the sampled blocks upstream or downstream",
     )
 
 
 def own_clock(block: Block) -> SampleClock | None:
-    """The clock that a sampled block declares; ``None`` if it inherits that of its inputs.
+    """The clock that a sampled block declares; ``None`` if the block inherits its clock.
 
     Raises ``InputError`` for an invalid sample time.
     """
@@ -52,7 +52,7 @@ def own_clock(block: Block) -> SampleClock | None:
         raise InputError(
             f"the sample time is {sample_time.tolist()}",
             where=f"{block.type_name()}.sample_time",
-            allowed="-1 (that of the inputs), a period > 0, or (period, offset) with 0 <= offset < period",
+            allowed="-1 (inherited), a period > 0, or (period, offset) with 0 <= offset < period",
             fix="give the period in seconds",
         )
     return SampleClock(period, offset)
@@ -70,8 +70,8 @@ def resolve_sampling(diagram: Diagram, equations: Mapping[str, BlockEquations]) 
     """Find the clock of every sampled block; ``equations`` are those of all other blocks.
 
     A block with sample time -1 inherits the clock of the sampled blocks upstream, through blocks without
-    states; the fastest one, if the periods of the others are multiples of it. If only constants are upstream,
-    it inherits from the sampled blocks downstream.
+    states. Of several clocks it inherits the fastest, if all other periods are multiples of it. If only
+    constants are upstream, the block inherits the clock of the sampled blocks downstream.
 
     Raises ``DiagramError`` for a block without a clock upstream or downstream, and for clocks that are not
     multiples.
@@ -79,46 +79,46 @@ def resolve_sampling(diagram: Diagram, equations: Mapping[str, BlockEquations]) 
     sampled = [name for name in diagram.blocks if diagram.clocked(name)]
     if not sampled:
         return Sampling((), {})
-    stated: dict[str, SampleClock | None] = {}
+    declared: dict[str, SampleClock | None] = {}
     for name in sampled:
         try:
-            stated[name] = own_clock(diagram.blocks[name])
+            declared[name] = own_clock(diagram.blocks[name])
         except InputError as error:
             raise DiagramError(
                 error.what, where=f"block '{name}', {error.where}", allowed=error.allowed, fix=error.fix
             ) from None
-    begins: dict[str, Source] = {name: clock for name, clock in stated.items() if clock is not None}
-    begins.update({name: None for name, clocks_by_block in equations.items() if _flows(clocks_by_block)})
+    sources: dict[str, Source] = {name: clock for name, clock in declared.items() if clock is not None}
+    sources.update({name: None for name, own in equations.items() if _is_continuous(own)})
     forward = {name: list[str]() for name in diagram.blocks}
     backward = {name: list[str]() for name in diagram.blocks}
     for wire in diagram.connections:
         forward[wire.source.block].append(wire.target.block)
         backward[wire.target.block].append(wire.source.block)
-    upstream = _reach(begins, forward)
+    upstream = _nearest_sources(sources, forward)
     downstream: Mapping[str, Collection[tuple[str, Source]]] | None = None
     clocks_by_block: dict[str, SampleClock] = {}
-    for name, clock in stated.items():
+    for name, clock in declared.items():
         if clock is not None:
             clocks_by_block[name] = clock
             continue
-        reaching = {source for entry in backward[name] for source in upstream[entry]}
-        if not reaching:
+        reaching_sources = {source for entry in backward[name] for source in upstream[entry]}
+        if not reaching_sources:
             if downstream is None:
-                clocked = {entry: own for entry, own in stated.items() if own is not None}
-                downstream = _reach(dict(clocked), backward)
-            reaching = {source for entry in forward[name] for source in downstream[entry]}
-        clocks_by_block[name] = _fastest(name, diagram.blocks[name], reaching)
+                clocked = {entry: own for entry, own in declared.items() if own is not None}
+                downstream = _nearest_sources(dict(clocked), backward)
+            reaching_sources = {source for entry in forward[name] for source in downstream[entry]}
+        clocks_by_block[name] = _fastest_clock(name, diagram.blocks[name], reaching_sources)
     clocks = tuple(sorted(set(clocks_by_block.values()), key=lambda clock: (clock.period, clock.offset)))
     return Sampling(clocks, {name: clocks.index(clock) for name, clock in clocks_by_block.items()})
 
 
 def moving_blocks(diagram: Diagram, equations: Mapping[str, BlockEquations]) -> frozenset[str]:
-    """The blocks with outputs that may change between instants: they depend on time, a state, or such
-    outputs.
+    """The blocks with moving outputs: outputs that may change between instants.
 
-    Outputs that depend only on sampled blocks, constants and modes change at instants. Blocks on a loop
-    always belong to the result, so that a loop through comparisons is solved for each of their values.
-    ``equations`` are those of all blocks that are not sampled.
+    A moving output depends on time, a state, or another moving output. Outputs that depend only on sampled
+    blocks, constants and modes change at instants. The result contains all blocks on loops, so that a loop
+    through comparisons is solved for each value of the comparisons. ``equations`` are those of all blocks
+    that are not sampled.
     """
     wires = {name: list[tuple[str, PortRef]]() for name in equations}
     for wire in diagram.connections:
@@ -134,21 +134,19 @@ def moving_blocks(diagram: Diagram, equations: Mapping[str, BlockEquations]) -> 
             if (port in outputs or name in on_loops) and target.port not in inputs[target.block]:
                 inputs[target.block].add(target.port)
                 queue.append(target.block)
-    flowing = {name for name, own in equations.items() if _flows(own)}
-    return frozenset(flowing | on_loops | {name for name, ports in inputs.items() if ports})
+    continuous = {name for name, own in equations.items() if _is_continuous(own)}
+    return frozenset(continuous | on_loops | {name for name, ports in inputs.items() if ports})
 
 
 def check_triggered(diagram: Diagram, equations: Mapping[str, BlockEquations]) -> None:
-    """Raise ``DiagramError`` for a block in a triggered subsystem with a continuous state or with a declared
-    sample time.
-    """
+    """Raise ``DiagramError`` for a continuous state or a declared sample time in a triggered subsystem."""
     for name, own in equations.items():
         block = diagram.blocks[name]
         if diagram.clocked(name) or "?fire" not in diagram.gates.get(name, {}):
             continue
         timed = block.sampled and own_clock(block) is not None
         if own.states or timed:
-            kind = "ticks by itself" if timed else f"has the continuous state '{own.states[0].name}'"
+            kind = "has its own sample time" if timed else f"has the continuous state '{own.states[0].name}'"
             raise DiagramError(
                 f"a block in a triggered subsystem {kind}",
                 where=f"block '{name}' ({block.title})",
@@ -157,13 +155,13 @@ def check_triggered(diagram: Diagram, equations: Mapping[str, BlockEquations]) -
             )
 
 
-def _flows(block: BlockEquations) -> bool:
+def _is_continuous(block: BlockEquations) -> bool:
     """Whether outputs of a block depend on time or a continuous state."""
     return bool(block.states or block.delays) or any(group.timed for group in block.groups)
 
 
 def _moving_outputs(block: Block, equations: BlockEquations, moving: Collection[str]) -> set[str]:
-    """The outputs of a block that may change between instants, where these inputs do."""
+    """The outputs of a block that may change between instants if the inputs ``moving`` do."""
     delayed = {line.name for line in equations.delays}
     outputs: set[str] = set()
     for port in block.output_ports():
@@ -178,29 +176,29 @@ def _moving_outputs(block: Block, equations: BlockEquations, moving: Collection[
     return outputs
 
 
-def _on_loops(following: Mapping[str, Iterable[str]]) -> set[str]:
+def _on_loops(successors: Mapping[str, Iterable[str]]) -> set[str]:
     """The blocks on feedback loops."""
-    indices = {name: index for index, name in enumerate(following)}
-    names = list(following)
-    needs = [[indices[entry] for entry in entries] for entries in following.values()]
+    indices = {name: index for index, name in enumerate(successors)}
+    names = list(successors)
+    needs = [[indices[entry] for entry in entries] for entries in successors.values()]
     components = (component for component in strongly_connected(needs) if len(component) > 1)
     on_loops = {names[index] for component in components for index in component}
-    return on_loops | {name for name, entries in following.items() if name in entries}
+    return on_loops | {name for name, entries in successors.items() if name in entries}
 
 
-def _reach(
-    begins: Mapping[str, Source], following: Mapping[str, Iterable[str]]
+def _nearest_sources(
+    sources: Mapping[str, Source], successors: Mapping[str, Iterable[str]]
 ) -> Mapping[str, set[tuple[str, Source]]]:
-    """For each block the nearest sources of its sample time, without those upstream of another source."""
-    reach: dict[str, set[tuple[str, Source]]] = {name: set() for name in following}
+    """The nearest sources of the sample time of each block; a source hides those upstream of it."""
+    reach: dict[str, set[tuple[str, Source]]] = {name: set() for name in successors}
     queue: deque[str] = deque()
-    for name, source in begins.items():
+    for name, source in sources.items():
         reach[name].add((name, source))
         queue.append(name)
     while queue:
         name = queue.popleft()
-        for entry in following[name]:
-            if entry in begins:
+        for entry in successors[name]:
+            if entry in sources:
                 continue
             before = len(reach[entry])
             # One block per clock is enough for the message and limits the size of the sets.
@@ -211,34 +209,36 @@ def _reach(
     return reach
 
 
-def _fastest(name: str, block: Block, reaching: Collection[tuple[str, Source]]) -> SampleClock:
+def _fastest_clock(name: str, block: Block, reaching_sources: Collection[tuple[str, Source]]) -> SampleClock:
     where = f"block '{name}' ({block.title})"
     fix = "set the sample_time of the block"
-    moving = sorted(entry for entry, source in reaching if source is None)
+    moving = sorted(entry for entry, source in reaching_sources if source is None)
     if moving:
         raise DiagramError(
-            f"the sample time -1 is that of the inputs, but '{moving[0]}' changes continuously",
+            f"the sample time is -1 (inherited), but '{moving[0]}' changes continuously",
             where=where,
             allowed="-1 downstream of sampled blocks only",
             fix=fix + "; to delay a continuous signal, use a Transport Delay",
         )
-    clocks = sorted(((clock, entry) for entry, clock in reaching if clock), key=lambda pair: pair[0].period)
+    clocks = sorted(
+        ((clock, entry) for entry, clock in reaching_sources if clock), key=lambda pair: pair[0].period
+    )
     if not clocks:
         raise DiagramError(
-            "the sample time -1 is that of the inputs, but none of them is sampled",
+            "the sample time is -1 (inherited), but no connected block is sampled",
             where=where,
             allowed="-1 upstream or downstream of a block with a sample time",
             fix=fix,
         )
-    fastest, by = clocks[0]
+    fastest, fastest_block = clocks[0]
     for clock, other in clocks[1:]:
         (step, start), (period, offset) = exact_clocks((fastest, clock))
         if (period / step).denominator != 1 or ((offset - start) / step).denominator != 1:
             raise DiagramError(
-                f"'{by}' ticks every {fastest.period:g} s (offset {fastest.offset:g} s) and '{other}' every "
-                f"{clock.period:g} s (offset {clock.offset:g} s)",
+                f"'{fastest_block}' ticks every {fastest.period:g} s (offset {fastest.offset:g} s) and "
+                f"'{other}' every {clock.period:g} s (offset {clock.offset:g} s)",
                 where=where,
-                allowed="inputs whose ticks are all ticks of the fastest one",
+                allowed="inputs whose ticks are all ticks of the fastest input",
                 fix=fix + ", or put a Rate Transition before one of the inputs",
             )
     return fastest

@@ -17,7 +17,7 @@ from armblocks.diagram.port import PortRef
 from armblocks.equations import Shape
 from armblocks.errors import ArmblocksError, DiagramError
 
-_OPEN = "?open"
+_GROUND = "?open"
 """The block that drives the unconnected inputs of a model without comments."""
 
 
@@ -38,7 +38,7 @@ def known_shapes(diagram: Diagram) -> dict[PortRef, Shape]:
     def learn(ref: PortRef, shape: Shape) -> None:
         if known.get(ref) == shape:
             return
-        # Each assumption can be widened once; more changes would not terminate.
+        # Each assumed shape can be widened once. More changes mean a shape that grows along a loop.
         changes[ref] = changes.get(ref, -1) + 1
         if changes[ref] > len(diagram.blocks):
             raise DiagramError(
@@ -120,10 +120,10 @@ def signals_without_comments(levels: Mapping[str, Diagram]) -> KnownSignals:
         for name in level.commented
         if not level.blocks[name].output_ports()
     }
-    plain = {path: block for path, block in net.blocks.items() if not is_inside(path, sinks)}
-    active = {path: level for path, level in levels.items() if not is_inside(path, sinks)}
+    active_blocks = {path: block for path, block in net.blocks.items() if not is_inside(path, sinks)}
+    active_levels = {path: level for path, level in levels.items() if not is_inside(path, sinks)}
     try:
-        form = flat_form(dataclasses.replace(net, blocks=plain, levels=active))
+        form = flat_form(dataclasses.replace(net, blocks=active_blocks, levels=active_levels))
         return KnownSignals(carried=form.carried, shapes=known_shapes(form.diagram))
     except ArmblocksError:
         return KnownSignals()
@@ -132,11 +132,11 @@ def signals_without_comments(levels: Mapping[str, Diagram]) -> KnownSignals:
 def _grounded(net: Netlist) -> Netlist:
     """A netlist with a scalar zero at every unconnected input."""
     targets = (PortRef(path, port.name) for path, block in net.blocks.items() for port in block.input_ports())
-    missing = {target: PortRef(_OPEN, "y") for target in targets if target not in net.drivers}
+    missing = {target: PortRef(_GROUND, "y") for target in targets if target not in net.drivers}
     if not missing:
         return net
     return dataclasses.replace(
         net,
-        blocks={**net.blocks, _OPEN: Grounded.of({"y": ()})},
+        blocks={**net.blocks, _GROUND: Grounded.of({"y": ()})},
         drivers={**net.drivers, **missing},
     )

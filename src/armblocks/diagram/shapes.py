@@ -23,13 +23,13 @@ class DiagramShapes:
     outputs: Mapping[str, Shapes]
 
 
-def check_stated(form: FlatForm, shapes: DiagramShapes) -> None:
-    """Raise ``DiagramError`` where a signal at the end of a subsystem differs from the declared shape."""
-    for target, (source, stated) in form.stated.items():
+def check_declared_shapes(form: FlatForm, shapes: DiagramShapes) -> None:
+    """Raise ``DiagramError`` where a signal at an In or Out block differs from its declared shape."""
+    for target, (source, declared) in form.declared_shapes.items():
         shape = shapes.outputs[source.block][source.port]
-        if not shapes_agree(shape, stated):
+        if not shapes_agree(shape, declared):
             raise DiagramError(
-                f"'{source}' gives shape {shape} but '{target}' takes shape {stated}",
+                f"'{source}' gives shape {shape} but '{target}' takes shape {declared}",
                 where=f"block '{target.block}'",
                 allowed="the dimensions of the subsystem's In and Out blocks",
                 fix="change the dimensions of the block or the width of the signal",
@@ -53,13 +53,13 @@ def infer_shapes(diagram: Diagram) -> DiagramShapes:
 def _checked(form: FlatForm, known: Mapping[PortRef, Shape]) -> DiagramShapes:
     """All shapes by block; raises the errors that were deferred until all shapes were known."""
     diagram, drivers = form.diagram, form.diagram.drivers
-    stated = {
+    port_shapes = {
         PortRef(name, port.name): port.shape
         for name, block in diagram.blocks.items()
         for port in block.input_ports()
     }
     for wire in diagram.connections:
-        signal_shape, port_shape = known.get(wire.source), stated[wire.target]
+        signal_shape, port_shape = known.get(wire.source), port_shapes[wire.target]
         if signal_shape is not None and port_shape is not None and not shapes_agree(signal_shape, port_shape):
             target = form.original_port(wire.target)
             raise DiagramError(
@@ -71,7 +71,7 @@ def _checked(form: FlatForm, known: Mapping[PortRef, Shape]) -> DiagramShapes:
     inputs: dict[str, Shapes] = {}
     outputs: dict[str, Shapes] = {}
     for name, block in diagram.blocks.items():
-        # Still unknown: depends on a block whose error is raised below; any shape is valid until then.
+        # A shape that is still unknown depends on a block whose error is raised below; () is a placeholder.
         input_shapes: dict[str, Shape] = {}
         complete = True
         for port in block.input_ports():

@@ -18,9 +18,9 @@ from armblocks.diagram.port import PortRef
 
 
 def named_signals(form: FlatForm) -> Iterator[tuple[str, PortRef]]:
-    """The names of all signals by path, outer sheets first, and then those of elements of buses.
+    """The names of all signals by path, outer sheets first, with the signals.
 
-    An element is ``name.element``.
+    The names of bus elements, ``name.element``, come last.
     """
     elements: list[tuple[str, PortRef]] = []
     for level, diagram in active_levels(form.levels).items():
@@ -35,7 +35,7 @@ def named_signals(form: FlatForm) -> Iterator[tuple[str, PortRef]]:
 
 
 def signal_titles(diagram: Diagram) -> dict[str, str]:
-    """The name of every named signal by ``block/port``; of several names that of the outermost sheet."""
+    """The names of signals by ``block/port``; of several names, the name on the outermost sheet."""
     titles: dict[str, str] = {}
     for name, ref in named_signals(flatten_hierarchy(diagram)):
         titles.setdefault(str(ref), name)

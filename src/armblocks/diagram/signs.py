@@ -1,7 +1,7 @@
 """The face of a block: its outline and its sign (a curve, a fraction, or a few characters).
 
 A block with a constant sign declares it as ``sign``; a block whose sign depends on parameters overrides
-``face_sign``. :mod:`armblocks.drawing` draws signs; a block without one shows its title.
+``face_sign``. :mod:`armblocks.drawing` draws signs. A block without a sign shows its title.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Outline(Enum):
 
 @dataclass(frozen=True)
 class Words:
-    """One short line."""
+    """One short line of text."""
 
     text: str
     italic: bool = False
@@ -39,7 +39,7 @@ class Words:
 
 @dataclass(frozen=True)
 class Lines:
-    """Several lines, without further line breaks."""
+    """Several lines of text, which are not broken further."""
 
     texts: tuple[str, ...]
 
@@ -53,7 +53,7 @@ class Title:
 
 @dataclass(frozen=True)
 class Fraction:
-    """A fraction; ``limited`` draws it between two stops."""
+    """A fraction; ``limited`` draws it between two limit stops."""
 
     above: str
     below: str
@@ -152,7 +152,7 @@ def superscript(number: int) -> str:
 
 
 def _roots(roots: object, letter: str) -> str:
-    """``s (s + 1)``; ``1`` without roots; the number of roots if there are more than two or complex ones."""
+    """``s (s + 1)``; ``1`` without roots; else the number of roots, if some are complex or more than two."""
     values = np.asarray(roots, dtype=np.complex128).reshape(-1).tolist()
     if len(values) > 2 or any(abs(value.imag) > 0 for value in values):
         return f"{len(values)} roots"

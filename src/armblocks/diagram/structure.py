@@ -33,8 +33,8 @@ ANY = -1.0
 """The dimensions of a port that accepts any shape."""
 
 
-def stated_shape(block: Inport | Outport) -> Shape | None:
-    """The declared shape of an end of a diagram; ``None`` for any shape."""
+def declared_shape(block: Inport | Outport) -> Shape | None:
+    """The declared shape of an In or Out block; ``None`` for any shape."""
     dimensions = np.atleast_1d(np.asarray(block.dimensions, dtype=np.float64)).tolist()
     if dimensions == [ANY]:
         return None
@@ -81,19 +81,19 @@ class Inport(Block):
         _check_dimensions(self)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the input of the subsystem", self.unit, stated_shape(self)),)
+        return (Port("y", "the input of the subsystem", self.unit, declared_shape(self)),)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
-        stated = stated_shape(self)
-        return {"y": np.shape(self.value) if stated is None else stated}
+        declared = declared_shape(self)
+        return {"y": np.shape(self.value) if declared is None else declared}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        value, stated = p["value"], stated_shape(self)
-        if stated is not None and value.numel() not in (1, math.prod(stated)):
+        value, declared = p["value"], declared_shape(self)
+        if declared is not None and value.numel() not in (1, math.prod(declared)):
             raise InputError(
                 f"the value has {value.numel()} entries",
                 where="Inport.value",
-                allowed=f"a scalar, or the dimensions {stated}",
+                allowed=f"a scalar, or the dimensions {declared}",
                 fix="change value or dimensions",
             )
         return {"y": value}
@@ -129,7 +129,7 @@ class Outport(Block):
         _check_dimensions(self)
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the output of the subsystem", self.unit, stated_shape(self)),)
+        return (Port("u", "the output of the subsystem", self.unit, declared_shape(self)),)
 
 
 PASS_THROUGH = Diagram(
@@ -142,9 +142,10 @@ PASS_THROUGH = Diagram(
 
 @dataclass(frozen=True, kw_only=True)
 class DiagramBlock(Block):
-    """Base class of blocks with an inner diagram: its ends are the ports, its mask gives the parameters.
+    """Base class of blocks with an inner diagram.
 
-    Subclasses define the additional control inputs.
+    Its In and Out blocks define the ports, and its mask declares parameters. Subclasses define the
+    control inputs.
     """
 
     virtual: ClassVar[bool] = True
@@ -159,8 +160,8 @@ class DiagramBlock(Block):
         return ()
 
     def check(self) -> None:
-        ends(self.diagram, Inport)
-        ends(self.diagram, Outport)
+        port_blocks(self.diagram, Inport)
+        port_blocks(self.diagram, Outport)
         for port in self.control_ports():
             if port.name in (*self.diagram.blocks, *self.diagram.signal_names.values()):
                 raise DiagramError(
@@ -208,7 +209,9 @@ class Subsystem(DiagramBlock):
     title: ClassVar[str] = "Subsystem"
 
 
-def ends(diagram: Diagram, kind: type[Inport] | type[Outport]) -> tuple[tuple[str, Inport | Outport], ...]:
+def port_blocks(
+    diagram: Diagram, kind: type[Inport] | type[Outport]
+) -> tuple[tuple[str, Inport | Outport], ...]:
     """The In or Out blocks of a diagram with their names, in the order of their numbers.
 
     Raises ``DiagramError`` for duplicate numbers.
@@ -253,8 +256,8 @@ def inner_inputs(diagram: Diagram) -> tuple[Port, ...]:
     return diagram.keep(
         "inner inputs",
         lambda: tuple(
-            Port(name, f"In block '{name}'", block.unit, stated_shape(block))
-            for name, block in ends(diagram, Inport)
+            Port(name, f"In block '{name}'", block.unit, declared_shape(block))
+            for name, block in port_blocks(diagram, Inport)
         ),
     )
 
@@ -264,7 +267,7 @@ def inner_outputs(diagram: Diagram) -> tuple[Port, ...]:
     return diagram.keep(
         "inner outputs",
         lambda: tuple(
-            Port(name, f"Out block '{name}'", block.unit, stated_shape(block))
-            for name, block in ends(diagram, Outport)
+            Port(name, f"Out block '{name}'", block.unit, declared_shape(block))
+            for name, block in port_blocks(diagram, Outport)
         ),
     )

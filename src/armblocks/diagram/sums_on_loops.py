@@ -1,9 +1,9 @@
-"""Sums in linear algebraic loops: these signals are the unknowns that the solver computes.
+"""Sums in linear algebraic loops become the unknowns that the solver computes.
 
-A loop can be cut at any signal. The other signals are computed from it, and a sum among them may lose all
-significant digits: in a follower with the gain 1e9 the error ``r - y`` is 1e-9 of r. Products keep the
-relative accuracy of their factors. With all sums as unknowns, the accuracy of every signal is limited only by
-its own condition number.
+A loop can be cut at any signal. The other signals are computed from the cut signal, and a sum among them may
+lose all significant digits: in a follower with the gain 1e9, the error ``r - y`` is 1e-9 of r. Products keep
+the relative accuracy of their factors. With all sums as unknowns, the accuracy of every signal is limited
+only by its own condition number.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from armblocks.diagram.ordering import HELD, Evaluation, Network, Node
 
 MAX_UNKNOWNS = 16
 """Maximum number of sums per strongly connected component; beyond it, only the necessary cuts are made,
-because the work grows with the cube."""
+because the work grows with the cube of the number of unknowns."""
 _SUMS = {casadi.OP_ADD, casadi.OP_SUB}
 
 
 def sums_on_loops(network: Network, evaluation: Evaluation) -> dict[Node, tuple[str, ...]]:
-    """Nodes that add, in loops whose equations are linear in the fed-back signals; each with such a loop."""
+    """The nodes that compute sums in linear algebraic loops, each with the signals of one of its loops."""
     if not evaluation.loops:
         return {}
     index_of = {node: index for index, node in enumerate(evaluation.order)}
@@ -37,7 +37,7 @@ def sums_on_loops(network: Network, evaluation: Evaluation) -> dict[Node, tuple[
             continue
         loops = [loop for node, loop in evaluation.loops.items() if node in nodes]
         cuts = [node for node in evaluation.loops if node in nodes]
-        sums = [node for node in (evaluation.order[index] for index in component) if _adds(network, node)]
+        sums = [node for node in (evaluation.order[index] for index in component) if _is_sum(network, node)]
         if _unknowns(network, sums) > max(MAX_UNKNOWNS, _unknowns(network, cuts)):
             continue
         for node in sums:
@@ -68,11 +68,12 @@ def _is_linear(network: Network, node: Node, component: set[Node]) -> bool:
     return not any(inner) or not any(which_depends(group.expression, group.z, 2))
 
 
-def _adds(network: Network, node: Node) -> bool:
+def _is_sum(network: Network, node: Node) -> bool:
     """Whether a node adds terms of several sources, or reduces the elements of one source.
 
-    The product of a square matrix with one vector counts as a product, not as a sum: its rounding errors are
-    like those of the matrix entries, and as unknowns the rows would double the size of loops of vectors.
+    The product of a square matrix with one vector is not counted as a sum. Its relative rounding errors are
+    comparable to those of the matrix entries, and its rows would double the number of unknowns of a loop of
+    vectors.
     """
     group = _group(network, node)
     function = Function("f", [group.t, group.p, group.z], [group.expression])

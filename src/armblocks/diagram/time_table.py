@@ -15,16 +15,16 @@ from armblocks.errors import ArmblocksError, InputError
 class TimeTable:
     """``rows (n, 1 + m)``: a time (s) and the values at that time; at least two rows, times ascending.
 
-    Two rows with the same time are a jump: the left limits, then the values. The time of the first one is
-    stored as the double before it.
+    Two rows with the same time are a jump: the left limits, then the values. The time of the first row is
+    stored as the next smaller double.
 
-    Compared and hashed by content. Not compared are ``names`` and ``units`` of the m columns, ``source`` (the
-    file that the table comes from), and the choice in that file: ``time`` is the column of times and
-    ``columns`` are those of values, empty where the file determines them. User interfaces show ``shown`` as
-    the path.
+    Tables are compared and hashed by ``rows`` only. ``names`` and ``units`` describe the m columns.
+    ``source`` is the file of the table, and ``shown`` its path in user interfaces. ``time`` is the column of
+    times in the file and ``columns`` are the columns of values; they are empty where the file determines
+    them.
 
-    A table that could not be read has its ``fault``, and zeros as rows. Its shape is usable, its values are
-    not: reading them raises the fault. Raises ``InputError`` for invalid rows.
+    A table that could not be read has a ``fault`` and zeros as rows. Its shape is usable; reading its values
+    raises the fault. Raises ``InputError`` for invalid rows.
     """
 
     rows: ArrayLike
@@ -71,7 +71,7 @@ class TimeTable:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Number of rows, and number of columns with that of the times."""
+        """Number of rows, and number of columns including the column of times."""
         count, width = np.shape(self.rows)
         return count, width
 

@@ -24,7 +24,7 @@ from armblocks.diagram.block_equations import BlockSlot
 from armblocks.diagram.conditional_equations import FIRE, ON
 from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.features import SlotKind
-from armblocks.diagram.flat_values import spread
+from armblocks.diagram.flat_values import broadcast_column
 from armblocks.diagram.hierarchy import FlatForm, flatten_hierarchy
 from armblocks.diagram.implicit import solve_affine
 from armblocks.diagram.model import Model, diagram_model
@@ -54,9 +54,9 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
 
     Two passes in evaluation order, one for the flow and one for the ticks: each group of each block is
     evaluated once, from values that are already available. A Derivative block's output is the exact time
-    derivative of its input, computed group by group by the chain rule (the derivative of a state is given by
-    its equation). Jumps of the input are ignored. An algebraic loop is cut at one signal: linear ones are
-    solved here, the others leave an unknown and a residual.
+    derivative of its input, computed group by group by the chain rule. Equations give the derivatives of
+    states. Jumps of the input are ignored. Algebraic loops are cut. Linear loops are solved here; of
+    every other loop, an unknown and a residual remain for the solver.
 
     Raises ``DiagramError`` or ``AlgebraicLoopError``; for a diagram from a builder, only for loops without a
     unique solution.
@@ -77,21 +77,20 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
     guards = _guards(model, flow)
     entries = [(name, guard) for name, guard, value in guards for _ in range(value.numel())]
     modes, followers, contradictions = _contradictions(model, symbols, flow)
-    remembered, recaptured = _remembered(model, symbols), _recaptured(model, symbols)
-    momentary = _momentary(model, symbols)
-    ends = {"t": symbols.t, "x": symbols.x, "z": symbols.z, "w": loops.w, "p": symbols.p}
+    momentary = _momentary_states(model, symbols)
+    point = {"t": symbols.t, "x": symbols.x, "z": symbols.z, "w": loops.w, "p": symbols.p}
     m, e, p = {"m": symbols.m}, {"e": symbols.e}, {"p": symbols.p}
 
     products, updated, updated_products = loops.solved(flow.products), *_updated(model, symbols, flow, loops)
 
     def function(name: str, inputs: Mapping[str, SX], **results: Sequence[SX]) -> TracedFunction:
-        rounded = products if inputs.keys() >= ends.keys() else SX(0, 1)
+        rounded = products if inputs.keys() >= point.keys() else SX(0, 1)
         return _flat_function(
             name, inputs, {key: loops.solved(parts) for key, parts in results.items()}, rounded
         )
 
-    residual = function("residual", ends, r=[loops.residual])
-    update = function("update", ends | m, z=[updated])
+    residual = function("residual", point, r=[loops.residual])
+    update = function("update", point | m, z=[updated])
     return HybridSystem(
         name=diagram.name,
         states=signature(*symbols.state_slots),
@@ -101,44 +100,44 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
         signals_layout=layout,
         clocks=model.sampling.clocks,
         parameter_values=values,
-        derivative=function("derivative", ends, xd=_derivatives(model, flow)),
-        signals=function("signals", ends, y=[_recorded(diagram, flow, value) for _, _, value in signals]),
+        derivative=function("derivative", point, xd=_derivatives(model, flow)),
+        signals=function("signals", point, y=[_record_of(diagram, flow, value) for *_, value in signals]),
         residual=residual,
-        residual_jacobian=_by_unknowns(residual, loops.w),
-        captures=_keeps_left_limits(model),
+        residual_jacobian=_residual_jacobian(residual, loops.w),
+        captures=_has_captures(model),
         called=tuple(name for name, block in diagram.blocks.items() if block.called),
         update=dataclasses.replace(update, rounded=vertcat(products, loops.solved([updated_products]))),
-        guards=function("guards", ends, g=[value for _, _, value in guards]),
+        guards=function("guards", point, g=[value for _, _, value in guards]),
         guard_directions=tuple(guard.direction for _, guard in entries),
         guard_names=tuple(name for name, _ in entries),
         guard_actions=tuple(guard.action for _, guard in entries),
         modes=modes,
         followers=followers,
-        remembered=remembered,
-        recaptured=recaptured,
-        momentary=tuple(momentary.values()),
-        silenced=_silenced(entries, momentary),
-        locating=tuple(number for number, (_, guard) in enumerate(entries) if guard.locates),
-        contradictions=function("contradictions", ends, c=contradictions) if modes else None,
-        reset=function("reset", ends | e, **_reset(model, symbols, flow)),
+        hysteresis_modes=_hysteresis_modes(model, symbols),
+        recaptured_states=_recaptured_states(model, symbols),
+        momentary_states=tuple(momentary.values()),
+        silenced_guards=_silenced_guards(entries, momentary),
+        locating_guards=tuple(number for number, (_, guard) in enumerate(entries) if guard.locates),
+        contradictions=function("contradictions", point, c=contradictions) if modes else None,
+        reset=function("reset", point | e, **_reset(model, symbols, flow)),
         initial_states=function("initial_states", p, x0=_initial_values(model, symbols)),
         initial_discrete=function("initial_discrete", p, z0=_initial_discrete(model, symbols)),
         initial_algebraic=function("initial_algebraic", p, w0=[loops.guesses]),
         breakpoints=function("breakpoints", p, times=_breakpoints(model, symbols)),
         aliases=_aliases(form, layout),
-        delays=_delays(model, symbols, flow, loops, ends, products),
-        loops=_linear_loops(loops, ends),
+        delays=_delays(model, symbols, flow, loops, point, products),
+        loops=_linear_loops(loops, point),
     )
 
 
-def _linear_loops(loops: Implicit, ends: Mapping[str, SX]) -> LinearLoops | None:
-    """Information about the solved loops."""
+def _linear_loops(loops: Implicit, point: Mapping[str, SX]) -> LinearLoops | None:
+    """The signals and matrices of the linear loops; ``None`` if the diagram has none."""
     if not loops.linear:
         return None
     matrices = loops.solved([flatten(matrix, matrix.shape) for _, matrix in loops.linear])
     return LinearLoops(
         signals=tuple(names for names, _ in loops.linear),
-        matrices=_flat_function("loop_matrices", ends, {"A": matrices}, SX(0, 1)),
+        matrices=_flat_function("loop_matrices", point, {"A": matrices}, SX(0, 1)),
     )
 
 
@@ -174,19 +173,19 @@ def _updated(model: Model, symbols: Symbols, flow: Tracing, loops: Implicit) -> 
             fix="put a Unit Delay between the loop and one of the sampled blocks",
         )
     if remaining:
-        # The same equations as between ticks, possibly with other cuts: their values are known.
-        known = loops.solved([flow.value(_same(model.flow, value)) for value in tick.unknowns])
+        # These are the equations between ticks, possibly with other cuts. Their solution is known.
+        known = loops.solved([flow.value(_same_quantity(model.flow, value)) for value in tick.unknowns])
         solution = substitute(solution, cuts[remaining], known[remaining])
     return substituted(updated, cuts, solution), substituted(products, cuts, solution)
 
 
-def _keeps_left_limits(model: Model) -> bool:
+def _has_captures(model: Model) -> bool:
     own = model.flow.equations.values()
     return any(kind is SlotKind.CAPTURE for equations in own for kind, _ in equations.group_of)
 
 
 def _captured(model: Model, symbols: Symbols, flow: Tracing, after_tick: Mapping[str, SX]) -> dict[str, SX]:
-    """Updates of states that store left limits: captured by an update without a tick."""
+    """The updates of states that store left limits. An update without ticks captures the left limits."""
     ticking = dot(symbols.m, symbols.m) if symbols.m.numel() else SX(0.0)
     return {
         f"{name}/{slot}": if_else(
@@ -209,23 +208,23 @@ def _breakpoints(model: Model, symbols: Symbols) -> list[SX]:
     ]
 
 
-def _recorded(diagram: Diagram, flow: Tracing, value: Value) -> SX:
-    """The recorded value of a signal; non-finite ones in an inactive subsystem are recorded as 0."""
+def _record_of(diagram: Diagram, flow: Tracing, value: Value) -> SX:
+    """The recorded value of a signal; a non-finite value in an inactive subsystem is recorded as 0."""
     recorded, gate = flow.value(value), diagram.gates.get(value.node.block, {})
     for control in (ON, FIRE):
         if control in gate:
-            works = flow.value(flow.network.input(value.node.block, control))
-            recorded = if_else(logic_or(works, fabs(recorded) <= sys.float_info.max), recorded, 0.0)
+            active = flow.value(flow.network.input(value.node.block, control))
+            recorded = if_else(logic_or(active, fabs(recorded) <= sys.float_info.max), recorded, 0.0)
     return recorded
 
 
-def _same(network: Network, value: Value) -> Value:
-    """The same quantity in another network, whose groups may be cut differently."""
+def _same_quantity(network: Network, value: Value) -> Value:
+    """The same quantity in another network, whose blocks may have other groups."""
     group = network.equations[value.node.block].group_of[value.kind, value.name]
     return value._replace(node=value.node._replace(group=group))
 
 
-def _by_unknowns(residual: TracedFunction, w: SX) -> TracedFunction:
+def _residual_jacobian(residual: TracedFunction, w: SX) -> TracedFunction:
     """The Jacobian of the implicit equations."""
     rates = densify(jacobian(residual.results[0], w))
     return dataclasses.replace(
@@ -255,7 +254,7 @@ def _guards(model: Model, flow: Tracing) -> list[tuple[str, Guard, SX]]:
 def _contradictions(
     model: Model, symbols: Symbols, flow: Tracing
 ) -> tuple[tuple[int, ...], tuple[bool, ...], list[SX]]:
-    """The indices of all modes in ``z``; which ones follow the signals; which ones are inconsistent."""
+    """The indices of all modes in ``z``; whether each is a following mode; whether each is inconsistent."""
     ranges = signature(*symbols.discrete_slots).ranges
     indices: list[int] = []
     follows: list[bool] = []
@@ -269,9 +268,8 @@ def _contradictions(
     return tuple(indices), tuple(follows), contradictions
 
 
-def _remembered(model: Model, symbols: Symbols) -> tuple[tuple[int, int, int], ...]:
-    """The indices in ``z`` of all hysteresis modes, each with the index of its previous value and of the mode
-    without which that value is kept, -1 for none."""
+def _hysteresis_modes(model: Model, symbols: Symbols) -> tuple[tuple[int, int, int], ...]:
+    """Indices in ``z`` of each hysteresis mode, its previous value, and its ``stored_while`` mode (or -1)."""
     ranges = signature(*symbols.discrete_slots).ranges
     return tuple(
         (own, before, ranges[f"{name}/{mode.stored_while}"].start if mode.stored_while else -1)
@@ -284,7 +282,7 @@ def _remembered(model: Model, symbols: Symbols) -> tuple[tuple[int, int, int], .
     )
 
 
-def _recaptured(model: Model, symbols: Symbols) -> tuple[int, ...]:
+def _recaptured_states(model: Model, symbols: Symbols) -> tuple[int, ...]:
     """The indices in ``z`` of discrete states that are captured together with modes with hysteresis."""
     ranges = signature(*symbols.discrete_slots).ranges
     return tuple(
@@ -296,7 +294,7 @@ def _recaptured(model: Model, symbols: Symbols) -> tuple[int, ...]:
     )
 
 
-def _momentary(model: Model, symbols: Symbols) -> dict[tuple[str, str], int]:
+def _momentary_states(model: Model, symbols: Symbols) -> dict[tuple[str, str], int]:
     """The indices in ``z`` of the discrete states that become 0 at the end of an instant."""
     ranges = signature(*symbols.discrete_slots).ranges
     return {
@@ -307,7 +305,7 @@ def _momentary(model: Model, symbols: Symbols) -> dict[tuple[str, str], int]:
     }
 
 
-def _silenced(
+def _silenced_guards(
     guards: Sequence[tuple[str, Guard]], momentary: Mapping[tuple[str, str], int]
 ) -> tuple[tuple[int, int], ...]:
     """The guards that a momentary state disables, each with the index of this state in ``z``."""
@@ -327,7 +325,7 @@ def _value(network: Network, block: str, kind: SlotKind, name: str) -> Value:
 
 
 def _delays(
-    model: Model, symbols: Symbols, flow: Tracing, loops: Implicit, ends: Mapping[str, SX], products: SX
+    model: Model, symbols: Symbols, flow: Tracing, loops: Implicit, point: Mapping[str, SX], products: SX
 ) -> Delays | None:
     """The delayed signals and their delays. Raises ``DiagramError`` where a delay depends on itself."""
     ranges = signature(*symbols.discrete_slots).ranges
@@ -347,8 +345,8 @@ def _delays(
             values += range(of_value.start, of_value.stop)
             derivatives += range(of_derivative.start, of_derivative.stop)
             fixed += [line.name in equations.fixed_delays] * u.numel()
-            each = SX.ones(u.numel())
-            parts = (u, du, tau * each, *(bound * each for bound in bounds[line.name]))
+            ones = SX.ones(u.numel())
+            parts = (u, du, tau * ones, *(bound * ones for bound in bounds[line.name]))
             for key, part in zip(columns, parts):
                 columns[key].append(part)
             delayed += [symbols.discrete[f"{name}/{line.name}{mark}"] for mark in ("", "'")]
@@ -364,7 +362,7 @@ def _delays(
         )
 
     def function(title: str, inputs: Mapping[str, SX], *keys: str) -> TracedFunction:
-        rounded = products if inputs.keys() >= ends.keys() else SX(0, 1)
+        rounded = products if inputs.keys() >= point.keys() else SX(0, 1)
         column = loops.solved([part for key in keys for part in columns[key]])
         return _flat_function(title, inputs, {"d": column}, rounded)
 
@@ -372,8 +370,8 @@ def _delays(
         values=tuple(values),
         derivatives=tuple(derivatives),
         fixed=tuple(fixed),
-        inputs=function("delay_inputs", ends, "u", "du"),
-        times=function("delay_times", ends, "tau"),
+        inputs=function("delay_inputs", point, "u", "du"),
+        times=function("delay_times", point, "tau"),
         bounds=function("delay_bounds", {"p": symbols.p}, "shortest", "longest"),
     )
 
@@ -381,7 +379,7 @@ def _delays(
 def _reset(model: Model, symbols: Symbols, flow: Tracing) -> dict[str, list[SX]]:
     """States and discrete variables after events; without events, the consistent modes."""
     states, discrete = dict(symbols.states), dict(symbols.discrete)
-    quiet = dot(symbols.e, symbols.e) == 0.0 if symbols.e.numel() else SX(1.0)
+    no_event = dot(symbols.e, symbols.e) == 0.0 if symbols.e.numel() else SX(1.0)
     for name, equations in model.flow.equations.items():
         for kind, slot in equations.group_of:
             path = f"{name}/{slot}"
@@ -391,10 +389,10 @@ def _reset(model: Model, symbols: Symbols, flow: Tracing) -> dict[str, list[SX]]
         for mode in equations.modes:
             path = f"{name}/{mode.name}"
             consistent = flow.value(_value(model.flow, name, SlotKind.MODE, mode.name))
-            requested = quiet
+            requested = no_event
             if mode.follows:  # its value needs no event
                 inconsistent = flow.value(_value(model.flow, name, SlotKind.CONTRADICTION, mode.name))
-                requested = logic_or(quiet, inconsistent)
+                requested = logic_or(no_event, inconsistent)
             discrete[path] = if_else(requested, consistent, discrete[path])
     return {"x": list(states.values()), "z": list(discrete.values())}
 
@@ -402,18 +400,18 @@ def _reset(model: Model, symbols: Symbols, flow: Tracing) -> dict[str, list[SX]]
 def _flat_function(
     name: str, inputs: Mapping[str, SX], outputs: Mapping[str, SX], rounded: SX
 ) -> TracedFunction:
-    def ends(columns: Mapping[str, SX]) -> Signature:
+    def layout(columns: Mapping[str, SX]) -> Signature:
         shapes = {letter: () if letter == "t" else (column.numel(),) for letter, column in columns.items()}
         return Signature(tuple(Slot(letter, shape) for letter, shape in shapes.items()))
 
     arguments, results = tuple(inputs.values()), tuple(outputs.values())
-    return TracedFunction(name, ends(inputs), ends(outputs), arguments, results, rounded)
+    return TracedFunction(name, layout(inputs), layout(outputs), arguments, results, rounded)
 
 
 def _signal_values(
     network: Network, order: Sequence[Node], shapes: DiagramShapes
 ) -> list[tuple[str, tuple[int, ...], Value]]:
-    """Path, shape and index of every recorded signal, in evaluation order."""
+    """Path, shape and location of every recorded signal, in evaluation order."""
     derived: dict[Node, list[PortRef]] = {}
     for name, block in network.diagram.blocks.items():
         for port in block.time_derivatives:
@@ -461,8 +459,8 @@ def _parameter_values(diagram: Diagram) -> dict[str, Any]:
 def _initial_values(model: Model, symbols: Symbols) -> list[SX]:
     values: list[SX] = []
     for name, equations in model.flow.equations.items():
-        starts = equations.features.starts(symbols.parameters_of(name))
-        values.extend(spread(SX(starts[state.name]), state.shape) for state in equations.states)
+        starts = equations.features.initial_states(symbols.parameters_of(name))
+        values.extend(broadcast_column(SX(starts[state.name]), state.shape) for state in equations.states)
     return values
 
 
@@ -470,18 +468,18 @@ def _initial_discrete(model: Model, symbols: Symbols) -> list[SX]:
     values: list[SX] = []
     for name, equations in model.flow.equations.items():
         features, p = equations.features, symbols.parameters_of(name)
-        starts = {**features.starts(p), **features.history(p)}
-        values.extend(spread(SX(starts.get(state.name, 0.0)), state.shape) for state in equations.discrete)
+        known = {**features.initial_states(p), **features.initial_history(p)}
+        slots = equations.discrete
+        values.extend(broadcast_column(SX(known.get(slot.name, 0.0)), slot.shape) for slot in slots)
         if name in model.sampling.clock_of:
-            held = features.held(p)
+            held = features.initial_outputs(p)
             shapes = model.shapes.outputs[name]
-            values.extend(spread(SX(held.get(port, 0.0)), shape) for port, shape in shapes.items())
+            values.extend(broadcast_column(SX(held.get(port, 0.0)), shape) for port, shape in shapes.items())
     return values
 
 
 def _aliases(form: FlatForm, layout: Signature) -> dict[str, str]:
-    """Other names of signals: names given by the user, a block's bare name, the input ports, and the ports of
-    virtual blocks."""
+    """Other names of signals: the user's names, names of blocks with one output, input and virtual ports."""
     aliases: dict[str, str] = {}
     used_names = set(layout.names)
     for name, block in form.diagram.blocks.items():

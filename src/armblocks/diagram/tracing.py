@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from armblocks.diagram.block import Signals
 from armblocks.diagram.conditional_equations import ON
 from armblocks.diagram.features import SlotKind
-from armblocks.diagram.flat_values import natural, tunable_slots
+from armblocks.diagram.flat_values import named_values, tunable_slots
 from armblocks.diagram.implicit import check_solvable, solve_affine
 from armblocks.diagram.model import Model
 from armblocks.diagram.ordering import HELD, Network, Node, Value
@@ -70,7 +70,7 @@ class Symbols:
 
     def parameters_of(self, block: str) -> Signals:
         """The symbols of a block's tunable parameters, in their natural shapes."""
-        return natural(self.tunables[block], self.parameters[block])
+        return named_values(self.tunables[block], self.parameters[block])
 
 
 class Tracing:
@@ -92,7 +92,7 @@ class Tracing:
         self.products: list[SX] = []
         """The signals that are products of two numbers."""
         self.unknowns: dict[Value, SX] = {}
-        """Symbols of the unknowns: loop cuts (values that are read before they are computed), implicit
+        """Symbols of the unknowns: loop cuts (values that are read before they are computed) and implicit
         outputs."""
 
     def evaluate(self, node: Node) -> None:
@@ -132,7 +132,7 @@ class Tracing:
             if (SlotKind.OUTPUT, name) in self._values[node]:
                 unknown = Value(node, SlotKind.OUTPUT, name)
                 self._residuals[unknown] = self._values[node].pop((SlotKind.OUTPUT, name))
-                self.value(unknown)  # also if nothing reads it
+                self.value(unknown)  # creates the unknown even if no block reads it
         if node in self._sums:
             for slot in group.slots:
                 if slot.kind is SlotKind.OUTPUT:
@@ -240,7 +240,7 @@ def _guess(network: Network, symbols: Symbols, value: Value, unknown: SX) -> SX:
     block, features = network.diagram.blocks[value.node.block], network.equations[value.node.block].features
     if value.node.order or value.kind is not SlotKind.OUTPUT or value.name not in block.implicit_outputs:
         return SX.zeros(unknown.numel())
-    guess = features.guesses(symbols.parameters_of(value.node.block))[value.name]
+    guess = features.initial_guesses(symbols.parameters_of(value.node.block))[value.name]
     return repmat(guess, unknown.numel(), 1) if guess.numel() == 1 else flatten(guess, guess.shape)
 
 

@@ -15,7 +15,7 @@ from armblocks.errors import InputError
 
 @dataclass(frozen=True, eq=False)
 class UserFunction:
-    """A Python function. Two are equal if they are identical, or have the same code without closures.
+    """A Python function as a value, compared by identity, or by code if it has no closure.
 
     Raises ``InputError`` where its arguments cannot be listed.
     """

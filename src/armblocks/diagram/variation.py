@@ -18,13 +18,12 @@ _Changed = TypeVar("_Changed")
 
 
 def with_parameters(diagram: Diagram, values: Mapping[str, object]) -> Diagram:
-    """A copy with other parameter values, ``{"jtraj.tmax": 5.0}``, which are checked.
+    """A copy of a diagram with other parameter values, ``{"jtraj.tmax": 5.0}``; the copy is checked.
 
-    A block inside subsystems is named by its path, ``"controller/pid.kp"``; parameters of a subsystem's mask
-    by the subsystem, ``"controller.kp"``; those of the diagram's own mask have no block, ``"kp"``. Parameters
-    with formulas are computed from them and cannot be set, nor can parameters inside a subsystem that is
-    linked to a library. Raises ``UnknownNameError`` for an unknown block or parameter, ``DiagramError`` for a
-    value that is invalid for the block or makes the diagram inconsistent.
+    The path of a parameter is ``"controller/pid.kp"`` inside a subsystem, ``"controller.kp"`` for the mask of
+    a subsystem, and ``"kp"`` for the mask of the diagram. Parameters with formulas and parameters inside a
+    subsystem that is linked to a library cannot be set. Raises ``UnknownNameError`` for an unknown block or
+    parameter, ``DiagramError`` for a value that is invalid for the block or makes the diagram inconsistent.
     """
     of_blocks: dict[str, dict[str, object]] = {}
     for path, value in values.items():
@@ -42,8 +41,8 @@ def with_comments(diagram: Diagram, comments: Mapping[str, Comment | None]) -> D
     Example of ``comments``: ``{"filter": "through", "plant/drag": "out", "gain": None}``.
 
     A block that is commented ``"out"`` takes no part in the model; its outputs are zeros of the same shapes.
-    One that is commented ``"through"`` is replaced by wires from its inputs to its outputs. ``None`` removes
-    a comment. Blocks inside subsystems are named by their paths. The copy is checked. Raises
+    A block that is commented ``"through"`` is replaced by connections from its inputs to its outputs.
+    ``None`` removes a comment. Blocks inside subsystems are named by their paths. The copy is checked. Raises
     ``UnknownNameError`` for an unknown block, ``DiagramError`` for a block that cannot be commented, or is
     linked to a library, and for an inconsistent diagram.
     """
@@ -99,14 +98,14 @@ def _with_values(diagram: Diagram, path: str, values: Mapping[str, object]) -> D
             if parameter not in diagram.mask_values:
                 known = [*diagram.mask_values, *(f"{name}.…" for name in diagram.blocks)]
                 raise UnknownNameError("parameter", parameter, known, where=f"diagram '{diagram.name}'")
-        return _located("", lambda: diagram.with_mask_values(values))
+        return _with_location("", lambda: diagram.with_mask_values(values))
     outside, diagram, name = found_block(diagram, path)
     block = diagram.block(name)
     for parameter in values:
         check_settable(outside, path, block, parameter)
     changed = dataclasses.replace(
         diagram,
-        blocks={**diagram.blocks, name: _located(path, lambda: block.with_parameters(**values))},
+        blocks={**diagram.blocks, name: _with_location(path, lambda: block.with_parameters(**values))},
     )
     return _rebuilt(outside, changed)
 
@@ -141,7 +140,7 @@ def check_settable(outside: Outside, path: str, block: Block, parameter: str) ->
         )
 
 
-def _located(path: str, change: Callable[[], _Changed]) -> _Changed:
+def _with_location(path: str, change: Callable[[], _Changed]) -> _Changed:
     """The result of a change; errors get the block's path."""
     block = f"block '{path}'" if path else ""
     try:

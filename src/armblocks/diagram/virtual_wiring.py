@@ -35,12 +35,12 @@ def _check_list(text: str, where: str, *, nested: bool) -> None:
     invalid = [part for part in parts if not part.isidentifier()]
     duplicates = [entry for entry in entries if entries.count(entry) > 1]
     if invalid or duplicates or not entries:
-        offender = (
+        problem = (
             f"'{(invalid or duplicates)[0]}' in '{text}' is not allowed"
             if invalid or duplicates
             else "the list is empty"
         )
-        raise InputError(offender, where=where, allowed=_PATHS if nested else _NAMES, fix="correct the list")
+        raise InputError(problem, where=where, allowed=_PATHS if nested else _NAMES, fix="correct the list")
 
 
 @dataclass(frozen=True, kw_only=True)

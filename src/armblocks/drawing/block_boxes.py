@@ -9,15 +9,15 @@ from functools import lru_cache
 from armblocks.diagram import Block, Placement
 from armblocks.diagram.signs import Outline
 from armblocks.drawing.block_faces import bus_width, face_size, face_width, port_labels
-from armblocks.drawing.structure_faces import CONTROL_ROOM, control_ports
+from armblocks.drawing.structure_faces import CONTROL_HEIGHT, control_ports
 from armblocks.pictures.text_width import text_width
 
 NAME_SIZE = 11.0
 """Font size of the names under the blocks, px."""
-NAME_ROOM = 20.0
+NAME_HEIGHT = 20.0
 """Height of the name below a block, px."""
 PORT_TEXT = 9.0
-PORT_TEXT_ROOM = 13.0
+PORT_TEXT_HEIGHT = 13.0
 """Height of the port names at the upper or lower edge, px."""
 
 
@@ -75,20 +75,20 @@ class Box:
         )
 
 
-def standing_box(name: str, block: Block, place: Placement) -> Box:
+def box_at_placement(name: str, block: Block, place: Placement) -> Box:
     """The box of a block at a placement, independent of its connections."""
-    return replace(_at_origin(block, replace(place, x=0.0, y=0.0)), name=name).at(place.x, place.y)
+    return replace(_placed_at_origin(block, replace(place, x=0.0, y=0.0)), name=name).at(place.x, place.y)
 
 
 @lru_cache(maxsize=4096)
-def _at_origin(block: Block, place: Placement) -> Box:
-    sized = sized_box("", block)
-    width, height = sized.width, sized.height
+def _placed_at_origin(block: Block, place: Placement) -> Box:
+    natural = box_at_origin("", block)
+    width, height = natural.width, natural.height
     if place.rotation % 180:
-        width, height = _rotated_size(sized)
+        width, height = _rotated_size(natural)
     return _with_ports(
         replace(
-            sized,
+            natural,
             width=place.width or width,
             height=place.height or height,
             flipped=place.flipped,
@@ -114,11 +114,11 @@ def _rotated_size(box: Box) -> tuple[float, float]:
         return float(round(max(box.height, wide))), 30.0
     _, width, height = face_size(box.block)
     labelled_sides = sum(any(side) for side in labels)
-    room = CONTROL_ROOM * bool(control_ports(box.block))
-    return float(round(max(width, wide))), height + labelled_sides * PORT_TEXT_ROOM + room
+    control_height = CONTROL_HEIGHT * bool(control_ports(box.block))
+    return float(round(max(width, wide))), height + labelled_sides * PORT_TEXT_HEIGHT + control_height
 
 
-def sized_box(name: str, block: Block) -> Box:
+def box_at_origin(name: str, block: Block) -> Box:
     """A box at the origin with the size of the block's face and with its ports along the edges."""
     shape, width, height = face_size(block)
     inputs, outputs = len(block.input_ports()) - len(control_ports(block)), len(block.output_ports())
@@ -127,7 +127,7 @@ def sized_box(name: str, block: Block) -> Box:
         if any(label for side in labels for label in side):
             widest = [max((text_width(t, PORT_TEXT) + 5 for t in side if t), default=0.0) for side in labels]
             width = max(width, face_width(block) + sum(widest) + 4)
-        height = max(height, 20.0 * max(inputs, outputs) + 8 + CONTROL_ROOM * bool(control_ports(block)))
+        height = max(height, 20.0 * max(inputs, outputs) + 8 + CONTROL_HEIGHT * bool(control_ports(block)))
     elif shape is Outline.BAR:
         height = max(height, 20.0 * max(inputs, outputs) + 4)
     elif shape is Outline.BUS:
@@ -146,8 +146,8 @@ def with_inputs(box: Box, inputs: Sequence[BoxPort]) -> Box:
     The side is below, above, left, right, hidden, or ``corner``, the upper right one of a block with wires
     from above and below.
     """
-    own = replace(box, inputs=tuple(inputs))
-    return replace(own, shown_name_side=_free_name_side(own))
+    updated = replace(box, inputs=tuple(inputs))
+    return replace(updated, shown_name_side=_free_name_side(updated))
 
 
 def _free_name_side(box: Box) -> str:
@@ -201,19 +201,21 @@ def _with_upright_ports(box: Box) -> Box:
         )
     above = control_ports(box.block)
     side = [name for name in into if name not in above]
-    top = CONTROL_ROOM if above else 0.0
+    top = CONTROL_HEIGHT if above else 0.0
     ports = {
-        **_spread(side, entry, box.y + top, box.height - top, forwards),
+        **_evenly_spaced_ports(side, entry, box.y + top, box.height - top, forwards),
         **{
             name: BoxPort(name, box.x + box.width * (k + 1) / (len(above) + 1), box.y, 0, 1)
             for k, name in enumerate(above)
         },
     }
-    leaving = _spread(out, leave, box.y + top, box.height - top, forwards)
+    leaving = _evenly_spaced_ports(out, leave, box.y + top, box.height - top, forwards)
     return replace(box, inputs=tuple(ports[name] for name in into), outputs=tuple(leaving.values()))
 
 
-def _spread(names: Sequence[str], x: float, y: float, height: float, forwards: int) -> dict[str, BoxPort]:
+def _evenly_spaced_ports(
+    names: Sequence[str], x: float, y: float, height: float, forwards: int
+) -> dict[str, BoxPort]:
     """Ports at equal distances along an edge that begins at y."""
     return {
         name: BoxPort(name, x, y + height * (k + 0.5) / len(names), forwards, 0)

@@ -10,7 +10,7 @@ import numpy as np
 from armblocks import blocks as kinds
 from armblocks.diagram import Block
 from armblocks.diagram.signs import Outline, value_text
-from armblocks.drawing.face_marks import Room, least_room, sign_marks, words
+from armblocks.drawing.face_marks import FaceArea, min_face_size, sign_marks, words
 from armblocks.drawing.sink_faces import Trend, display, scope, xy_graph
 from armblocks.drawing.structure_faces import (
     BAR,
@@ -57,7 +57,7 @@ def face_size(block: Block) -> tuple[Outline, float, float]:
         return outline, *_SIZES[outline]
     if block.card_size is not None:
         return outline, *block.card_size
-    width, height = least_room(block.face_sign())
+    width, height = min_face_size(block.face_sign())
     return outline, max(68.0, width), max(50.0, height)
 
 
@@ -68,12 +68,12 @@ def face_width(block: Block) -> float:
         return width
     if is_subsystem(block):
         return mask_width(block)
-    if _draws_itself(block):
+    if _has_special_drawing(block):
         return 0.62 * width
-    return least_room(block.face_sign())[0]
+    return min_face_size(block.face_sign())[0]
 
 
-def _draws_itself(block: Block) -> bool:
+def _has_special_drawing(block: Block) -> bool:
     return isinstance(
         block,
         kinds.Product | kinds.Scope | kinds.XYGraph | kinds.JTraj | kinds.RobotPlot | kinds.Fkine
@@ -83,7 +83,7 @@ def _draws_itself(block: Block) -> bool:
 
 
 def outline(block: Block, x: float, y: float, width: float, height: float, flipped: bool) -> Mark:
-    """The block's body."""
+    """The outline of a block."""
     match face_size(block)[0]:
         case Outline.CIRCLE:
             radius = min(width, height) / 2
@@ -104,39 +104,39 @@ def outline(block: Block, x: float, y: float, width: float, height: float, flipp
             return Rectangle(x, y, width, height, 5, Tone.SURFACE, Tone.WIRE, 1.2)
 
 
-def face(block: Block, room: Room, trend: Trend | None, *, flipped: bool = False) -> list[Mark]:
+def face(block: Block, area: FaceArea, trend: Trend | None, *, flipped: bool = False) -> list[Mark]:
     """The drawing inside the block, except for subsystems and switches, see :func:`face_at_ports`."""
     match block:
         case kinds.Gain() | kinds.SliderGain():
-            return _gain(block, room, flipped=flipped)
+            return _gain(block, area, flipped=flipped)
         case kinds.Sum() | kinds.BusCreator() | kinds.BusSelector() | kinds.BusAssignment():
             return []
         case kinds.Inport() | kinds.Outport():
-            return port_number(block, room)
+            return port_number(block, area)
         case kinds.Goto() | kinds.From():
-            return words(room.shrunk(6.0, 0.0), tag_text(block), size=11.0)
+            return words(area.shrunk(6.0, 0.0), tag_text(block), size=11.0)
         case kinds.Product():
             # If all inputs are factors, one sign is drawn in the middle; else the signs are drawn at the
             # ports.
-            return words(room, "×", size=20) if set(block.operators) == {"*"} else []
+            return words(area, "×", size=20) if set(block.operators) == {"*"} else []
         case kinds.Scope():
-            return scope(room, trend)
+            return scope(area, trend)
         case kinds.XYGraph():
-            return xy_graph(room, trend)
+            return xy_graph(area, trend)
         case kinds.Display():
-            return display(room, block.inputs, trend)
+            return display(area, block.inputs, trend)
         case kinds.StopSimulation():
-            return stop_marks(room)
+            return stop_marks(area)
         case kinds.RobotPlot() | kinds.Fkine() | kinds.ForwardDynamics() | kinds.ArmPlant():
             caption = "" if isinstance(block, kinds.RobotPlot) else block.title
-            return _robot(room, block.robot, caption)
+            return _robot(area, block.robot, caption)
         case _:
-            return sign_marks(block.face_sign(), room)
+            return sign_marks(block.face_sign(), area)
 
 
 def face_at_ports(
     block: Block,
-    room: Room,
+    area: FaceArea,
     heights: tuple[float, ...],
     tops: tuple[tuple[str, float], ...],
     *,
@@ -148,13 +148,13 @@ def face_at_ports(
     the upper edge.
     """
     if is_subsystem(block):
-        return subsystem_marks(block, room, tops)
+        return subsystem_marks(block, area, tops)
     if isinstance(block, kinds.Switch | kinds.ManualSwitch | kinds.MultiportSwitch):
         if isinstance(block, kinds.Switch):
             heights = (heights[0], heights[-1])
         elif isinstance(block, kinds.MultiportSwitch):
             heights = heights[1:]
-        return lever_marks(block, room, heights, flipped)
+        return lever_marks(block, area, heights, flipped)
     return None
 
 
@@ -192,7 +192,7 @@ def bus_width(block: Block, size: float) -> float:
 
 
 def _with_exponent(gain: object) -> str:
-    """A long number with a power of ten, such as 2.5e4; an empty text if that is long as well."""
+    """A long number with a power of ten, such as 2.5e4; an empty text if that is too long."""
     array = np.asarray(gain, dtype=np.float64)
     if array.size != 1:
         return ""
@@ -201,29 +201,31 @@ def _with_exponent(gain: object) -> str:
     return text if len(text) <= 6 else ""
 
 
-def _gain(block: kinds.Gain | kinds.SliderGain, room: Room, *, flipped: bool) -> list[Mark]:
-    """The formula or the value of a gain, whichever fits into the triangle first; else the letter ``K``."""
-    limit = 0.56 * room.width
+def _gain(block: kinds.Gain | kinds.SliderGain, area: FaceArea, *, flipped: bool) -> list[Mark]:
+    """The formula of a gain, or its value, if one of them fits into the triangle; else the letter ``K``."""
+    limit = 0.56 * area.width
     candidates = (block.stated_text("gain"), value_text(block.gain), _with_exponent(block.gain))
     text = next(
         (candidate for candidate in candidates if candidate and text_width(candidate, 9.5) <= limit), "K"
     )
-    size = 12.0 if text_width(text, 12.0) < 0.52 * room.width else 9.5
-    share = 0.64 if flipped else 0.36
-    return [Text(room.x + share * room.width, room.middle[1] + 0.36 * size, text, size, Tone.INK, "middle")]
+    size = 12.0 if text_width(text, 12.0) < 0.52 * area.width else 9.5
+    fraction = 0.64 if flipped else 0.36
+    return [
+        Text(area.x + fraction * area.width, area.middle[1] + 0.36 * size, text, size, Tone.INK, "middle")
+    ]
 
 
-def _robot(room: Room, robot: Robot, caption: str) -> list[Mark]:
+def _robot(area: FaceArea, robot: Robot, caption: str) -> list[Mark]:
     """The joints and links of the robot as a small stick figure."""
     is_plot = not caption
-    box = room.shrunk(7.0, 7.0)
+    box = area.shrunk(7.0, 7.0)
     if caption:
-        box = Room(box.x, box.y + 8, box.width, box.height - 8)
+        box = FaceArea(box.x, box.y + 8, box.width, box.height - 8)
     frames = link_frames(robot, [0.35 + 0.25 * k if k % 2 else 0.3 for k in range(robot.n)])
     row = {link.name: k for k, link in enumerate(robot.links, start=1)}
     points = frames[:, :3, 3]
     camera = Camera.framing(points + 1e-6 * np.arange(3), box.width, box.height, margin=3.0)
-    flat = camera.flat(points) + np.array([box.x, box.y])
+    flat = camera.to_pixels(points) + np.array([box.x, box.y])
     marks: list[Mark] = []
     for k, link in enumerate(robot.links, start=1):
         a, b = flat[row[link.parent] if link.parent is not None else 0], flat[k]
@@ -235,5 +237,5 @@ def _robot(room: Room, robot: Robot, caption: str) -> list[Mark]:
     x, y = flat[0].tolist()
     base = (("M", x - 7, y + 5), ("L", x + 7, y + 5), ("L", x + 3.5, y), ("L", x - 3.5, y), ("Z",))
     if caption:
-        marks.append(Text(room.x + 6, room.y + 13, caption, 9.5, Tone.MUTED))
+        marks.append(Text(area.x + 6, area.y + 13, caption, 9.5, Tone.MUTED))
     return [Curve(base, stroke=None, fill=Tone.GRAPHITE), *marks]

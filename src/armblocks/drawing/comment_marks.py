@@ -1,4 +1,4 @@
-"""Drawing of commented blocks: grey, with a sign for what replaces the block in the model."""
+"""Drawing of commented blocks: grey, with a percent sign or the wires that replace the block."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def commented_marks(marks: Sequence[Mark], box: Box, comment: str) -> list[Mark]
     A percent sign marks a block that is commented out. A block that is commented through shows the wires that
     replace it.
     """
-    grey = [greyed(mark) for mark in marks]
+    grey = [grey_mark(mark) for mark in marks]
     if comment == "out":
         return [*grey, Text(box.x, box.y - 3, "%", NAME_SIZE, Tone.MUTED, bold=True)]
     inputs, outputs = ({port.name: port for port in ports} for ports in (box.inputs, box.outputs))
@@ -36,22 +36,22 @@ def _wire(into: BoxPort, out: BoxPort) -> Mark:
     return Polyline(points, stroke=Tone.WIRE, width=1.2)
 
 
-def _ground(tone: Tone | None) -> Tone | None:
+def _fill_tone(tone: Tone | None) -> Tone | None:
     return None if tone is None else Tone.SUNKEN if tone in _BACKGROUNDS else Tone.HAIRLINE
 
 
-def _line(tone: Tone | None) -> Tone | None:
+def _stroke_tone(tone: Tone | None) -> Tone | None:
     return None if tone is None else Tone.HAIRLINE
 
 
-def greyed(mark: Mark) -> Mark:
+def grey_mark(mark: Mark) -> Mark:
     """A mark in the greys of commented blocks."""
     match mark:
         case Text():
             return replace(mark, tone=Tone.MUTED)
         case Group():
-            return replace(mark, marks=tuple(greyed(inner) for inner in mark.marks))
+            return replace(mark, marks=tuple(grey_mark(inner) for inner in mark.marks))
         case Polyline() | Curve() | Rectangle() | Disc():
-            return replace(mark, stroke=_line(mark.stroke), fill=_ground(mark.fill))
+            return replace(mark, stroke=_stroke_tone(mark.stroke), fill=_fill_tone(mark.fill))
         case Raster():
             return mark

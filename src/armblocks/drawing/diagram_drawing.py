@@ -22,27 +22,27 @@ from armblocks.diagram import (
 from armblocks.diagram.signs import Outline
 from armblocks.drawing import block_faces
 from armblocks.drawing.block_boxes import (
-    NAME_ROOM,
+    NAME_HEIGHT,
     NAME_SIZE,
     PORT_TEXT,
-    PORT_TEXT_ROOM,
+    PORT_TEXT_HEIGHT,
     Box,
     BoxPort,
-    sized_box,
+    box_at_origin,
 )
 from armblocks.drawing.block_colours import coloured_marks
-from armblocks.drawing.comment_marks import COMMENT_WORDS, commented_marks, greyed
+from armblocks.drawing.comment_marks import COMMENT_WORDS, commented_marks, grey_mark
 from armblocks.drawing.diagram_layout import boxes
-from armblocks.drawing.face_marks import Room
+from armblocks.drawing.face_marks import FaceArea
 from armblocks.drawing.rates import Rates
 from armblocks.drawing.sink_faces import Trend
 from armblocks.drawing.structure_faces import control_ports
-from armblocks.drawing.wire_marks import WireKind, arrow_head, label_marks, rounded, wire_marks
+from armblocks.drawing.wire_marks import WireKind, arrow_head, label_marks, rounded_path, wire_marks
 from armblocks.drawing.wire_names import name_marks
 from armblocks.drawing.wire_routing import route
 from armblocks.drawing.wires import Net, Obstacle, RoutedNet, WireEnd
 from armblocks.errors import DiagramError, UnknownNameError
-from armblocks.pictures.picture import Curve, Group, Mark, Picture, Polyline, Text, moved, turned
+from armblocks.pictures.picture import Curve, Group, Mark, Picture, Polyline, Text, moved, rotated_clockwise
 from armblocks.pictures.style import Theme, Tone
 from armblocks.pictures.svg import svg_file
 from armblocks.pictures.text_width import shorten, text_width
@@ -52,8 +52,8 @@ _MARGIN = 22.0
 NOTE_SIZE = 12.0
 NOTE_LINE = 17.0
 """Font size and line height of notes, px."""
-_TRENDS = (ViewKind.TRACES, ViewKind.PATH, ViewKind.VALUE)
-_STUB = 16.0
+_TREND_KINDS = (ViewKind.TRACES, ViewKind.PATH, ViewKind.VALUE)
+_STUB_LENGTH = 16.0
 """Length of the wires at the ports of a block that is drawn alone, px."""
 
 
@@ -64,27 +64,27 @@ def diagram_picture(
 
     ``sheet``: the path of a subsystem to draw instead of the top level. A sheet inside a commented subsystem
     is grey. An incomplete diagram, which cannot be traced, has thin lines only. ``rates``: sampled blocks and
-    their wires show their clocks, which a legend names. Raises UnknownNameError for an unknown sheet,
-    DiagramError for unknown rates.
+    their wires show their clocks, and a legend lists the periods. Raises UnknownNameError for an unknown
+    sheet, DiagramError if the sample times cannot be determined.
     """
-    carried = _Carried.of(diagram)
+    contents = _SignalContents.of(diagram)
     clocks = Rates.of(diagram) if rates else Rates()
-    if sheet not in carried.levels:
-        known = [path for path in carried.levels if path]
+    if sheet not in contents.levels:
+        known = [path for path in contents.levels if path]
         raise UnknownNameError("sheet", sheet, known, where=f"diagram '{diagram.name}'")
-    level = carried.levels[sheet]
+    level = contents.levels[sheet]
     path = f"{sheet}/" if sheet else ""
-    placed = boxes(level)
-    nets, wires = wire_nets(level.connections, drawn_bends(level), placed)
-    obstacles = [obstacle(box) for box in placed.values()]
+    placed_boxes = boxes(level)
+    nets, wires = wire_nets(level.connections, drawn_bends(level), placed_boxes)
+    obstacles = [obstacle(box) for box in placed_boxes.values()]
     routed = route(obstacles, nets)
     marks: list[Mark] = []
     for (source, _), net in zip(wires.items(), routed):
-        kind = carried.kind(PortRef(path + source.block, source.port))
+        kind = contents.kind(PortRef(path + source.block, source.port))
         _, tone = clocks.mark(path + source.block) or ("", Tone.WIRE)
         marks += wire_marks(net, kind, _wire_title(source, wires[source]), tone)
-    for name, box in placed.items():
-        trend = _trend(path + name, carried.views.get(path + name), result)
+    for name, box in placed_boxes.items():
+        trend = _trend(path + name, contents.views.get(path + name), result)
         own_comment = level.commented.get(name, "")
         block = _block(box, trend, own_comment)
         if (mark := clocks.mark(path + name)) is not None:
@@ -94,19 +94,19 @@ def diagram_picture(
     for (source, _), wire_net, net in zip(wires.items(), nets, routed):
         marks += label_marks(wire_net, net, wire_label(level, source))
         marks += name_marks(level.signal_names.get(source, ""), net.paths, obstacles)
-    comment = _outer_comment(carried.levels, sheet)
+    comment = _outer_comment(contents.levels, sheet)
     if comment:
-        marks = [greyed(mark) for mark in marks]
+        marks = [grey_mark(mark) for mark in marks]
     marks += _notes(level)
-    left, top, right, bottom = _extent(placed, routed, level)
+    left, top, right, bottom = _extent(placed_boxes, routed, level)
     picture = Picture(
         width=right - left + 2 * _MARGIN,
         height=bottom - top + 2 * _MARGIN,
         title=", ".join(filter(None, (f"Diagram {diagram.name}", sheet and f"sheet {sheet}", comment))),
         description=_text_alternative(level),
     )
-    drawn = Picture(width=0, height=0, title="", marks=marks)
-    picture.place(drawn, _MARGIN - left, _MARGIN - top)
+    content = Picture(width=0, height=0, title="", marks=marks)
+    picture.place(content, _MARGIN - left, _MARGIN - top)
     clocks.add_legend(picture)
     return picture
 
@@ -139,46 +139,46 @@ def diagram_svg(
 
 def block_picture(block: Block) -> Picture:
     """The symbol of one block, with stubs of its connections."""
-    box = sized_box("", block)
+    box = box_at_origin("", block)
     marks: list[Mark] = []
     for port in (*box.inputs, *box.outputs):
         enters = port in box.inputs
-        reach = -_STUB if enters else _STUB
+        reach = -_STUB_LENGTH if enters else _STUB_LENGTH
         edge, outside = (port.x, port.y), (port.x + reach * port.dx, port.y + reach * port.dy)
         path = (outside, edge) if enters else (edge, outside)
-        marks.append(Curve(rounded(path), stroke=Tone.WIRE, width=1.2))
+        marks.append(Curve(rounded_path(path), stroke=Tone.WIRE, width=1.2))
         if enters:
             marks.append(arrow_head(path))
     marks += [mark for mark in _block(box, None) if not isinstance(mark, Text) or mark.text]
-    above, below = (any(port.dy == way for port in box.inputs) for way in (1, -1))
+    above, below = (any(port.dy == direction for port in box.inputs) for direction in (1, -1))
     picture = Picture(
-        width=box.width + 2 * (_STUB + 2),
-        height=box.height + 8 + _STUB * (above + below),
+        width=box.width + 2 * (_STUB_LENGTH + 2),
+        height=box.height + 8 + _STUB_LENGTH * (above + below),
         title=f"Symbol of {block.title}",
     )
-    drawn = Picture(width=0, height=0, title="", marks=marks)
-    picture.place(drawn, _STUB + 2 - box.x, 4 + _STUB * above - box.y)
+    content = Picture(width=0, height=0, title="", marks=marks)
+    picture.place(content, _STUB_LENGTH + 2 - box.x, 4 + _STUB_LENGTH * above - box.y)
     return picture
 
 
 def drawn_bends(diagram: Diagram) -> Mapping[Connection, tuple[float, ...]]:
-    """The user-drawn routes, if the diagram has a layout for which they were drawn."""
+    """The user-drawn routes; none if the layout lacks a block, because they belong to a complete layout."""
     return diagram.bends if set(diagram.layout) >= set(diagram.blocks) else {}
 
 
 def wire_nets(
     connections: Iterable[Connection],
     bends: Mapping[Connection, tuple[float, ...]],
-    placed: Mapping[str, Box],
+    placed_boxes: Mapping[str, Box],
 ) -> tuple[list[Net], dict[PortRef, list[PortRef]]]:
-    """The nets to route: one for every connected output, and its targets by source."""
+    """The nets to route, one for each connected output, and the targets of each source."""
     wires: dict[PortRef, list[PortRef]] = {}
     for wire in sorted(connections, key=lambda w: (w.source, w.target)):
         wires.setdefault(wire.source, []).append(wire.target)
     nets = [
         Net(
-            _end(placed[source.block].outputs, source.port),
-            tuple(_end(placed[target.block].inputs, target.port) for target in targets),
+            _end(placed_boxes[source.block].outputs, source.port),
+            tuple(_end(placed_boxes[target.block].inputs, target.port) for target in targets),
             tuple(bends.get(Connection(source, target), ()) for target in targets),
         )
         for source, targets in wires.items()
@@ -213,15 +213,15 @@ def _label(box: Box) -> tuple[float, float, float, float]:
         case "hidden":
             return box.x, box.y, box.width, box.height
         case "right":
-            return box.x + box.width + 5, middle, width, NAME_ROOM - 4
+            return box.x + box.width + 5, middle, width, NAME_HEIGHT - 4
         case "left":
-            return box.x - 5 - width, middle, width, NAME_ROOM - 4
+            return box.x - 5 - width, middle, width, NAME_HEIGHT - 4
         case "corner":
             return box.x + box.width * 0.78, box.y - NAME_SIZE - 2, width, NAME_SIZE + 3
         case "above":
-            return box.x + (box.width - width) / 2, box.y - NAME_ROOM + 2, width, NAME_ROOM - 4
+            return box.x + (box.width - width) / 2, box.y - NAME_HEIGHT + 2, width, NAME_HEIGHT - 4
         case _:
-            return box.x + (box.width - width) / 2, box.y + box.height + 2, width, NAME_ROOM - 4
+            return box.x + (box.width - width) / 2, box.y + box.height + 2, width, NAME_HEIGHT - 4
 
 
 def _shape(box: Box) -> Outline:
@@ -250,9 +250,9 @@ def block_marks(box: Box, trend: Trend | None = None, comment: str = "") -> list
 def _plain_marks(box: Box, trend: Trend | None) -> list[Mark]:
     shape, block = _shape(box), box.block
     marks: list[Mark] = [_outline(box)]
-    room = Room(box.x, box.y, box.width, box.height)
+    area = FaceArea(box.x, box.y, box.width, box.height)
     if shape in (Outline.CARD, Outline.BUS):
-        names, room = _port_names(box)
+        names, area = _port_names(box)
         marks += names
     elif shape is Outline.CIRCLE:
         marks += _signs(box)
@@ -262,26 +262,30 @@ def _plain_marks(box: Box, trend: Trend | None) -> list[Mark]:
     if not box.upright and shape is Outline.TRIANGLE:
         # The number is in the wide half of the triangle, which is the upper half if the triangle points down.
         points_down = (box.rotation == 90) != box.flipped
-        way = -1 if points_down else 1
-        room = Room(room.x + 0.14 * room.width, room.y + way * 0.14 * room.height, room.width, room.height)
+        direction = -1 if points_down else 1
+        area = FaceArea(
+            area.x + 0.14 * area.width, area.y + direction * 0.14 * area.height, area.width, area.height
+        )
         flipped = False
     above = set(control_ports(block))
     if box.upright:
         heights = tuple(port.y for port in box.inputs if port.name not in above)
     else:
         count = len(box.inputs)
-        heights = tuple(room.y + room.height * (k + 0.5) / count for k in range(count))
+        heights = tuple(area.y + area.height * (k + 0.5) / count for k in range(count))
     tops = tuple((port.name, port.x) for port in box.inputs if port.name in above and not box.rotation)
-    own = block_faces.face_at_ports(block, room, heights, tops, flipped=flipped)
-    return marks + (own if own is not None else block_faces.face(block, room, trend, flipped=flipped))
+    port_marks = block_faces.face_at_ports(block, area, heights, tops, flipped=flipped)
+    return marks + (
+        port_marks if port_marks is not None else block_faces.face(block, area, trend, flipped=flipped)
+    )
 
 
 def _outline(box: Box) -> Mark:
     width, height = (box.width, box.height) if box.upright else (box.height, box.width)
-    drawn = block_faces.outline(box.block, 0.0, 0.0, width, height, box.flipped)
+    content = block_faces.outline(box.block, 0.0, 0.0, width, height, box.flipped)
     for _ in range(box.rotation // 90):
-        drawn, width, height = turned(drawn, height), height, width
-    return moved(drawn, box.x, box.y)
+        content, width, height = rotated_clockwise(content, height), height, width
+    return moved(content, box.x, box.y)
 
 
 def _block(box: Box, trend: Trend | None, comment: str = "") -> list[Mark]:
@@ -300,7 +304,7 @@ def _block(box: Box, trend: Trend | None, comment: str = "") -> list[Mark]:
     return marks
 
 
-def _port_names(box: Box) -> tuple[list[Mark], Room]:
+def _port_names(box: Box) -> tuple[list[Mark], FaceArea]:
     """Port names inside the edges of sides with several ports, and the remaining area."""
     if not box.upright:
         return _port_names_above_and_below(box)
@@ -322,10 +326,10 @@ def _port_names(box: Box) -> tuple[list[Mark], Room]:
             anchor = "start" if side == "left" else "end"
             marks.append(Text(x, port.y + 3.2, label, PORT_TEXT, Tone.MUTED, anchor))
     width = box.width - label_width["left"] - label_width["right"]
-    return marks, Room(box.x + label_width["left"], box.y, width, box.height)
+    return marks, FaceArea(box.x + label_width["left"], box.y, width, box.height)
 
 
-def _port_names_above_and_below(box: Box) -> tuple[list[Mark], Room]:
+def _port_names_above_and_below(box: Box) -> tuple[list[Mark], FaceArea]:
     marks: list[Mark] = []
     top, bottom = box.y, box.y + box.height
     for ports, labels in zip((box.inputs, box.outputs), block_faces.port_labels(box.block)):
@@ -335,10 +339,10 @@ def _port_names_above_and_below(box: Box) -> tuple[list[Mark], Room]:
             y = box.y + PORT_TEXT + 3 if above else box.y + box.height - 5
             marks.append(Text(port.x, y, label, PORT_TEXT, Tone.MUTED, "middle"))
         if named and above:
-            top += PORT_TEXT_ROOM
+            top += PORT_TEXT_HEIGHT
         elif named:
-            bottom -= PORT_TEXT_ROOM
-    return marks, Room(box.x, top, box.width, bottom - top)
+            bottom -= PORT_TEXT_HEIGHT
+    return marks, FaceArea(box.x, top, box.width, bottom - top)
 
 
 def _signs(box: Box) -> list[Mark]:
@@ -354,8 +358,8 @@ def _signs(box: Box) -> list[Mark]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Carried:
-    """The sheets of a diagram, and the known contents of their lines."""
+class _SignalContents:
+    """The sheets of a diagram, and the known contents of their signal lines."""
 
     levels: Mapping[str, Diagram]
     views: Mapping[str, View]
@@ -363,13 +367,13 @@ class _Carried:
     outputs: Mapping[str, Shapes]
 
     @classmethod
-    def of(cls, diagram: Diagram) -> _Carried:
+    def of(cls, diagram: Diagram) -> _SignalContents:
         try:
             form = flatten_hierarchy(diagram)
             outputs = infer_shapes(diagram).outputs
         except DiagramError:
             return cls(levels_of(diagram), {}, {}, {})
-        views = {name: view for name, view in diagram_views(diagram) if view.kind in _TRENDS}
+        views = {name: view for name, view in diagram_views(diagram) if view.kind in _TREND_KINDS}
         return cls(form.levels, views, form.carried, outputs)
 
     def kind(self, source: PortRef) -> WireKind:
@@ -390,7 +394,7 @@ def _notes(diagram: Diagram) -> list[Mark]:
 
 
 def _extent(
-    placed: dict[str, Box], routed: list[RoutedNet], diagram: Diagram
+    placed_boxes: dict[str, Box], routed: list[RoutedNet], diagram: Diagram
 ) -> tuple[float, float, float, float]:
     xs: list[float] = []
     ys: list[float] = []
@@ -398,7 +402,7 @@ def _extent(
         lines = note.text.split("\n")
         xs += [note.x, note.x + max(text_width(line, NOTE_SIZE) for line in lines)]
         ys += [note.y, note.y + NOTE_LINE * len(lines)]
-    for box in placed.values():
+    for box in placed_boxes.values():
         lx, ly, lw, lh = _label(box)
         xs += [box.x, box.x + box.width, lx, lx + lw]
         ys += [box.y, box.y + box.height, ly, ly + lh]
@@ -421,8 +425,8 @@ def _block_title(name: str, box: Box, comment: str) -> str:
 def _text_alternative(diagram: Diagram) -> str:
     """The text alternative of the drawing: a list of all connections."""
 
-    def words(wire: Connection) -> str:
+    def connection_text(wire: Connection) -> str:
         return f"{wire.source} to {wire.target}"
 
-    listed = "; ".join(words(wire) for wire in diagram.connections)
+    listed = "; ".join(connection_text(wire) for wire in diagram.connections)
     return f"{len(diagram.blocks)} blocks. Wires: {listed}." if listed else f"{len(diagram.blocks)} blocks."

@@ -1,4 +1,4 @@
-"""Drawing of signs, as large as the face allows."""
+"""Drawing of the signs on blocks, as large as the face allows."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from armblocks.pictures.picture import Mark, Polyline, Text
 from armblocks.pictures.style import Tone
 from armblocks.pictures.text_width import shorten, text_width
 
-_WORDS = (13.0, 9.0)
+_FONT_SIZES = (13.0, 9.0)
 """Largest and smallest legible font size of a sign, px."""
-_TITLE = 10.0
+_TITLE_SIZE = 10.0
 _MIN_SIGN_WIDTH = 44.0
 """Minimum width of a sign between the port names, px."""
 _MAX_SIGN_WIDTH = 132.0
@@ -20,7 +20,7 @@ _MAX_SIGN_WIDTH = 132.0
 
 
 @dataclass(frozen=True)
-class Room:
+class FaceArea:
     """The part of a face that is free of port names."""
 
     x: float
@@ -30,15 +30,17 @@ class Room:
 
     @property
     def middle(self) -> tuple[float, float]:
-        """Centre."""
+        """The centre of the area, px."""
         return self.x + self.width / 2, self.y + self.height / 2
 
-    def shrunk(self, dx: float, dy: float) -> Room:
+    def shrunk(self, dx: float, dy: float) -> FaceArea:
         """The same area without a border."""
-        return Room(self.x + dx, self.y + dy, max(self.width - 2 * dx, 1.0), max(self.height - 2 * dy, 1.0))
+        return FaceArea(
+            self.x + dx, self.y + dy, max(self.width - 2 * dx, 1.0), max(self.height - 2 * dy, 1.0)
+        )
 
 
-def least_room(sign: FaceSign) -> tuple[float, float]:
+def min_face_size(sign: FaceSign) -> tuple[float, float]:
     """Width and height (px) that a complete sign needs."""
     match sign:
         case Words():
@@ -46,9 +48,9 @@ def least_room(sign: FaceSign) -> tuple[float, float]:
         case Lines():
             return min(max(text_width(line, 9.5) for line in sign.texts) + 10, _MAX_SIGN_WIDTH), 40.0
         case Title():
-            widest_part = max(text_width(line, _TITLE) for line in _broken(sign.text, 0.0))
-            width = max(widest_part, text_width(sign.text, _TITLE) / 3, _MIN_SIGN_WIDTH)
-            rows = len(_broken(sign.text, width))
+            widest_part = max(text_width(line, _TITLE_SIZE) for line in _wrapped_lines(sign.text, 0.0))
+            width = max(widest_part, text_width(sign.text, _TITLE_SIZE) / 3, _MIN_SIGN_WIDTH)
+            rows = len(_wrapped_lines(sign.text, width))
             return min(width + 10, _MAX_SIGN_WIDTH), 13.0 * rows + 10
         case Fraction():
             widest = max(text_width(text, 10.0) for text in (sign.above, sign.below))
@@ -57,65 +59,65 @@ def least_room(sign: FaceSign) -> tuple[float, float]:
             return 42.0, 40.0
 
 
-def sign_marks(sign: FaceSign, room: Room) -> list[Mark]:
+def sign_marks(sign: FaceSign, area: FaceArea) -> list[Mark]:
     """Draw a sign in the middle of an area."""
     match sign:
         case Words():
-            size = _WORDS[0] if len(sign.text) > 2 else 16.0
-            return words(room, sign.text, size=size, italic=sign.italic)
+            size = _FONT_SIZES[0] if len(sign.text) > 2 else 16.0
+            return words(area, sign.text, size=size, italic=sign.italic)
         case Lines():
-            return _lines(room, sign.texts, size=9.5)
+            return _lines(area, sign.texts, size=9.5)
         case Title():
-            return _lines(room, _broken(sign.text, room.width - 6), size=_TITLE)
+            return _lines(area, _wrapped_lines(sign.text, area.width - 6), size=_TITLE_SIZE)
         case Fraction():
-            return _fraction(room, sign)
+            return _fraction(area, sign)
         case Graph():
-            return _graph(room, sign.points)
+            return _graph(area, sign.points)
 
 
-def words(room: Room, text: str, *, size: float = _WORDS[0], italic: bool = False) -> list[Mark]:
+def words(area: FaceArea, text: str, *, size: float = _FONT_SIZES[0], italic: bool = False) -> list[Mark]:
     """Draw one line of text. A long text gets a smaller font, then it is shortened."""
-    x, y = room.middle
+    x, y = area.middle
     font = size
-    while font > _WORDS[1] and text_width(text, font) > room.width - 6:
+    while font > _FONT_SIZES[1] and text_width(text, font) > area.width - 6:
         font -= 0.5
-    fitted = shorten(text, font, room.width - 4)
+    fitted = shorten(text, font, area.width - 4)
     return [Text(x, y + 0.36 * font, fitted, font, Tone.INK, "middle", italic=italic)]
 
 
-def _broken(text: str, width: float) -> list[str]:
-    """Lines of text, broken at spaces and hyphens to fit a width; a word that is too long has its own
-    line."""
-    parts = [part for word in text.split() for part in _at_hyphens(word)]
+def _wrapped_lines(text: str, width: float) -> list[str]:
+    """Lines of text, broken at spaces and hyphens to fit a width; a longer word is on a
+    separate line."""
+    parts = [part for word in text.split() for part in _hyphen_parts(word)]
     lines = [""]
     for part in parts:
-        together = lines[-1] + ("" if lines[-1].endswith("-") else " ") + part if lines[-1] else part
-        if lines[-1] and text_width(together, _TITLE) > width:
+        joined = lines[-1] + ("" if lines[-1].endswith("-") else " ") + part if lines[-1] else part
+        if lines[-1] and text_width(joined, _TITLE_SIZE) > width:
             lines.append(part)
         else:
-            lines[-1] = together
+            lines[-1] = joined
     return lines
 
 
-def _at_hyphens(word: str) -> list[str]:
+def _hyphen_parts(word: str) -> list[str]:
     first, hyphen, rest = word.partition("-")
     # "Zero-Pole" may be broken, "S-R" and "n-D" must not be.
     return [first + hyphen, rest] if len(first) > 2 and len(rest) > 2 else [word]
 
 
-def _lines(room: Room, texts: Sequence[str], *, size: float) -> list[Mark]:
-    x, y = room.middle
+def _lines(area: FaceArea, texts: Sequence[str], *, size: float) -> list[Mark]:
+    x, y = area.middle
     top = y - (len(texts) - 1) * size * 0.65
-    shown = [shorten(text, size, room.width - 4) for text in texts]
+    shortened = [shorten(text, size, area.width - 4) for text in texts]
     return [
         Text(x, top + k * size * 1.3 + 0.36 * size, text, size, Tone.INK, "middle")
-        for k, text in enumerate(shown)
+        for k, text in enumerate(shortened)
     ]
 
 
-def _fraction(room: Room, sign: Fraction) -> list[Mark]:
-    x, y = room.middle
-    size, free = _WORDS[0], room.width - (20 if sign.limited else 10)
+def _fraction(area: FaceArea, sign: Fraction) -> list[Mark]:
+    x, y = area.middle
+    size, free = _FONT_SIZES[0], area.width - (20 if sign.limited else 10)
     while size > 8 and max(text_width(text, size) for text in (sign.above, sign.below)) > free:
         size -= 0.5
     above, below = (shorten(text, size, free + 2) for text in (sign.above, sign.below))
@@ -134,11 +136,11 @@ def _fraction(room: Room, sign: Fraction) -> list[Mark]:
     return marks
 
 
-def _graph(room: Room, points: Sequence[tuple[float, float]]) -> list[Mark]:
-    wide = min(room.width, 1.6 * room.height)  # a tall block does not stretch its curve
-    high = min(room.height, room.width)
-    middle = Room(room.x + (room.width - wide) / 2, room.y + (room.height - high) / 2, wide, high)
-    box = middle.shrunk(min(12.0, 0.18 * wide), min(12.0, 0.22 * high))
+def _graph(area: FaceArea, points: Sequence[tuple[float, float]]) -> list[Mark]:
+    width = min(area.width, 1.6 * area.height)  # a tall block does not stretch its curve
+    height = min(area.height, area.width)
+    middle = FaceArea(area.x + (area.width - width) / 2, area.y + (area.height - height) / 2, width, height)
+    box = middle.shrunk(min(12.0, 0.18 * width), min(12.0, 0.22 * height))
     line = [(box.x + u * box.width, box.y + (1 - v) * box.height) for u, v in points]
     left, top, right, bottom = box.x - 3, box.y - 3, box.x + box.width + 3, box.y + box.height + 3
     axes = [(left, top), (left, bottom), (right, bottom)]

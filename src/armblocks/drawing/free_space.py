@@ -17,12 +17,12 @@ import numpy as np
 from armblocks.drawing.wire_search import (
     BEND,
     BLOCKED,
+    Booleans,
     Floats,
     Grid,
     Point,
-    Truths,
+    edge_weights,
     grid_lines,
-    painted,
 )
 
 Extent: TypeAlias = tuple[float, float, float, float]
@@ -56,16 +56,16 @@ class Level:
     gap: float
     block_lanes: tuple[float, ...]
     wire_lane: float
-    apart: float
+    line_spacing: float
     """Minimum distance of grid lines."""
     window: float
     """Margin of the search window around the ends of a wire."""
     detour: float
     """Accepted relative excess over the lower bound of the cost; beyond it, the next window is searched."""
 
-    def most(self, least: float) -> float:
-        """The maximum accepted cost of a route whose lower bound is ``least``."""
-        return least + _ACCEPTED_DETOUR + self.detour * (least + 200.0)
+    def max_cost(self, lower_bound: float) -> float:
+        """The maximum accepted cost of a route whose lower bound is ``lower_bound``."""
+        return lower_bound + _ACCEPTED_DETOUR + self.detour * (lower_bound + 200.0)
 
 
 LEVELS = (
@@ -90,14 +90,14 @@ class End(Protocol):
     def dy(self) -> int: ...
 
 
-def meet(a: Extent, b: Extent) -> bool:
+def areas_overlap(a: Extent, b: Extent) -> bool:
     """Whether two areas have a point in common."""
     return a[0] <= b[2] and b[0] <= a[2] and a[1] <= b[3] and b[1] <= a[3]
 
 
 def extents(segments: Floats, *, at_ports: bool = False) -> list[Extent]:
     """The areas in which segments influence other nets; ``at_ports``: the segments are reserved for ports."""
-    x0, y0, x1, y1 = _wider(segments, _APPROACH if at_ports else _NEAR).T.tolist()
+    x0, y0, x1, y1 = _enlarged(segments, _APPROACH if at_ports else _NEAR).T.tolist()
     return list(zip(x0, y0, x1, y1))
 
 
@@ -133,7 +133,7 @@ class FreeSpace:
         self._owners = np.array(owners, dtype=np.int64)
         self._approaches = self._count = len(self._segments)
 
-    def lay(self, segments: Floats, number: int) -> None:
+    def add_net(self, segments: Floats, number: int) -> None:
         """Add the segments (n, 4) of a net, see :func:`sorted_ends`."""
         begin, end = self._count, self._count + len(segments)
         while end > len(self._segments):  # double the capacity
@@ -159,7 +159,7 @@ class FreeSpace:
         )
 
 
-def _inside(areas: Floats, extent: Extent, margin: float) -> Truths:
+def _inside(areas: Floats, extent: Extent, margin: float) -> Booleans:
     return (
         (areas[:, 0] <= extent[2] + margin)
         & (areas[:, 2] >= extent[0] - margin)
@@ -168,11 +168,11 @@ def _inside(areas: Floats, extent: Extent, margin: float) -> Truths:
     )
 
 
-def _wider(areas: Floats, margin: float) -> Floats:
+def _enlarged(areas: Floats, margin: float) -> Floats:
     return areas + np.array([-margin, -margin, margin, margin])
 
 
-def _meets(areas: Floats, line: Floats) -> bool:
+def _intersects_any(areas: Floats, line: Floats) -> bool:
     """Whether a line, from its upper left to its lower right end, intersects one of these open areas."""
     return bool(
         np.any(
@@ -224,9 +224,9 @@ class Surroundings:
             blocks = blocks[~_owns(blocks, port, out)]
         along = self._level if line[1] == line[3] else self._upright
         return not (
-            _meets(_wider(blocks, level.clearance), segment)
-            or _meets(_wider(along, level.gap), segment)
-            or _meets(_wider(self._corners, level.gap), segment)
+            _intersects_any(_enlarged(blocks, level.clearance), segment)
+            or _intersects_any(_enlarged(along, level.gap), segment)
+            or _intersects_any(_enlarged(self._corners, level.gap), segment)
         )
 
     def is_free(
@@ -234,24 +234,26 @@ class Surroundings:
     ) -> bool:
         """Whether a straight line is legal and intersects nothing, so that no other route is better."""
         segment = _sorted_line(line)
-        if _meets(_wider(self._names, 3.0), segment) or _meets(_wider(self._segments, _NEAR), segment):
+        if _intersects_any(_enlarged(self._names, 3.0), segment) or _intersects_any(
+            _enlarged(self._segments, _NEAR), segment
+        ):
             return False
         return self.is_legal(line, level, ports)
 
     def may_bend(self, point: Point, level: Level) -> bool:
         """Whether a corner or a dot at this point is legal."""
-        return not _meets(_wider(self._segments, level.gap), np.array([*point, *point]))
+        return not _intersects_any(_enlarged(self._segments, level.gap), np.array([*point, *point]))
 
     def path(self, source: End, start: Point, goal: Point, target: End, level: Level) -> list[Point]:
         """The corners of the cheapest route between the stubs of the source and the target."""
-        own: list[Segment] = [((source.x, source.y), start), (goal, (target.x, target.y))]
-        grid = self._grid(own, [], level, (start, goal) if source.dx else None)
-        begins = np.full(grid.turn.shape, np.inf)
-        begins[grid.node(start)] = 0.0
-        infinite = np.full(grid.turn.shape, np.inf)
-        rightwards, downwards = (begins, infinite) if source.dx else (infinite, begins)
-        most = level.most(_least(source, start, goal, target))
-        return grid.cheapest(rightwards, downwards, grid.node(goal), most, flat=target.dx != 0)
+        own_segments: list[Segment] = [((source.x, source.y), start), (goal, (target.x, target.y))]
+        grid = self._grid(own_segments, [], level, (start, goal) if source.dx else None)
+        start_costs = np.full(grid.may_bend.shape, np.inf)
+        start_costs[grid.node(start)] = 0.0
+        infinite = np.full(grid.may_bend.shape, np.inf)
+        rightwards, downwards = (start_costs, infinite) if source.dx else (infinite, start_costs)
+        max_cost = level.max_cost(_cost_bound(source, start, goal, target))
+        return grid.cheapest(rightwards, downwards, grid.node(goal), max_cost, flat=target.dx != 0)
 
     def branch(
         self,
@@ -263,14 +265,15 @@ class Surroundings:
         level: Level,
     ) -> list[Point]:
         """The corners of the cheapest route from the lines of the net itself to a target's stub.
+
         No route starts at one of the ``dots``, or near one of the ``closed`` points.
         """
         grid = self._grid([(goal, (target.x, target.y))], tree, level, None)
-        on_tree = np.zeros(grid.turn.shape, dtype=np.bool_)
+        on_tree = np.zeros(grid.may_bend.shape, dtype=np.bool_)
         for a, b in tree:
             (top, left), (bottom, right) = sorted((grid.node(a), grid.node(b)))
             on_tree[top : bottom + 1, left : right + 1] = True
-        rows, columns = np.nonzero(on_tree & grid.turn)
+        rows, columns = np.nonzero(on_tree & grid.may_bend)
 
         def distances(points: Sequence[Point]) -> Floats:
             xs, ys = np.array(points).reshape(-1, 2).T
@@ -281,10 +284,10 @@ class Surroundings:
         free &= np.all((away == 0.0) | (away >= level.gap), axis=1)
         if not np.any(free):
             return []
-        begins = np.full(grid.turn.shape, np.inf)
-        begins[rows[free], columns[free]] = _BRANCH
-        most = level.most(_BRANCH + float(np.min(distances([goal])[free])))
-        return grid.cheapest(begins, begins, grid.node(goal), most, flat=target.dx != 0)
+        start_costs = np.full(grid.may_bend.shape, np.inf)
+        start_costs[rows[free], columns[free]] = _BRANCH
+        max_cost = level.max_cost(_BRANCH + float(np.min(distances([goal])[free])))
+        return grid.cheapest(start_costs, start_costs, grid.node(goal), max_cost, flat=target.dx != 0)
 
     # -- the grid --------------------------------------------------------------------------------------------
 
@@ -297,31 +300,31 @@ class Surroundings:
     ) -> Grid:
         """The grid of an area. Routes of the net avoid its own ``stubs`` and start on its ``tree``."""
         xs, ys = self._lines([*stubs, *tree], level, middle)
-        own = np.array([_sorted_line((*a, *b)) for a, b in (*stubs, *tree)]).reshape(-1, 4)
+        own_segments = np.array([_sorted_line((*a, *b)) for a, b in (*stubs, *tree)]).reshape(-1, 4)
         solid = np.array([_sorted_line((*a, *b)) for a, b in stubs]).reshape(-1, 4)
-        flat = own[:, 1] == own[:, 3]
-        unchanged, turned = [0, 2, 1, 3], [1, 3, 0, 2]
+        flat = own_segments[:, 1] == own_segments[:, 3]
+        unchanged, transposed = [0, 2, 1, 3], [1, 3, 0, 2]
         right, down = (
-            self._edges(order, lines, across, own[along], solid, level)
-            for order, lines, across, along in ((unchanged, xs, ys, flat), (turned, ys, xs, ~flat))
+            self._edges(order, lines, across, own_segments[along], solid, level)
+            for order, lines, across, along in ((unchanged, xs, ys, flat), (transposed, ys, xs, ~flat))
         )
         if middle is not None:
             (ax, _), (bx, _) = middle
             half = max(abs(bx - ax) / 2, 1.0)
             off = np.minimum(np.abs(xs - (ax + bx) / 2) / half, 1.0)
             down += np.diff(ys)[:, None] * (off * _MIDDLE_COST)
-        near = _wider(self._segments, level.gap)
+        near = _enlarged(self._segments, level.gap)
         rows = (ys[:, None] > near[:, 1]) & (ys[:, None] < near[:, 3])
         columns = (xs > near[:, 0, None]) & (xs < near[:, 2, None])
-        turn = rows.astype(np.float64) @ columns.astype(np.float64) == 0.0
-        return Grid(xs, ys, right, down, turn)
+        may_bend = rows.astype(np.float64) @ columns.astype(np.float64) == 0.0
+        return Grid(xs, ys, right, down, may_bend)
 
     def _lines(
-        self, own: Sequence[Segment], level: Level, middle: tuple[Point, Point] | None
+        self, own_segments: Sequence[Segment], level: Level, middle: tuple[Point, Point] | None
     ) -> tuple[Floats, Floats]:
         x0, y0, x1, y1 = self._extent
-        exact_x = [x for segment in own for x, _ in segment]
-        exact_y = [y for segment in own for _, y in segment]
+        exact_x = [x for segment in own_segments for x, _ in segment]
+        exact_y = [y for segment in own_segments for _, y in segment]
         lanes = np.array(level.block_lanes)[:, None]
         tops = np.minimum(self._blocks[:, 1], self._names[:, 1])
         bottoms = np.maximum(self._blocks[:, 3], self._names[:, 3])
@@ -337,12 +340,18 @@ class Surroundings:
         lanes_x = np.concatenate([part.ravel() for part in candidates_x])
         lanes_y = np.concatenate([part.ravel() for part in candidates_y])
         return (
-            grid_lines(exact_x, lanes_x[(lanes_x >= x0) & (lanes_x <= x1)].tolist(), level.apart),
-            grid_lines(exact_y, lanes_y[(lanes_y >= y0) & (lanes_y <= y1)].tolist(), level.apart),
+            grid_lines(exact_x, lanes_x[(lanes_x >= x0) & (lanes_x <= x1)].tolist(), level.line_spacing),
+            grid_lines(exact_y, lanes_y[(lanes_y >= y0) & (lanes_y <= y1)].tolist(), level.line_spacing),
         )
 
     def _edges(
-        self, order: list[int], line: Floats, levels: Floats, own: Floats, solid: Floats, level: Level
+        self,
+        order: list[int],
+        line: Floats,
+        levels: Floats,
+        own_segments: Floats,
+        solid: Floats,
+        level: Level,
     ) -> Floats:
         """Costs of the edges of parallel grid lines; ``order`` permutes rectangles to (along, across)."""
         begin, _, low, high = order
@@ -350,24 +359,24 @@ class Surroundings:
         across = self._upright if begin == 0 else self._level
         ends = self._ends[self._ends[:, low] == self._ends[:, high]]
         areas = (
-            (_wider(self._blocks, level.clearance), BLOCKED, 0.0),
-            (_wider(along, level.gap), BLOCKED, 0.0),
-            (_wider(self._corners, level.gap), BLOCKED, 0.0),
-            (_thicker(own, level.gap, low), BLOCKED, 0.0),
-            (_thicker(solid, _ON_EDGE, begin), BLOCKED, 0.0),
-            (_thicker(across, _ON_EDGE, begin, 0.0), _CROSSING, 0.0),
-            (_wider(self._blocks, _BLOCK_MARGIN), 0.0, _BLOCK_MARGIN_COST),
-            (_wider(self._names, 3.0), 0.0, _LABEL_COST),
-            (_wider(along, _NEAR), 0.0, _NEAR_COST),
-            (_thicker(_thicker(ends, _APPROACH, begin), 6.0, low), 0.0, _APPROACH_COST),
+            (_enlarged(self._blocks, level.clearance), BLOCKED, 0.0),
+            (_enlarged(along, level.gap), BLOCKED, 0.0),
+            (_enlarged(self._corners, level.gap), BLOCKED, 0.0),
+            (_enlarged_along(own_segments, level.gap, low), BLOCKED, 0.0),
+            (_enlarged_along(solid, _ON_EDGE, begin), BLOCKED, 0.0),
+            (_enlarged_along(across, _ON_EDGE, begin, 0.0), _CROSSING, 0.0),
+            (_enlarged(self._blocks, _BLOCK_MARGIN), 0.0, _BLOCK_MARGIN_COST),
+            (_enlarged(self._names, 3.0), 0.0, _LABEL_COST),
+            (_enlarged(along, _NEAR), 0.0, _NEAR_COST),
+            (_enlarged_along(_enlarged_along(ends, _APPROACH, begin), 6.0, low), 0.0, _APPROACH_COST),
         )
         weights = np.repeat([area[1:] for area in areas], [len(area[0]) for area in areas], axis=0)
         rectangles = np.vstack([area[0] for area in areas])[:, order]
-        fixed, per_px = painted(rectangles, weights, line, levels)
+        fixed, per_px = edge_weights(rectangles, weights, line, levels)
         return np.diff(line)[:, None] * (1.0 + per_px) + fixed
 
 
-def _thicker(areas: Floats, margin: float, axis: int, other: float | None = None) -> Floats:
+def _enlarged_along(areas: Floats, margin: float, axis: int, other: float | None = None) -> Floats:
     """Areas enlarged along one axis: by ``margin`` below, by ``other`` (by default ``margin``) above."""
     enlarged = areas.copy()
     enlarged[:, axis] -= margin
@@ -375,7 +384,7 @@ def _thicker(areas: Floats, margin: float, axis: int, other: float | None = None
     return enlarged
 
 
-def _least(source: End, start: Point, goal: Point, target: End) -> float:
+def _cost_bound(source: End, start: Point, goal: Point, target: End) -> float:
     """The lower bound of the cost of a route: its cost without obstacles."""
     across, down = abs(goal[0] - start[0]), abs(goal[1] - start[1])
     if (source.dx != 0) != (target.dx != 0):
@@ -383,7 +392,7 @@ def _least(source: End, start: Point, goal: Point, target: End) -> float:
     return across + down + (2 * BEND if (down if source.dx else across) else 0.0)
 
 
-def _owns(blocks: Floats, port: Point, out: tuple[int, int]) -> Truths:
+def _owns(blocks: Floats, port: Point, out: tuple[int, int]) -> Booleans:
     """The block that has a port on its side; no block if several overlap there."""
     (x, y), (dx, dy) = port, out
     edge = blocks[:, (0 if dx < 0 else 2) if dx else (1 if dy < 0 else 3)]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.drawing.face_marks import Room
+from armblocks.drawing.face_marks import FaceArea
 from armblocks.pictures.numbers import axis_number
 from armblocks.pictures.picture import Mark, Polyline, Rectangle, Text
 from armblocks.pictures.style import Tone, trace_tone
@@ -26,16 +26,16 @@ class Trend:
     inputs: tuple[_Array, ...]
 
 
-def _screen(room: Room) -> tuple[Room, Mark]:
-    box = room.shrunk(6.0, 6.0)
+def _screen(area: FaceArea) -> tuple[FaceArea, Mark]:
+    box = area.shrunk(6.0, 6.0)
     return box.shrunk(3.0, 4.0), Rectangle(
         box.x, box.y, box.width, box.height, 3, Tone.SUNKEN, Tone.HAIRLINE, 1.0
     )
 
 
-def scope(room: Room, trend: Trend | None) -> list[Mark]:
-    """All signals over time."""
-    box, screen = _screen(room)
+def scope(area: FaceArea, trend: Trend | None) -> list[Mark]:
+    """Draw all signals over time."""
+    box, screen = _screen(area)
     marks: list[Mark] = [screen]
     if trend is None or len(trend.time) < 2:
         points = [(u, 0.5 + 0.35 * math.sin(7 * u)) for u in (k / 24 for k in range(25))]
@@ -49,38 +49,38 @@ def scope(room: Room, trend: Trend | None) -> list[Mark]:
     ]
     for index, values in columns:
         time, thin = thin_out(trend.time, values, round(box.width))
-        marks.append(_mini(box, time, thin, [v for _, v in columns], index))
+        marks.append(_curve(box, time, thin, [v for _, v in columns], index))
     return marks
 
 
-def _mini(box: Room, x: _Array, y: _Array, together: Sequence[_Array], index: int) -> Mark:
-    low, high = (float(f(np.concatenate(together))) for f in (np.nanmin, np.nanmax))
+def _curve(box: FaceArea, x: _Array, y: _Array, all_values: Sequence[_Array], index: int) -> Mark:
+    low, high = (float(f(np.concatenate(all_values))) for f in (np.nanmin, np.nanmax))
     left, right = float(np.nanmin(x)), float(np.nanmax(x))
     px = box.x + (x - left) / ((right - left) or 1.0) * box.width
-    share = (y - low) / (high - low) if high > low else np.full(len(y), 0.5)
-    py = box.y + (1 - share) * box.height
+    fraction = (y - low) / (high - low) if high > low else np.full(len(y), 0.5)
+    py = box.y + (1 - fraction) * box.height
     return Polyline(np.column_stack([px, py]), stroke=trace_tone(index), width=1.3)
 
 
-def xy_graph(room: Room, trend: Trend | None) -> list[Mark]:
-    """The second signal over the first."""
-    box, screen = _screen(room)
+def xy_graph(area: FaceArea, trend: Trend | None) -> list[Mark]:
+    """Draw the second signal over the first."""
+    box, screen = _screen(area)
     if trend is None or len(trend.time) < 2:
         circle = [(math.cos(a), math.sin(2 * a)) for a in (2 * math.pi * k / 40 for k in range(41))]
         x, y = box.middle
         line = [(x + 0.45 * box.width * u, y + 0.45 * box.height * v) for u, v in circle]
         return [screen, Polyline(line, stroke=Tone.MUTED, width=1.2)]
-    pick = np.unique(np.linspace(0, len(trend.time) - 1, 600).astype(int))
-    x, y = trend.inputs[0][pick, 0], trend.inputs[1][pick, 0]
-    return [screen, _mini(box, x, y, [y], 0)]
+    indices = np.unique(np.linspace(0, len(trend.time) - 1, 600).astype(int))
+    x, y = trend.inputs[0][indices, 0], trend.inputs[1][indices, 0]
+    return [screen, _curve(box, x, y, [y], 0)]
 
 
-def display(room: Room, count: int, trend: Trend | None) -> list[Mark]:
-    """A field for each input, with the last value."""
+def display(area: FaceArea, count: int, trend: Trend | None) -> list[Mark]:
+    """Draw a field for each input, with the last value."""
     marks: list[Mark] = []
-    height = room.height / count
+    height = area.height / count
     for k in range(count):
-        box = Room(room.x, room.y + k * height, room.width, height).shrunk(6.0, 3.5)
+        box = FaceArea(area.x, area.y + k * height, area.width, height).shrunk(6.0, 3.5)
         marks.append(Rectangle(box.x, box.y, box.width, box.height, 3, Tone.SUNKEN, Tone.HAIRLINE, 1.0))
         text = "…"
         if trend is not None and len(trend.time):

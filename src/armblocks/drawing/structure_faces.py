@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 from armblocks import blocks as kinds
 from armblocks.diagram import Block, Diagram
-from armblocks.drawing.face_marks import Room, words
+from armblocks.drawing.face_marks import FaceArea, words
 from armblocks.pictures.picture import Disc, Mark, Polyline, Rectangle, Text
 from armblocks.pictures.style import Tone
 from armblocks.pictures.text_width import text_width
 
 CONTROLS = ("enable", "trigger", "reset", "action")
 """Control inputs of a subsystem, which are on its upper edge with their symbols below."""
-CONTROL_ROOM = 18.0
+CONTROL_HEIGHT = 18.0
 """Height of the area below the upper edge of a conditional subsystem for the symbol of its control, px."""
 BAR = 6.0
 """Thickness of the bar of a bus block, px."""
@@ -24,11 +24,11 @@ _CONDITIONAL = (
     kinds.ResettableSubsystem,
     kinds.ActionSubsystem,
 )
-_SYMBOL = 15.0
+_SYMBOL_HEIGHT = 15.0
 """Height of the symbols of control inputs, px."""
 _MASK_SIZE = 10.5
 """Font size of the text of a mask, px."""
-_MASK_LINE = 84.0
+_MASK_LINE_WIDTH = 84.0
 """Width at which a line of the text of a mask is broken, px."""
 _MAX_MASK_WIDTH = 140.0
 """Maximum width of the text of a mask, px."""
@@ -56,7 +56,7 @@ def tag_text(block: kinds.Goto | kinds.From) -> str:
 
 
 def tag_outline(block: Block, x: float, y: float, width: float, height: float, flipped: bool) -> Mark:
-    """A Goto has an arrow tip; a From has the matching notch."""
+    """The outline of a tag: a Goto has an arrow tip, a From the matching notch."""
     tip = 9.0
     if isinstance(block, kinds.Goto):
         corners = [(0.0, 0.0), (width - tip, 0.0), (width, height / 2), (width - tip, height), (0.0, height)]
@@ -73,15 +73,17 @@ def bus_bar(block: Block, x: float, y: float, width: float, height: float, flipp
     return Rectangle(left, y, BAR, height, radius=1.5, fill=Tone.WIRE)
 
 
-def subsystem_marks(block: Block, room: Room, tops: tuple[tuple[str, float], ...]) -> list[Mark]:
-    """A small diagram, or the text of the mask; above, symbols of the control inputs under their ports (name,
-    x)."""
-    down = CONTROL_ROOM if tops else 0.0
-    below = Room(room.x, room.y + down, room.width, room.height - down)
+def subsystem_marks(block: Block, area: FaceArea, tops: tuple[tuple[str, float], ...]) -> list[Mark]:
+    """Draw a small diagram or the text of the mask, and the symbols of control inputs below their ports.
+
+    ``tops``: names and positions x (px) of the control inputs.
+    """
+    down = CONTROL_HEIGHT if tops else 0.0
+    below = FaceArea(area.x, area.y + down, area.width, area.height - down)
     inner: object = block.parameter_value("diagram")
     marks = _lines(below, mask_text(inner)) if isinstance(inner, Diagram) and inner.mask else _sheet(below)
     for name, x in tops:
-        marks += _control(block, name, x, room.y + 5.0)
+        marks += _control(block, name, x, area.y + 5.0)
     return marks
 
 
@@ -98,25 +100,25 @@ def mask_text(diagram: Diagram) -> tuple[str, ...]:
     """The lines on the face of a masked subsystem: its name, broken between words if it is long."""
     lines = [""]
     for word in diagram.name.replace("_", " ").split():
-        together = f"{lines[-1]} {word}".strip()
-        if lines[-1] and text_width(together, _MASK_SIZE) > _MASK_LINE:
+        joined = f"{lines[-1]} {word}".strip()
+        if lines[-1] and text_width(joined, _MASK_SIZE) > _MASK_LINE_WIDTH:
             lines.append(word)
         else:
-            lines[-1] = together
+            lines[-1] = joined
     return tuple(lines)
 
 
-def _lines(room: Room, texts: Sequence[str]) -> list[Mark]:
+def _lines(area: FaceArea, texts: Sequence[str]) -> list[Mark]:
     """Draw lines of text in the middle of an area, each with a font size that fits."""
     height = _MASK_SIZE * 1.3
-    top = room.middle[1] - height * len(texts) / 2
-    rows = [Room(room.x, top + k * height, room.width, height) for k in range(len(texts))]
+    top = area.middle[1] - height * len(texts) / 2
+    rows = [FaceArea(area.x, top + k * height, area.width, height) for k in range(len(texts))]
     return [mark for row, text in zip(rows, texts) for mark in words(row, text, size=_MASK_SIZE)]
 
 
-def _sheet(room: Room) -> list[Mark]:
+def _sheet(area: FaceArea) -> list[Mark]:
     """A small diagram of the content of a block."""
-    x, y = room.middle
+    x, y = area.middle
     boxes = [(x - 17, y - 9), (x + 5, y + 1)]
     wire = [(x - 5, y - 4.5), (x, y - 4.5), (x, y + 5.5), (x + 5, y + 5.5)]
     return [
@@ -144,49 +146,53 @@ def _control(block: Block, name: str, x: float, y: float) -> list[Mark]:
 
 def _stroke(points: Stroke, x: float, y: float) -> Mark:
     width = 18.0 if len(points) > 4 else 14.0
-    line = [(x + (u - 0.5) * width, y + v * (_SYMBOL - 4)) for u, v in points]
+    line = [(x + (u - 0.5) * width, y + v * (_SYMBOL_HEIGHT - 4)) for u, v in points]
     return Polyline(line, stroke=Tone.TRACE_0, width=1.6)
 
 
 def _edge_arrow(x: float, y: float, *, up: bool) -> Mark:
-    middle, way = y + (_SYMBOL - 4) / 2, -1.0 if up else 1.0
-    corners = [(x - 3, middle - 1.6 * way), (x, middle + 2.4 * way), (x + 3, middle - 1.6 * way)]
+    middle, direction = y + (_SYMBOL_HEIGHT - 4) / 2, -1.0 if up else 1.0
+    corners = [
+        (x - 3, middle - 1.6 * direction),
+        (x, middle + 2.4 * direction),
+        (x + 3, middle - 1.6 * direction),
+    ]
     return Polyline(corners, stroke=None, fill=Tone.TRACE_0, closed=True)
 
 
-def lever_marks(block: Block, room: Room, heights: tuple[float, ...], flipped: bool) -> list[Mark]:
+def lever_marks(block: Block, area: FaceArea, heights: tuple[float, ...], flipped: bool) -> list[Mark]:
     """Draw the contacts of a switch at the heights of the inputs, the output contact, and a lever between
     two."""
-    inner, outer = room.x + 0.2 * room.width, room.x + 0.8 * room.width
+    inner, outer = area.x + 0.2 * area.width, area.x + 0.8 * area.width
     begin, end = (outer, inner) if flipped else (inner, outer)
-    middle = room.middle[1]
-    chosen = heights[0]
+    middle = area.middle[1]
+    connected_height = heights[0]
     if isinstance(block, kinds.ManualSwitch):
-        chosen = heights[0] if block.position < 1.5 else heights[-1]
+        connected_height = heights[0] if block.position < 1.5 else heights[-1]
     marks: list[Mark] = [
-        Polyline([(begin, chosen), (end, middle)], stroke=Tone.INK, width=1.6),
+        Polyline([(begin, connected_height), (end, middle)], stroke=Tone.INK, width=1.6),
         *(Disc(begin, y, 2.4, Tone.SURFACE, Tone.INK, 1.2) for y in heights),
         Disc(end, middle, 2.4, Tone.SURFACE, Tone.INK, 1.2),
     ]
     return marks
 
 
-def stop_marks(room: Room) -> list[Mark]:
-    """The stop sign of road traffic."""
-    x, y = room.middle
+def stop_marks(area: FaceArea) -> list[Mark]:
+    """Draw a stop sign."""
+    x, y = area.middle
     r = 17.0
-    near = 0.41421356 * r
+    half_side = 0.41421356 * r
     corners = [
-        (x - near, y - r), (x + near, y - r), (x + r, y - near), (x + r, y + near),
-        (x + near, y + r), (x - near, y + r), (x - r, y + near), (x - r, y - near),
+        (x - half_side, y - r), (x + half_side, y - r), (x + r, y - half_side), (x + r, y + half_side),
+        (x + half_side, y + r), (x - half_side, y + r), (x - r, y + half_side), (x - r, y - half_side),
     ]  # fmt: skip
     sign = Polyline(corners, stroke=Tone.ERROR, width=1.6, fill=Tone.ERROR_WASH, closed=True)
     return [sign, Text(x, y + 3.4, "STOP", 9.5, Tone.ERROR, "middle", bold=True)]
 
 
-def port_number(block: kinds.Inport | kinds.Outport, room: Room) -> list[Mark]:
-    """The number of the port."""
-    return words(room, str(block.port or 1), size=11.0)
+def port_number(block: kinds.Inport | kinds.Outport, area: FaceArea) -> list[Mark]:
+    """Draw the number of the port."""
+    return words(area, str(block.port or 1), size=11.0)
 
 
 def tag_width(block: kinds.Goto | kinds.From) -> float:

@@ -31,7 +31,7 @@ def wire_marks(net: RoutedNet, kind: WireKind, title: str, tone: Tone) -> list[M
     """The lines of a net: thin for a scalar, thick for a vector, double for a matrix, triple for a bus."""
     marks: list[Mark] = []
     weight = (1.2, 2.3, 3.8, 5.4)[kind]
-    lines = [rounded(_shortened(path, 5.0), net.dots) for path in net.paths if path]
+    lines = [rounded_path(_shortened(path, 5.0), net.dots) for path in net.paths if path]
     marks += [Curve(line, stroke=tone, width=weight) for line in lines]
     if kind is WireKind.MATRIX:
         marks += [Curve(line, stroke=Tone.SURFACE, width=1.5) for line in lines]
@@ -47,11 +47,11 @@ def _shortened(path: tuple[Point, ...], by: float) -> tuple[Point, ...]:
     """The path without its last ``by`` px, which the arrow head covers."""
     (ax, ay), (bx, by_) = path[-2], path[-1]
     length = abs(bx - ax) + abs(by_ - ay)
-    share = max(length - by, 0.0) / length if length else 0.0
-    return (*path[:-1], (ax + (bx - ax) * share, ay + (by_ - ay) * share))
+    fraction = max(length - by, 0.0) / length if length else 0.0
+    return (*path[:-1], (ax + (bx - ax) * fraction, ay + (by_ - ay) * fraction))
 
 
-def rounded(path: tuple[Point, ...], dots: Sequence[Point] = ()) -> tuple[tuple[str | float, ...], ...]:
+def rounded_path(path: tuple[Point, ...], dots: Sequence[Point] = ()) -> tuple[tuple[str | float, ...], ...]:
     """The path commands of segments with small round corners; corners at dots are sharp."""
     commands: list[tuple[str | float, ...]] = [("M", *path[0])]
     for before, corner, after in zip(path, path[1:], path[2:]):
@@ -59,8 +59,8 @@ def rounded(path: tuple[Point, ...], dots: Sequence[Point] = ()) -> tuple[tuple[
             commands.append(("L", *corner))
             continue
         radius = min(_ROUNDING, _distance(before, corner) / 2, _distance(corner, after) / 2)
-        commands.append(("L", *_towards(corner, before, radius)))
-        commands.append(("Q", *corner, *_towards(corner, after, radius)))
+        commands.append(("L", *_point_toward(corner, before, radius)))
+        commands.append(("Q", *corner, *_point_toward(corner, after, radius)))
     commands.append(("L", *path[-1]))
     return tuple(commands)
 
@@ -69,10 +69,10 @@ def _distance(a: Point, b: Point) -> float:
     return abs(a[0] - b[0]) + abs(a[1] - b[1])
 
 
-def _towards(a: Point, b: Point, length: float) -> Point:
+def _point_toward(a: Point, b: Point, length: float) -> Point:
     total = _distance(a, b)
-    share = length / total if total else 0.0
-    return a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share
+    fraction = length / total if total else 0.0
+    return a[0] + (b[0] - a[0]) * fraction, a[1] + (b[1] - a[1]) * fraction
 
 
 def arrow_head(path: tuple[Point, ...], tone: Tone = Tone.WIRE) -> Mark:

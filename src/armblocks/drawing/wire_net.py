@@ -10,14 +10,14 @@ import numpy as np
 
 from armblocks.drawing.free_space import LEVELS, Extent, FreeSpace, Level, sorted_ends
 from armblocks.drawing.wire_search import Floats, Point
-from armblocks.drawing.wires import Net, RoutedNet, WireEnd, bent, corners
+from armblocks.drawing.wires import Net, RoutedNet, WireEnd, corners, drawn_path
 
-_EXAMINED = 12.0
+_EXAMINED_DISTANCE = 12.0
 """The legality of a line depends on objects within this distance, px."""
 
 
 @dataclass(frozen=True)
-class LaidNet:
+class NetRoute:
     """A routed net, its segments (n, 4), and the area on which its route depends."""
 
     net: Net
@@ -37,42 +37,42 @@ class NetRouter:
         self._dots: list[Point] = []
         self._examined: Extent = (np.inf, np.inf, -np.inf, -np.inf)
 
-    def routed(self) -> LaidNet:
+    def route(self) -> NetRoute:
         """Route all targets: user-drawn routes first, then the others by distance from the source."""
         net = self._net
         paths: dict[int, tuple[Point, ...]] = {}
         for k, (target, bends) in enumerate(zip(net.targets, net.bends)):
-            if (drawn := bent(net.source, bends, target)) and (path := self._user_drawn(drawn, target)):
+            if (drawn := drawn_path(net.source, bends, target)) and (path := self._user_drawn(drawn, target)):
                 paths[k] = path
         origin = net.source
 
-        def nearness(k: int) -> tuple[float, int]:
+        def distance(k: int) -> tuple[float, int]:
             return abs(net.targets[k].x - origin.x) + abs(net.targets[k].y - origin.y), k
 
-        for k in sorted(set(range(len(net.targets))) - set(paths), key=nearness):
+        for k in sorted(set(range(len(net.targets))) - set(paths), key=distance):
             paths[k] = self._route(net.targets[k])
         routed = RoutedNet(tuple(paths[k] for k in range(len(net.targets))), tuple(sorted(self._dots)))
         segments = sorted_ends(np.array([(*a, *b) for a, b in self._tree]).reshape(-1, 4))
-        return LaidNet(net, routed, segments, self._examined)
+        return NetRoute(net, routed, segments, self._examined)
 
     def _route(self, target: WireEnd) -> tuple[Point, ...]:
         for level in LEVELS:
-            path = self._at_level(target, level)
+            path = self._route_at_level(target, level)
             if path:
                 self._add(path)
                 return path
         return ()
 
-    def _at_level(self, target: WireEnd, level: Level) -> tuple[Point, ...]:
+    def _route_at_level(self, target: WireEnd, level: Level) -> tuple[Point, ...]:
         source, end = self._net.source, (target.x, target.y)
         if not self._tree and _is_straight(source, target):
             line = (source.x, source.y, target.x, target.y)
-            extent = _around(line, _EXAMINED + level.clearance)
+            extent = _enlarged(line, _EXAMINED_DISTANCE + level.clearance)
             self._examine(extent)
             ports = [((source.x, source.y), (source.dx, source.dy)), (end, (-target.dx, -target.dy))]
             if self._space.around(extent, self._number).is_free(line, level, ports):
                 return (source.x, source.y), end
-        start, goal = _ahead(source, level.stub), _behind(target, level.stub)
+        start, goal = _source_stub_end(source, level.stub), _target_stub_start(target, level.stub)
         points = [
             start,
             goal,
@@ -80,7 +80,7 @@ class NetRouter:
             end,
             *(point for segment in self._tree for point in segment),
         ]
-        extent = _around(_hull(points), level.window)
+        extent = _enlarged(_bounds(points), level.window)
         self._examine(extent)
         surroundings = self._space.around(extent, self._number)
         if not surroundings.is_legal_stub((*goal, *end), level, end, (-target.dx, -target.dy)):
@@ -102,7 +102,7 @@ class NetRouter:
 
     def _user_drawn(self, path: tuple[Point, ...], target: WireEnd) -> tuple[Point, ...]:
         """Add a user-drawn path from its last point on the routed tree; empty if it is not legal."""
-        extent = _around(_hull(path), _EXAMINED)
+        extent = _enlarged(_bounds(path), _EXAMINED_DISTANCE)
         self._examine(extent)
         source, level = self._net.source, LEVELS[-1]
         if not (_is_along(path[0], path[1], source) and _is_along(path[-2], path[-1], target)):
@@ -118,13 +118,13 @@ class NetRouter:
                 ends.append((path[-1], (-target.dx, -target.dy)))
             if not surroundings.is_legal((*a, *b), level, ends):
                 return ()
-        path = self._leaving(path)
+        path = self._after_tree(path)
         if len(path) < 2 or (self._tree and not surroundings.may_bend(path[0], level)):
             return ()
         self._add(path)
         return path
 
-    def _leaving(self, path: tuple[Point, ...]) -> tuple[Point, ...]:
+    def _after_tree(self, path: tuple[Point, ...]) -> tuple[Point, ...]:
         """The part of a path after it last touches the tree."""
         for k in range(len(path) - 2, -1, -1):
             touched = [
@@ -177,20 +177,20 @@ def _distance(a: Point, b: Point) -> float:
     return abs(a[0] - b[0]) + abs(a[1] - b[1])
 
 
-def _ahead(end: WireEnd, stub: float) -> Point:
+def _source_stub_end(end: WireEnd, stub: float) -> Point:
     """The end of the stub of a wire that leaves a port."""
     return end.x + stub * end.dx, end.y + stub * end.dy
 
 
-def _behind(end: WireEnd, stub: float) -> Point:
+def _target_stub_start(end: WireEnd, stub: float) -> Point:
     """The start of the stub of a wire that enters a port."""
     return end.x - stub * end.dx, end.y - stub * end.dy
 
 
-def _hull(points: Iterable[Point]) -> Extent:
+def _bounds(points: Iterable[Point]) -> Extent:
     xs, ys = zip(*points)
     return min(xs), min(ys), max(xs), max(ys)
 
 
-def _around(extent: Extent, margin: float) -> Extent:
+def _enlarged(extent: Extent, margin: float) -> Extent:
     return extent[0] - margin, extent[1] - margin, extent[2] + margin, extent[3] + margin

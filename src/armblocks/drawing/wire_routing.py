@@ -5,8 +5,8 @@ net. Lines of two nets never overlap, and cross at right angles away from corner
 without a legal route has labels at its ends in place of a line.
 
 The routes are a function of the blocks and nets alone. :class:`Routing` stores the previous routes and the
-area on which each depends. It reroutes only nets with a change in this area; the result equals that of a new
-routing of the whole sheet.
+area on which each depends. It reroutes only nets with a change in this area. The result equals that of
+routing the whole sheet again.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from armblocks.drawing.free_space import RESERVED, Extent, FreeSpace, extents, meet, sorted_ends
-from armblocks.drawing.wire_net import LaidNet, NetRouter
+from armblocks.drawing.free_space import RESERVED, Extent, FreeSpace, areas_overlap, extents, sorted_ends
+from armblocks.drawing.wire_net import NetRoute, NetRouter
 from armblocks.drawing.wire_search import Floats
 from armblocks.drawing.wires import Net, Obstacle, RoutedNet, WireEnd
 
-ALMOST_LEVEL = 1.5
-"""Maximum offset of a line from the middle of a port, if that makes the line straight, px."""
+MAX_LEVEL_OFFSET = 1.5
+"""Maximum distance between the end of a line and the centre of its port, px; it makes lines straight."""
 
 
 def route(obstacles: Sequence[Obstacle], nets: Sequence[Net]) -> list[RoutedNet]:
@@ -49,47 +49,47 @@ class Routing:
         self._obstacles: Mapping[str, Obstacle] = {}
         self._space = FreeSpace([])
         self._ranked: dict[str, _RankedNet] = {}
-        self._laid: dict[str, LaidNet] = {}
-        self._levelled_by_key: dict[str, tuple[Net, Net]] = {}
-        self._numbers = 0
+        self._routes: dict[str, NetRoute] = {}
+        self._aligned_by_key: dict[str, tuple[Net, Net]] = {}
+        self._net_count = 0
 
     def update(self, obstacles: Mapping[str, Obstacle], nets: Mapping[str, Net]) -> dict[str, RoutedNet]:
         """The routes of all nets by key. Nets with user-drawn routes are routed first, then others by
         length."""
-        nets = {key: self._levelled(key, net) for key, net in nets.items()}
+        nets = {key: self._aligned(key, net) for key, net in nets.items()}
         changed = [*self._changed_obstacles(obstacles), *self._changed_nets(nets)]
-        if not changed and nets.keys() == self._laid.keys():
-            return {key: self._laid[key].routed for key in nets}
+        if not changed and nets.keys() == self._routes.keys():
+            return {key: self._routes[key].routed for key in nets}
         space = self._space if obstacles == self._obstacles else FreeSpace(_sides(obstacles.values()))
         space.reserve([(entry.ends, entry.number) for entry in self._ranked.values()])
         stale = self._stale(changed)
-        laid: dict[str, LaidNet] = {}
+        routes: dict[str, NetRoute] = {}
         changed_areas: list[Extent] = []
         for key in sorted(nets, key=lambda key: self._ranked[key].rank):
-            net, old = nets[key], self._laid.get(key)
+            net, old = nets[key], self._routes.get(key)
             if (
                 old is None
                 or key in stale
                 or old.net != net
-                or (changed_areas and any(meet(old.examined, extent) for extent in changed_areas))
+                or (changed_areas and any(areas_overlap(old.examined, extent) for extent in changed_areas))
             ):
-                rerouted = NetRouter(space, net, self._ranked[key].number).routed()
+                rerouted = NetRouter(space, net, self._ranked[key].number).route()
                 if old is None or rerouted.routed != old.routed:
                     changed_areas += extents(rerouted.segments)
                     changed_areas += extents(old.segments) if old is not None else ()
                 old = rerouted
-            laid[key] = old
-            space.lay(old.segments, self._ranked[key].number)
-        self._obstacles, self._space, self._laid = dict(obstacles), space, laid
-        self._levelled_by_key = {key: self._levelled_by_key[key] for key in nets}
-        return {key: laid[key].routed for key in nets}
+            routes[key] = old
+            space.add_net(old.segments, self._ranked[key].number)
+        self._obstacles, self._space, self._routes = dict(obstacles), space, routes
+        self._aligned_by_key = {key: self._aligned_by_key[key] for key in nets}
+        return {key: routes[key].routed for key in nets}
 
-    def _levelled(self, key: str, net: Net) -> Net:
-        """The net with targets that are at most ``ALMOST_LEVEL`` off the level of the source moved to it."""
-        old = self._levelled_by_key.get(key)
+    def _aligned(self, key: str, net: Net) -> Net:
+        """The net; targets within ``MAX_LEVEL_OFFSET`` of the source's line are moved onto this line."""
+        old = self._aligned_by_key.get(key)
         if old is None or (old[0] is not net and old[0] != net):
-            targets = tuple(_level(target, net.source) for target in net.targets)
-            old = self._levelled_by_key[key] = (
+            targets = tuple(_aligned_target(target, net.source) for target in net.targets)
+            old = self._aligned_by_key[key] = (
                 net,
                 net if targets == net.targets else replace(net, targets=targets),
             )
@@ -97,13 +97,13 @@ class Routing:
 
     def _stale(self, changed: Sequence[Extent]) -> set[str]:
         """The nets whose routes depend on one of these changed areas."""
-        if not changed or not self._laid:
+        if not changed or not self._routes:
             return set()
-        examined = np.array([laid.examined for laid in self._laid.values()])[:, None]
+        examined = np.array([entry.examined for entry in self._routes.values()])[:, None]
         areas = np.array(changed)[None]
         overlaps = (examined[..., :2] <= areas[..., 2:]) & (areas[..., :2] <= examined[..., 2:])
         is_stale = np.any(np.all(overlaps, axis=2), axis=1)
-        return {key for key, stale in zip(self._laid, is_stale.tolist()) if stale}
+        return {key for key, stale in zip(self._routes, is_stale.tolist()) if stale}
 
     def _changed_obstacles(self, obstacles: Mapping[str, Obstacle]) -> Iterable[Extent]:
         for name in {*obstacles, *self._obstacles}:
@@ -117,26 +117,26 @@ class Routing:
         for key, net in nets.items():
             old = self._ranked.get(key)
             if old is None or (old.net is not net and old.net != net):
-                self._numbers += 1
+                self._net_count += 1
                 rank = not any(net.bends), _length(net), key
-                ranked[key] = _RankedNet(net, self._numbers, _ends(net), rank)
+                ranked[key] = _RankedNet(net, self._net_count, _ends(net), rank)
                 changed += extents(ranked[key].ends, at_ports=True)
             else:
                 ranked[key] = old
         for key, old in self._ranked.items():
             if ranked.get(key) is not old:
                 changed += extents(old.ends, at_ports=True)
-                changed += extents(self._laid[key].segments)
+                changed += extents(self._routes[key].segments)
         self._ranked = ranked
         return changed
 
 
-def _level(target: WireEnd, source: WireEnd) -> WireEnd:
+def _aligned_target(target: WireEnd, source: WireEnd) -> WireEnd:
     if (target.dx, target.dy) != (source.dx, source.dy):
         return target
-    if target.dx and abs(target.y - source.y) <= ALMOST_LEVEL:
+    if target.dx and abs(target.y - source.y) <= MAX_LEVEL_OFFSET:
         return replace(target, y=source.y)
-    if target.dy and abs(target.x - source.x) <= ALMOST_LEVEL:
+    if target.dy and abs(target.x - source.x) <= MAX_LEVEL_OFFSET:
         return replace(target, x=source.x)
     return target
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats: TypeAlias = NDArray[np.float64]
-Truths: TypeAlias = NDArray[np.bool_]
+Booleans: TypeAlias = NDArray[np.bool_]
 Point: TypeAlias = tuple[float, float]
 Node: TypeAlias = tuple[int, int]
 
@@ -27,23 +27,25 @@ BLOCKED = 1e6
 _MAX_BENDS = 14
 
 
-def grid_lines(exact: Sequence[float], candidates: Sequence[float], apart: float) -> Floats:
-    """All ``exact`` coordinates, and those of ``candidates`` that are ``apart`` from all others; sorted."""
+def grid_lines(exact: Sequence[float], candidates: Sequence[float], spacing: float) -> Floats:
+    """All ``exact`` coordinates, and those of ``candidates`` that are ``spacing`` from all others; sorted."""
     fixed = sorted(set(exact))
     lines, k = list(fixed), 0
     last = -np.inf
     for value in sorted(set(candidates)):
         while k < len(fixed) and fixed[k] < value:
             k += 1
-        near_exact = (k < len(fixed) and fixed[k] - value < apart) or (k > 0 and value - fixed[k - 1] < apart)
-        if near_exact or value - last < apart:
+        near_exact = (k < len(fixed) and fixed[k] - value < spacing) or (
+            k > 0 and value - fixed[k - 1] < spacing
+        )
+        if near_exact or value - last < spacing:
             continue
         lines.append(value)
         last = value
     return np.array(sorted(lines))
 
 
-def painted(rectangles: Floats, weights: Floats, line: Floats, levels: Floats) -> Floats:
+def edge_weights(rectangles: Floats, weights: Floats, line: Floats, levels: Floats) -> Floats:
     """The sum of the weights of the open rectangles that each edge of parallel grid lines intersects.
 
     ``rectangles`` (n, 4): begin, end along the lines, begin, end across them. ``weights`` (n, kinds) are
@@ -71,32 +73,36 @@ def painted(rectangles: Floats, weights: Floats, line: Floats, levels: Floats) -
 class Grid:
     """Grid lines, the cost of every edge, and the nodes at which a wire may bend.
 
-    ``right`` (columns - 1, rows) and ``down`` (rows - 1, columns): costs of edges. ``turn`` (rows, columns).
+    ``right`` (columns - 1, rows) and ``down`` (rows - 1, columns): costs of edges.
+    ``may_bend`` (rows, columns).
     """
 
     xs: Floats
     ys: Floats
     right: Floats
     down: Floats
-    turn: Truths
+    may_bend: Booleans
 
     def node(self, point: Point) -> Node:
         """Row and column of a point at the intersection of two grid lines."""
         return int(np.searchsorted(self.ys, point[1])), int(np.searchsorted(self.xs, point[0]))
 
     def cheapest(
-        self, rightwards: Floats, downwards: Floats, goal: Node, most: float, *, flat: bool
+        self, rightwards: Floats, downwards: Floats, goal: Node, max_cost: float, *, flat: bool
     ) -> list[Point]:
-        """The corners of the cheapest route to a goal; empty if there is none at a cost below ``most``.
+        """The corners of the cheapest route to a goal; empty if there is none at a cost below ``max_cost``.
 
         ``rightwards`` and ``downwards`` (rows, columns): the cost of a start at a node along its row or along
         its column, infinite elsewhere. ``flat``: the route arrives along the row of the goal.
         """
-        left = np.abs(self.ys - self.ys[goal[0]])[:, None] + np.abs(self.xs - self.xs[goal[1]])
-        rows, columns = _Sweeps(self.right, self.turn.T, left.T), _Sweeps(self.down, self.turn, left)
+        remaining = np.abs(self.ys - self.ys[goal[0]])[:, None] + np.abs(self.xs - self.xs[goal[1]])
+        rows, columns = (
+            _Sweeps(self.right, self.may_bend.T, remaining.T),
+            _Sweeps(self.down, self.may_bend, remaining),
+        )
         arriving, index = (rows, goal[::-1]) if flat else (columns, goal)
         improved = rows.sweep(rightwards.T), columns.sweep(downwards)
-        best, bends = min(most, BLOCKED / 2), -1
+        best, bends = min(max_cost, BLOCKED / 2), -1
         for k in range(_MAX_BENDS):
             if (cost := float(arriving.costs[k][index])) < best:
                 best, bends = cost, k
@@ -121,37 +127,37 @@ class Grid:
 class _Sweeps:
     """The sweeps along the rows of a grid, or along its columns. Arrays are (nodes along, lines)."""
 
-    def __init__(self, edges: Floats, turn: Truths, left: Floats) -> None:
+    def __init__(self, edges: Floats, may_bend: Booleans, remaining: Floats) -> None:
         self._along = np.zeros((edges.shape[0] + 1, edges.shape[1]))
         np.cumsum(edges, axis=0, out=self._along[1:])
-        self._turning = np.where(turn, BEND, np.inf)
-        self._left = left
+        self._bend_costs = np.where(may_bend, BEND, np.inf)
+        self._remaining = remaining
         self._best = np.full(self._along.shape, BLOCKED / 2)
-        self._begins: list[Floats] = []
+        self._start_costs: list[Floats] = []
         self.costs: list[Floats] = []
         """Cost of arriving at each node with each number of bends."""
         self.bound = np.inf
         """Lower bound of the cost of routes that continue from the latest sweep, without further bends."""
 
-    def sweep(self, begins: Floats) -> Floats:
+    def sweep(self, start_costs: Floats) -> Floats:
         """Sweep from these start costs; returns the costs that are new minima, infinity at all other
         nodes."""
-        forwards = np.minimum.accumulate(begins - self._along, axis=0)
+        forwards = np.minimum.accumulate(start_costs - self._along, axis=0)
         forwards += self._along
-        costs = np.minimum.accumulate((begins + self._along)[::-1], axis=0)[::-1] - self._along
+        costs = np.minimum.accumulate((start_costs + self._along)[::-1], axis=0)[::-1] - self._along
         np.minimum(costs, forwards, out=costs)
-        self._begins.append(begins)
+        self._start_costs.append(start_costs)
         self.costs.append(costs)
         improved = np.where(costs < self._best, costs, np.inf)
         np.minimum(self._best, costs, out=self._best)
-        self.bound = float(np.min(improved + self._left))
+        self.bound = float(np.min(improved + self._remaining))
         return improved
 
     def bend(self, across: Floats) -> Floats:
         """Sweep after a bend from nodes with these costs in the other direction."""
-        return self.sweep(across.T + self._turning)
+        return self.sweep(across.T + self._bend_costs)
 
     def origin(self, k: int, line: int, node: int) -> int:
         """The node of a line at which the route with ``k`` bends to ``node`` has entered this line."""
         along = self._along[:, line]
-        return int(np.argmin(self._begins[k][:, line] + np.abs(along - along[node])))
+        return int(np.argmin(self._start_costs[k][:, line] + np.abs(along - along[node])))

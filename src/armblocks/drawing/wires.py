@@ -48,7 +48,7 @@ class Net:
     source: WireEnd
     targets: tuple[WireEnd, ...]
     bends: tuple[tuple[float, ...], ...] = ()
-    """The user-drawn route for each target, see :func:`bent`; empty for automatic routing."""
+    """The user-drawn route for each target, see :func:`drawn_path`; empty for automatic routing."""
 
 
 def moved_bends(bends: Sequence[float], flat: bool, shift: tuple[float, float]) -> tuple[float, ...]:
@@ -69,7 +69,7 @@ class RoutedNet:
     dots: tuple[Point, ...]
 
 
-def bent(source: WireEnd, bends: Sequence[float], target: WireEnd) -> tuple[Point, ...] | None:
+def drawn_path(source: WireEnd, bends: Sequence[float], target: WireEnd) -> tuple[Point, ...] | None:
     """The corner points of the user-drawn route with these ``bends``; ``None`` if there is no such route.
 
     ``bends`` has the coordinate (px) of each inner segment: x, y, x … for a wire that leaves its source

@@ -24,9 +24,9 @@ def aba(
     """Joint accelerations from the joint torques minus friction, in the order of q.
 
     ``on_bodies``: wrenches that bodies exert on the surroundings, each in its body's frame. Spatial vectors
-    have the angular part first. The cost is proportional to n instead of n^3, which is an advantage for long
-    chains. Source: Featherstone, *Rigid Body Dynamics Algorithms*, table 7.1 (with its numbers of the
-    passes); rotor inertia is added to the inertia of each joint.
+    have the angular part first. The cost is proportional to n instead of n^3, an advantage for long chains.
+    Source: Featherstone, *Rigid Body Dynamics Algorithms*, table 7.1 (with its numbers of the passes); rotor
+    inertia is added to the inertia of each joint.
     """
     bodies = tree.bodies
     X = [_motion_transform(joint) for joint in joints]
@@ -53,7 +53,7 @@ def aba(
         body = bodies[i]
         U[i] = mtimes(IA[i], S[i])
         pivot = mtimes(S[i].T, U[i]) + body.reflected_inertia
-        # Not 1 / pivot: CasADi would replace every later product with it by a separate division.
+        # This is 1 / pivot. With that expression CasADi would replace every product with d by a division.
         d[i] = 2.0 / (pivot + pivot)
         u[i] = tau[body.joint] - mtimes(S[i].T, pA[i])
         if body.parent != BASE:
@@ -73,7 +73,7 @@ def aba(
 
 
 def _motion_transform(joint: JointMotion) -> SX:
-    """Motion vectors of the parent body in the body: ``[E 0; -E [p]x E]``."""
+    """The transform of motion vectors from the parent body to the body: ``[E 0; -E [p]x E]``."""
     c, s = joint.rotation
     R = multiply(joint.body.placement.rotation, ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
     E = _sx(R).T
@@ -82,7 +82,7 @@ def _motion_transform(joint: JointMotion) -> SX:
 
 
 def _matrix_of(inertia: RigidInertia) -> SX:
-    """``[I, [h]x; [h]x', m 1]``."""
+    """The spatial inertia ``[I, [h]x; [h]x', m 1]``."""
     S = inertia.second
     second: Matrix = ((S.xx, S.xy, S.xz), (S.xy, S.yy, S.yz), (S.xz, S.yz, S.zz))
     m = inertia.mass
@@ -91,7 +91,7 @@ def _matrix_of(inertia: RigidInertia) -> SX:
 
 
 def _cross_matrix(v: SX) -> SX:
-    """``v x`` on motion vectors; minus its transpose is ``v x*`` on forces."""
+    """The matrix ``v x`` for motion vectors; minus its transpose is ``v x*`` for forces."""
     w = _skew((v[0], v[1], v[2]))
     return _stack(w, SX(3, 3), _skew((v[3], v[4], v[5])), w)
 

@@ -11,13 +11,13 @@ from armblocks.spatial.vectors import ZERO, Symmetric
 
 
 def regrouped(tree: KinematicTree) -> KinematicTree:
-    """The same equations of motion with the fewest inertial parameters.
+    """A tree with the same equations of motion and the minimum number of inertial parameters.
 
     Some parameters of a body have the same effect as parameters of its parent and are added to these. For a
     revolute joint they are the mass, the first moment along the axis, and an inertia that is equal about all
     directions normal to the axis; for a prismatic joint the whole inertia matrix. Before that, each body's
-    origin is shifted along its joint axis to the foot of the common normal with the next axis, which saves
-    the products with that distance.
+    origin is shifted along its joint axis to the foot of the common normal with the next axis. This removes
+    products with the distance between them.
 
     Joint torques, mass matrix and kinetic energy are those of the robot; the inertia of a single body is not.
     Source: Khalil, Dombre, *Modeling, Identification and Control of Robots*, 9.4 (base inertial parameters).
@@ -48,7 +48,7 @@ def _shared_with_parent(inertia: RigidInertia, *, angular: float, linear: float)
 
 
 def _without(inertia: RigidInertia, part: RigidInertia) -> RigidInertia:
-    """``inertia`` minus ``part``, exactly zero where an entry is moved completely."""
+    """``inertia`` minus ``part``, exactly zero in the entries that are equal."""
     mass, first, second = inertia
     return RigidInertia(
         mass - part.mass,
@@ -66,19 +66,23 @@ def _origins_on_common_normals(tree: KinematicTree) -> KinematicTree:
         if not children:
             continue
         shift = bodies[children[0]].placement.translation[2]
-        forth, back = transl(0.0, 0.0, shift), transl(0.0, 0.0, -shift)
+        to_new_origin, to_old_origin = transl(0.0, 0.0, shift), transl(0.0, 0.0, -shift)
         bodies[i] = replace(
             bodies[i],
-            placement=bodies[i].placement @ forth,
-            inertia=bodies[i].inertia.moved(back),
+            placement=bodies[i].placement @ to_new_origin,
+            inertia=bodies[i].inertia.moved(to_old_origin),
         )
         for k in children:
-            bodies[k] = replace(bodies[k], placement=_level(back @ bodies[k].placement, k == children[0]))
-        links = [replace(frame, pose=back @ frame.pose) if frame.body == i else frame for frame in links]
+            bodies[k] = replace(
+                bodies[k], placement=_shifted_placement(to_old_origin @ bodies[k].placement, k == children[0])
+            )
+        links = [
+            replace(frame, pose=to_old_origin @ frame.pose) if frame.body == i else frame for frame in links
+        ]
     return replace(tree, bodies=tuple(bodies), links=tuple(links))
 
 
-def _level(placement: Transform, exact: bool) -> Transform:
-    """The placement with z exactly zero if the shift removes it."""
+def _shifted_placement(placement: Transform, z_is_zero: bool) -> Transform:
+    """The placement, with z exactly zero if ``z_is_zero``."""
     x, y, z = placement.translation
-    return Transform(rotation=placement.rotation, translation=(x, y, 0.0 if exact else z))
+    return Transform(rotation=placement.rotation, translation=(x, y, 0.0 if z_is_zero else z))

@@ -16,7 +16,7 @@ SquareMatrix = list[list[Scalar]]
 
 
 def crba(tree: KinematicTree, joints: Sequence[JointMotion]) -> SquareMatrix:
-    """Inertia matrix of the rigid bodies and rotors in the order of the *bodies*.
+    """The inertia matrix of the rigid bodies and rotors, in the order of the *bodies*.
 
     ``tree`` may have regrouped parameters. Source: Featherstone, *Rigid Body Dynamics Algorithms*, table 6.2,
     with three-vectors in body frames.
@@ -68,7 +68,7 @@ def solve_factored(tree: KinematicTree, M: SquareMatrix, right: Sequence[Scalar]
     x = [SX(entry) for entry in right]
     for k in reversed(range(n)):
         ancestors = tree.ancestors(k)
-        # Not 1 / d: CasADi would replace every later product with it by a separate division.
+        # This is 1 / H[k][k]. With that expression CasADi would replace every product with it by a division.
         inverse_pivots[k] = 2.0 / (SX(H[k][k]) + H[k][k])
         factors = {i: H[k][i] * inverse_pivots[k] for i in ancestors}
         for i in ancestors:

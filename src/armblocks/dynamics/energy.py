@@ -20,8 +20,10 @@ from armblocks.spatial.vectors import (
 
 
 def kinetic_energy(tree: KinematicTree, joints: Sequence[JointMotion], qd: Sequence[Scalar]) -> Scalar:
-    """Kinetic energy of all bodies and rotors, J: ``sum (m v.v + 2 v.(w x h) + w.I w) / 2 + G^2 Jm qd^2 /
-    2``."""
+    """Kinetic energy of all bodies and rotors, J.
+
+    It is the sum of ``(m v.v + 2 v.(w x h) + w.I w) / 2`` and ``G^2 Jm qd^2 / 2``.
+    """
     omegas: list[Vector] = []
     velocities: list[Vector] = []
     doubled_energy: Scalar = 0.0
@@ -60,8 +62,7 @@ def first_moment(tree: KinematicTree, joints: Sequence[JointMotion]) -> tuple[fl
 
 
 def potential_energy(tree: KinematicTree, joints: Sequence[JointMotion]) -> Scalar:
-    """Potential energy in gravity, J, ``-g . sum m c``: zero if the centre of mass is at the world's
-    origin."""
+    """Potential energy in gravity, J: ``-g . sum m c``, zero with the centre of mass at the world origin."""
     mass, moment = first_moment(tree, joints)
     in_base = dot(tree.gravity, moment)
     to_base = tree.base.translation

@@ -17,12 +17,15 @@ from armblocks.robot.tree import KinematicTree
 from armblocks.spatial.vectors import Scalar
 
 MAX_JOINTS_BY_MATRIX = 18
-"""Up to this number of joints the factored inertia matrix takes fewer operations than the articulated-body
-algorithm, for chains of revolute joints with general axes (6 joints: 2,200 against 4,345; 16 joints: 12,165
-against 14,555)."""
+"""Maximum number of joints for which the factored inertia matrix is used.
 
-SAMPLES = 3
-NO_INERTIA = 1e-12
+Up to this number it takes fewer operations than the articulated-body algorithm, for chains of revolute joints
+with general axes (6 joints: 2,200 against 4,345; 16 joints: 12,165 against 14,555).
+"""
+
+RANDOM_POSITIONS = 3
+"""Number of positions at which the inertia matrix is checked."""
+PIVOT_TOLERANCE = 1e-12
 """A pivot below this fraction of its diagonal entry counts as zero."""
 
 
@@ -60,13 +63,13 @@ def check_accelerations_exist(tree: KinematicTree) -> None:
     M = crba(tree, joint_motions(tree, q))
     evaluate = Function("M", [q], [horzcat(*(vertcat(*(SX(entry) for entry in row)) for row in M))])
     random = np.random.default_rng(0)
-    sound = np.zeros(tree.n, dtype=bool)
-    for _ in range(SAMPLES):
+    has_inertia = np.zeros(tree.n, dtype=bool)
+    for _ in range(RANDOM_POSITIONS):
         numbers = np.asarray(evaluate(random.uniform(-np.pi, np.pi, tree.n)).full())
-        sound |= _pivots(numbers) > NO_INERTIA * np.abs(np.diag(numbers))
-    if sound.all():
+        has_inertia |= _pivots(numbers) > PIVOT_TOLERANCE * np.abs(np.diag(numbers))
+    if has_inertia.all():
         return
-    joint = tree.bodies[int(np.argmin(sound))].link
+    joint = tree.bodies[int(np.argmin(has_inertia))].link
     raise RobotError(
         f"joint '{joint}' has no inertia to accelerate: the inertia matrix is singular at every position",
         where=f"robot '{tree.robot.name}', link '{joint}'",
@@ -76,11 +79,13 @@ def check_accelerations_exist(tree: KinematicTree) -> None:
 
 
 def _pivots(M: NDArray[np.float64]) -> NDArray[np.float64]:
-    """D of ``M = L' D L``, eliminated from the last row upwards; 0 for entries undefined after a zero
-    pivot."""
+    """D of ``M = L' D L``, by elimination from the last row upwards.
+
+    Entries that are undefined after a zero pivot are 0.
+    """
     H = M.copy()
     n = len(H)
     for k in reversed(range(n)):
-        if H[k, k] > NO_INERTIA * abs(M[k, k]):
+        if H[k, k] > PIVOT_TOLERANCE * abs(M[k, k]):
             H[:k, :k] -= np.outer(H[:k, k], H[k, :k]) / H[k, k]
     return np.diag(H)

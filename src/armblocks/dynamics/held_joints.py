@@ -1,4 +1,4 @@
-"""Equations of motion of an arm with locked joints: by sticking friction or by a stop.
+"""Equations of motion of an arm whose joints may be locked by sticking friction or by a stop.
 
 :func:`locked_joints` finds the locked joints at one time. The set is constant between events, so that the
 equations are smooth. Sources: Siciliano et al., *Robotics*, 2009, 7.3 (equations of motion); Pfeiffer,
@@ -17,22 +17,21 @@ from armblocks.dynamics.base_parameters import regrouped
 from armblocks.dynamics.crba import SquareMatrix, crba, solve_factored
 from armblocks.dynamics.forward import check_accelerations_exist
 from armblocks.dynamics.joint_motion import entries, joint_motions
-from armblocks.dynamics.loads import at_tip, carrying
+from armblocks.dynamics.loads import tip_wrench, with_payload
 from armblocks.dynamics.rnea import rnea
 from armblocks.robot.robot import Robot
 from armblocks.robot.tree import KinematicTree
 
-ROUNDING = 1e-9
-"""Relative margin of torques: a torque against the sliding direction counts only if it exceeds this fraction
-of the friction."""
-_SOME_PAYLOAD = SX([1.0, 0.1, 0.2, 0.3, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+TORQUE_TOLERANCE = 1e-9
+"""A torque against the sliding direction is significant if it exceeds this fraction of the friction."""
+_GENERIC_PAYLOAD = SX([1.0, 0.1, 0.2, 0.3, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 
 
 @dataclass(frozen=True, eq=False)
 class DryFriction:
     """Coulomb friction of the joints, N m or N: ``forward`` >= 0 and ``backward`` <= 0, each (n,).
 
-    A joint sticks while the torque on it is within ``breakaway`` times these limits.
+    A joint sticks while the torque that holds it is within ``breakaway`` times these limits.
     """
 
     forward: NDArray[np.float64]
@@ -40,7 +39,7 @@ class DryFriction:
 
     @classmethod
     def of(cls, robot: Robot) -> DryFriction:
-        """The joint's share of the motors' Coulomb friction, by the robot's friction model."""
+        """The Coulomb friction of the motors, referred to the joints by the robot's friction model."""
         limits = np.zeros((robot.n, 2))
         for k, motor in enumerate(robot.motors):
             if motor is not None:
@@ -55,7 +54,7 @@ class DryFriction:
         return tuple(int(k) for k in np.flatnonzero((self.forward != 0.0) | (self.backward != 0.0)))
 
     def sliding(self, mode: SX) -> SX:
-        """The torque against the motion of joints that slide forwards (1) or backwards (-1); 0 of others."""
+        """The friction torque of joints that slide forwards (1) or backwards (-1); 0 for other joints."""
         return if_else(mode > 0.0, SX(self.forward), if_else(mode < 0.0, SX(self.backward), 0.0))
 
 
@@ -81,10 +80,10 @@ class JointEquations:
         self, robot: Robot, q: SX, qd: SX, wrench: SX | None = None, payload: SX | None = None
     ) -> None:
         tree = regrouped(KinematicTree.of(robot))
-        check_accelerations_exist(tree if payload is None else carrying(tree, _SOME_PAYLOAD))
-        on_bodies = None if wrench is None else at_tip(tree, wrench)
+        check_accelerations_exist(tree if payload is None else with_payload(tree, _GENERIC_PAYLOAD))
+        on_bodies = None if wrench is None else tip_wrench(tree, wrench)
         if payload is not None:
-            tree = carrying(tree, payload)
+            tree = with_payload(tree, payload)
         self._tree = tree
         joints = joint_motions(tree, q)
         no_acceleration = [0.0] * tree.n
@@ -96,12 +95,13 @@ class JointEquations:
     def solve(self, right: SX, free: SX) -> SX:
         """``x`` with ``M x = right`` in the rows of the free joints (1), and exactly 0 for the others (0)."""
         n, bodies = self._tree.n, self._tree.bodies
-        on = [free[body.joint] for body in bodies]
+        is_free = [free[body.joint] for body in bodies]
         masked: SquareMatrix = [
-            [self._M[i][j] if i == j else self._M[i][j] * on[i] * on[j] for j in range(n)] for i in range(n)
+            [self._M[i][j] if i == j else self._M[i][j] * is_free[i] * is_free[j] for j in range(n)]
+            for i in range(n)
         ]
         solution = solve_factored(
-            self._tree, masked, [right[body.joint] * on[i] for i, body in enumerate(bodies)]
+            self._tree, masked, [right[body.joint] * is_free[i] for i, body in enumerate(bodies)]
         )
         result = SX(n, 1)
         for body, value in zip(bodies, solution):
@@ -112,65 +112,68 @@ class JointEquations:
         """``qdd`` (n,), exactly 0 for locked joints."""
         return self.solve(torque - self.bias, free)
 
-    def unbalanced(self, torque: SX, qdd: SX) -> SX:
-        """The remaining torque at each joint (n,); for a locked joint, its holding torque."""
+    def holding_torque(self, torque: SX, qdd: SX) -> SX:
+        """The torque that holds each locked joint (n,); 0 up to rounding for free joints."""
         return torque - self.bias - mtimes(self.M, qdd)
 
-    def stopped(self, qd: SX, stopping: SX) -> SX:
+    def speeds_after_impact(self, qd: SX, stopping: SX) -> SX:
         """Speeds after an impact that stops some joints (1) and leaves the others free (0).
 
-        The impulse acts at the joints that stop and at no other: ``M (qd+ - qd)`` is 0 elsewhere.
+        The impulse acts only at the joints that stop: ``M (qd+ - qd)`` is 0 for the others.
         """
-        halt = -stopping * qd
-        change = self.solve(-mtimes(self.M, halt), 1.0 - stopping)
+        speed_change_of_stopping = -stopping * qd
+        change = self.solve(-mtimes(self.M, speed_change_of_stopping), 1.0 - stopping)
         return if_else(stopping, 0.0, qd + change)
 
 
 @dataclass(frozen=True, eq=False)
-class Rest:
-    """The modes of the joints: ``mode`` 1 slides forwards (or is free), -1 backwards, 0 is locked;
-    ``contact`` 1 at the upper stop, -1 at the lower one, 0 at none. Each (n,)."""
+class JointModes:
+    """The modes of the joints, each (n,).
+
+    ``mode``: 1 for a joint that slides forwards or is free, -1 for one that slides backwards, 0 for a locked
+    joint. ``contact``: 1 at the upper stop, -1 at the lower stop, else 0.
+    """
 
     mode: SX
     contact: SX
 
 
-def from_rest(held_torque: SX, contact: SX, forward: SX, backward: SX) -> SX:
-    """Direction in which a locked joint starts to move: 1 forwards, -1 backwards, 0 stays locked."""
+def breakaway_direction(held_torque: SX, contact: SX, forward: SX, backward: SX) -> SX:
+    """Direction in which a locked joint starts to move: 1 forwards, -1 backwards, 0 if it remains locked."""
     forwards = logic_and(held_torque > forward, contact <= 0.0)
     backwards = logic_and(held_torque < backward, contact >= 0.0)
     return forwards - backwards
 
 
 def locked_joints(
-    equations: JointEquations, qd: SX, driving: SX, start: Rest, friction: DryFriction, breakaway: SX
-) -> Rest:
+    equations: JointEquations, qd: SX, driving: SX, start: JointModes, friction: DryFriction, breakaway: SX
+) -> JointModes:
     """The locked joints, and the sliding directions of the others.
 
-    ``driving`` is the torque (n,) at the joints without dry friction and rigid stops; ``start`` a first
-    guess. A moving joint slides. Of the joints at rest, those beyond their friction limit are released, and
-    those that would slide against their direction are locked; this is repeated as many times as there are
-    joints. (The accelerations minimise 1/2 qdd' M qdd - qdd' (torque - bias) + sum of friction |qdd|, the
-    principle of least constraint. This function is convex and has a unique minimum.) Guards detect remaining
-    inconsistencies.
+    ``driving`` is the torque (n,) at the joints without dry friction and rigid stops; ``start`` is the
+    initial guess. A moving joint slides. Of the joints at rest, those beyond their friction limit are
+    released, and those that would slide against their direction are locked; this is repeated as many times as
+    there are joints. (The accelerations minimise 1/2 qdd' M qdd - qdd' (torque - bias) + sum of friction
+    |qdd|, the principle of least constraint. This function is convex and has a unique minimum.) Guards detect
+    remaining inconsistencies.
     """
     n = qd.numel()
     dry = np.zeros(n)
     dry[list(friction.joints)] = 1.0
     has_friction = SX(dry)
     forward, backward = breakaway * SX(friction.forward), breakaway * SX(friction.backward)
-    slack = ROUNDING * SX(friction.forward - friction.backward)
+    tolerance = TORQUE_TOLERANCE * SX(friction.forward - friction.backward)
     mode, contact = start.mode, start.contact
-    for round_ in range(n + 1):
+    for iteration in range(n + 1):
         torque = driving - friction.sliding(mode)
         qdd = equations.accelerations(torque, mode != 0.0)
-        released = from_rest(equations.unbalanced(torque, qdd), contact, forward, backward)
+        released = breakaway_direction(equations.holding_torque(torque, qdd), contact, forward, backward)
         slides = mode
-        if round_ < n:
+        if iteration < n:
             inertia = SX(vertcat(*(equations.M[i, i] for i in range(n))))
-            slides = if_else(mode * qdd * inertia < -slack, 0.0, mode)
+            slides = if_else(mode * qdd * inertia < -tolerance, 0.0, mode)
         dry_mode = if_else(qd != 0.0, sign(qd), if_else(mode == 0.0, released, slides))
         held = logic_and(logic_and(contact != 0.0, mode == 0.0), released == 0.0)
         mode = if_else(has_friction, dry_mode, if_else(held, 0.0, 1.0))
         contact = if_else(logic_or(mode != 0.0, qd != 0.0), 0.0, contact)
-    return Rest(mode, contact)
+    return JointModes(mode, contact)

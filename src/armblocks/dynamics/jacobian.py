@@ -18,7 +18,7 @@ Column = tuple[Vector, Vector]
 """Linear and angular velocity of the tool per unit speed of one joint."""
 
 MAX_COLUMNS_BY_MINORS = 8
-"""Up to this number of joints all 6x6 minors are computed; for more joints the Gram matrix is cheaper."""
+"""Maximum number of joints for which all 6x6 minors are computed; for more, the Gram matrix is cheaper."""
 
 
 def world_columns(tree: KinematicTree, q: Sequence[Scalar]) -> list[Column]:
@@ -46,17 +46,17 @@ def tool_columns(tree: KinematicTree, q: SX) -> list[Column]:
         columns[body.joint] = (v, w)
         x = subtract(scale(c, pose.x), scale(s, pose.y))
         y = add(scale(s, pose.x), scale(c, pose.y))
-        unturned = Pose(x, y, pose.z, pose.p)
-        parent = unturned.after(Transform(rotation=body.placement.inverse().rotation))
+        before_rotation = Pose(x, y, pose.z, pose.p)
+        parent = before_rotation.after(Transform(rotation=body.placement.inverse().rotation))
         pose = parent._replace(p=subtract(pose.p, parent.rotate(joints[i].p)))
     return columns
 
 
 def _columns(tree: KinematicTree, bodies: Sequence[Pose], tip: Vector) -> list[Column]:
-    """``v = angular z x (tip - p) + linear z``, ``w = angular z`` for the joints between base and tool, else
-    zero.
+    """The columns of the joints between base and tool; the columns of other joints are zero.
 
-    Source: Siciliano, Sciavicco, Villani, Oriolo, *Robotics*, 3.1.3.
+    ``v = angular z x (tip - p) + linear z`` and ``w = angular z``. Source: Siciliano, Sciavicco, Villani,
+    Oriolo, *Robotics*, 3.1.3.
     """
     columns: list[Column] = [(ZERO, ZERO)] * tree.n
     carrier = tree.tool.body
@@ -69,7 +69,7 @@ def _columns(tree: KinematicTree, bodies: Sequence[Pose], tip: Vector) -> list[C
 
 
 def jacobian_matrix(columns: Sequence[Column]) -> SX:
-    """(6, n): rows linear, then angular."""
+    """The Jacobian (6, n): three linear rows, then three angular rows."""
     return SX(horzcat(*(vertcat(*v, *w) for v, w in columns)))
 
 
@@ -88,28 +88,28 @@ def yoshikawa(columns: Sequence[Column]) -> SX:
         rows = list(zip(*entries))
         gram = [[_dot(a, b) for b in rows] for a in rows]
         return SX(sqrt(fmax(_minors(gram)[0], 0.0)))
-    short = entries if n <= 6 else [list(row) for row in zip(*entries)]
-    minors = _minors(short)
+    wide = entries if n <= 6 else [list(row) for row in zip(*entries)]
+    minors = _minors(wide)
     if len(minors) == 1:
         return SX(fabs(minors[0]))
     return SX(sqrt(_dot(minors, minors)))
 
 
 def _minors(rows: Sequence[Sequence[Scalar]]) -> list[SX]:
-    """All minors of full height, by Laplace expansion row by row, with every smaller minor computed once."""
+    """All minors of full height, by Laplace expansion row by row; every smaller minor is computed once."""
     width = len(rows[0])
-    known: dict[tuple[int, ...], Scalar] = {(): 1.0}
+    minors: dict[tuple[int, ...], Scalar] = {(): 1.0}
     for height, row in enumerate(rows, start=1):
-        grown: dict[tuple[int, ...], Scalar] = {}
+        larger_minors: dict[tuple[int, ...], Scalar] = {}
         for chosen in combinations(range(width), height):
             total: Scalar = 0.0
             for index, column in enumerate(chosen):
-                term = row[column] * known[chosen[:index] + chosen[index + 1 :]]
+                term = row[column] * minors[chosen[:index] + chosen[index + 1 :]]
                 total = total + term if (height - 1 - index) % 2 == 0 else total - term
-            grown[chosen] = total
-        known = grown
-    assert len(known) == math.comb(width, len(rows))
-    return [SX(minor) for minor in known.values()]
+            larger_minors[chosen] = total
+        minors = larger_minors
+    assert len(minors) == math.comb(width, len(rows))
+    return [SX(minor) for minor in minors.values()]
 
 
 def _dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> SX:

@@ -14,7 +14,7 @@ from armblocks.spatial.vectors import RotationZ, Scalar, Vector, add, rotate
 
 @dataclass(frozen=True, eq=False)
 class JointMotion:
-    """The motion of a body's joint at one q: the ``rotation`` about z, and ``p``.
+    """The motion of a body's joint at one q: ``rotation`` about z, and ``p``.
 
     ``p`` is the position of the body's origin in the parent body's frame, m.
     """
@@ -24,16 +24,16 @@ class JointMotion:
     p: Vector
 
     def to_body(self, a: Vector) -> Vector:
-        """A vector of the parent body's axes in the body's axes."""
+        """A vector, transformed from the axes of the parent body to those of the body."""
         return self.rotation.rotate_back(self.to_joint(a))
 
     def to_joint(self, a: Vector) -> Vector:
-        """A vector of the parent body's axes in the axes of the joint before its rotation."""
+        """A vector, transformed from the axes of the parent body to those of the unrotated joint."""
         R = self.body.placement.rotation
         return rotate((_column(R, 0), _column(R, 1), _column(R, 2)), a)
 
     def to_parent(self, a: Vector) -> Vector:
-        """A vector of the body's axes in the parent body's axes."""
+        """A vector, transformed from the axes of the body to those of the parent body."""
         return rotate(self.body.placement.rotation, self.rotation.rotate(a))
 
 

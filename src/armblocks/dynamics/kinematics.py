@@ -22,15 +22,15 @@ class Pose(NamedTuple):
     p: Vector
 
     def rotate(self, a: Vector) -> Vector:
-        """R a."""
+        """The rotated vector ``R a``."""
         return add(add(scale(a[0], self.x), scale(a[1], self.y)), scale(a[2], self.z))
 
     def point(self, a: Vector) -> Vector:
-        """T a."""
+        """The transformed point ``T a``."""
         return add(self.p, self.rotate(a))
 
     def after(self, T: Transform) -> Pose:
-        """This pose, then the constant transform ``T``."""
+        """The product of this pose and the constant transform ``T``."""
         R = T.rotation
         x, y, z = (self.rotate((R[0][j], R[1][j], R[2][j])) for j in range(3))
         return Pose(x, y, z, self.point(T.translation))
@@ -41,9 +41,10 @@ class Pose(NamedTuple):
         return SX(horzcat(*columns, vertcat(*self.p, 1.0)))
 
 
-class _TurnedPose(NamedTuple):
-    """A pose in the form ``start Rz(variable + constant)``. Joints with parallel axes then add their angles
-    instead of multiplying their matrices.
+class _RotatedPose(NamedTuple):
+    """A pose in the form ``start Rz(variable + constant)``.
+
+    For joints with parallel axes, angles are then added instead of multiplying matrices.
     """
 
     start: Pose
@@ -62,16 +63,16 @@ def constant_pose(T: Transform) -> Pose:
 
 def body_poses(tree: KinematicTree, q: Sequence[Scalar], ground: Pose) -> list[Pose]:
     """Poses of all bodies with the base at ``ground``; q in the robot's order, rad or m."""
-    base = _TurnedPose(ground, 0.0, 0.0, RotationZ(1.0, 0.0), ground)
-    turned: list[_TurnedPose] = []
+    base = _RotatedPose(ground, 0.0, 0.0, RotationZ(1.0, 0.0), ground)
+    rotated: list[_RotatedPose] = []
     for body in tree.bodies:
-        parent = base if body.parent == BASE else turned[body.parent]
-        turned.append(_body_pose(parent, body, q[body.joint]))
-    return [entry.pose for entry in turned]
+        parent = base if body.parent == BASE else rotated[body.parent]
+        rotated.append(_body_pose(parent, body, q[body.joint]))
+    return [entry.pose for entry in rotated]
 
 
-def _body_pose(parent: _TurnedPose, body: Body, q: Scalar) -> _TurnedPose:
-    """The pose of a body from its parent's."""
+def _body_pose(parent: _RotatedPose, body: Body, q: Scalar) -> _RotatedPose:
+    """The pose of a body, from that of its parent."""
     p = parent.start.rotate(parent.rotation.rotate(body.placement.translation))
     p = add(parent.pose.p, p)
     if body.placement.rotation == IDENTITY3:
@@ -88,7 +89,7 @@ def _body_pose(parent: _TurnedPose, body: Body, q: Scalar) -> _TurnedPose:
     x = add(scale(rotation.c, start.x), scale(rotation.s, start.y))
     y = add(scale(rotation.c, start.y), scale(-rotation.s, start.x))
     start = Pose(start.x, start.y, start.z, ZERO)
-    return _TurnedPose(start, variable, constant, rotation, Pose(x, y, start.z, p))
+    return _RotatedPose(start, variable, constant, rotation, Pose(x, y, start.z, p))
 
 
 def frame_pose(frame: Frame, bodies: Sequence[Pose], ground: Pose) -> Pose:

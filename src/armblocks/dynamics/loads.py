@@ -19,8 +19,8 @@ PAYLOAD_SLOT = Slot("payload", (10,), "kg, m, kg m2")
 """Mass, centre x y z, inertia xx yy zz xy yz xz about that centre, all in the tool frame."""
 
 
-def carrying(tree: KinematicTree, payload: SX) -> KinematicTree:
-    """The tree with a payload on its tool (none where the tool is fixed to the base)."""
+def with_payload(tree: KinematicTree, payload: SX) -> KinematicTree:
+    """The tree with a payload on its tool; unchanged if the tool is fixed to the base."""
     tool = tree.tool
     if tool.body == BASE:
         return tree
@@ -32,8 +32,8 @@ def carrying(tree: KinematicTree, payload: SX) -> KinematicTree:
     return replace(tree, bodies=tuple(bodies))
 
 
-def at_tip(tree: KinematicTree, wrench: SX) -> dict[int, Wrench]:
-    """The wrench at the last link's frame, in the frame of the body that carries this link."""
+def tip_wrench(tree: KinematicTree, wrench: SX) -> dict[int, Wrench]:
+    """A wrench at the frame of the last link, by the index and in the frame of the body of this link."""
     tip = tree.tip
     if tip.body == BASE:
         return {}

@@ -22,8 +22,10 @@ NO_WRENCH = Wrench(ZERO, ZERO)
 
 
 class BodyMotion(NamedTuple):
-    """The motion of one body in its own axes: angular velocity and acceleration, acceleration of the origin
-    (rad/s, rad/s2, m/s2). ``U = [omega_dot]x + [omega]x [omega]x`` maps a point to its acceleration relative
+    """The motion of one body, in the axes of the body.
+
+    ``omega`` is the angular velocity (rad/s), ``alpha`` the angular acceleration (rad/s2), ``acceleration``
+    that of the origin (m/s2). ``U = [alpha]x + [omega]x [omega]x`` maps a point to its acceleration relative
     to the origin.
     """
 
@@ -74,22 +76,22 @@ def rnea(
 def _body_motion(
     parent: BodyMotion, joint: JointMotion, qd: Sequence[Scalar], qdd: Sequence[Scalar]
 ) -> BodyMotion:
-    """The motion of a body, from that of its parent."""
+    """The motion of a body, from the motion of its parent."""
     body = joint.body
     j = body.joint
     w = joint.to_body(parent.omega)
     alpha = joint.to_body(parent.alpha)
     acceleration = joint.to_body(add(parent.acceleration, rotate(parent.U, joint.p)))
-    spin, spin_rate = body.angular * qd[j], body.angular * qdd[j]
+    spin, spin_acceleration = body.angular * qd[j], body.angular * qdd[j]
     if body.linear:
-        slip, slip_rate = body.linear * qd[j], body.linear * qdd[j]
-        # 2 w x (slip z) + slip_rate z; w without the joint's rotation, which is along z
+        slide_speed, slide_acceleration = body.linear * qd[j], body.linear * qdd[j]
+        # 2 w x (slide_speed z) + slide_acceleration z; w without the joint's rotation, which is along z
         acceleration = (
-            acceleration[0] + 2.0 * slip * w[1],
-            acceleration[1] - 2.0 * slip * w[0],
-            acceleration[2] + slip_rate,
+            acceleration[0] + 2.0 * slide_speed * w[1],
+            acceleration[1] - 2.0 * slide_speed * w[0],
+            acceleration[2] + slide_acceleration,
         )
-    alpha = (alpha[0] + w[1] * spin, alpha[1] - w[0] * spin, alpha[2] + spin_rate)
+    alpha = (alpha[0] + w[1] * spin, alpha[1] - w[0] * spin, alpha[2] + spin_acceleration)
     w = (w[0], w[1], w[2] + spin)
     return BodyMotion(w, alpha, acceleration, _rotation_accelerations(w, alpha))
 
@@ -106,8 +108,10 @@ def _rotation_accelerations(w: Vector, alpha: Vector) -> Matrix:
 
 
 def inertial_wrench(inertia: RigidInertia, motion: BodyMotion) -> Wrench:
-    """Newton-Euler equations about the body's origin: ``f = m a + U h``, ``n = I alpha + w x I w + h x
-    a``."""
+    """The Newton-Euler equations about the body's origin.
+
+    The force is ``m a + U h``, the moment ``I alpha + w x I w + h x a``.
+    """
     w, alpha, a, U = motion
     m, h, S = inertia
     force = add(scale(m, a), rotate(U, h))

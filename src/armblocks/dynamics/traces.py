@@ -1,4 +1,4 @@
-"""All quantities of an arm as traced functions, with a table for the other packages.
+"""All quantities of an arm as traced functions, and the table ``TRACES`` of these functions.
 
 Shapes, units and frames of the inputs and outputs, here and in all functions below:
 
@@ -26,7 +26,7 @@ from armblocks.dynamics.friction import joint_friction, rotor_torques
 from armblocks.dynamics.jacobian import jacobian_matrix, tool_columns, world_columns, yoshikawa
 from armblocks.dynamics.joint_motion import entries, joint_motions
 from armblocks.dynamics.kinematics import body_poses, constant_pose, frame_pose
-from armblocks.dynamics.loads import PAYLOAD_SLOT, WRENCH_SLOT, at_tip, carrying
+from armblocks.dynamics.loads import PAYLOAD_SLOT, WRENCH_SLOT, tip_wrench, with_payload
 from armblocks.dynamics.rnea import rnea
 from armblocks.equations import Signature, TracedFunction, signature
 from armblocks.equations.signatures import Slot
@@ -54,8 +54,8 @@ def trace_link_poses(robot: Robot) -> TracedFunction:
     def equations(q: SX) -> SX:
         ground = constant_pose(tree.base)
         bodies = body_poses(tree, entries(q), ground)
-        riding = [frame_pose(frame, bodies, ground) for frame in (*tree.links, tree.tool)]
-        return SX(vertcat(*(pose.matrix() for pose in (ground, *riding))))
+        poses = [frame_pose(frame, bodies, ground) for frame in (*tree.links, tree.tool)]
+        return SX(vertcat(*(pose.matrix() for pose in (ground, *poses))))
 
     return _trace("link_poses", robot, ("q",), ("poses", (len(robot.links) + 2, 4, 4), "m"), equations)
 
@@ -91,7 +91,7 @@ def trace_manipulability(robot: Robot) -> TracedFunction:
 
 
 def trace_rne(robot: Robot) -> TracedFunction:
-    """``tau (n,)`` for a motion: rigid bodies, rotor inertia and friction, in the robot's gravity."""
+    """``tau (n,)`` of a motion, with rigid bodies, rotor inertia, friction and the robot's gravity."""
     tree = regrouped(KinematicTree.of(robot))
 
     def equations(q: SX, qd: SX, qdd: SX) -> SX:
@@ -108,9 +108,9 @@ def trace_rne_loaded(robot: Robot) -> TracedFunction:
 
     def equations(q: SX, qd: SX, qdd: SX, wrench: SX, payload: SX) -> SX:
         rates, accelerations = entries(qd), entries(qdd)
-        loaded = carrying(tree, payload)
+        loaded = with_payload(tree, payload)
         rigid = rnea(
-            loaded, joint_motions(loaded, q), rates, accelerations, tree.gravity, at_tip(tree, wrench)
+            loaded, joint_motions(loaded, q), rates, accelerations, tree.gravity, tip_wrench(tree, wrench)
         )
         return _sum(rigid, rotor_torques(robot, accelerations), joint_friction(robot, rates))
 
@@ -150,16 +150,16 @@ def trace_coriolis(robot: Robot) -> TracedFunction:
     tree = regrouped(KinematicTree.of(robot))
 
     def equations(q: SX, qd: SX) -> SX:
-        weightless = (0.0, 0.0, 0.0)
+        zero_gravity = (0.0, 0.0, 0.0)
         no_acceleration = [0.0] * tree.n
-        c = _sum(rnea(tree, joint_motions(tree, q), entries(qd), no_acceleration, weightless))
+        c = _sum(rnea(tree, joint_motions(tree, q), entries(qd), no_acceleration, zero_gravity))
         return 0.5 * jacobian(c, qd)
 
     return _trace("coriolis", robot, ("q", "qd"), ("C", (robot.n, robot.n), "N m s"), equations)
 
 
 def trace_friction(robot: Robot) -> TracedFunction:
-    """``tau (n,)`` that overcomes motor friction, of the sign of ``qd``; see :class:`FrictionModel`.
+    """``tau (n,)`` that overcomes motor friction, with the sign of ``qd``; see :class:`FrictionModel`.
 
     The toolbox's ``friction`` has the opposite sign since release 9.
     """
@@ -192,14 +192,14 @@ def trace_accel_loaded(robot: Robot) -> TracedFunction:
     Raises RobotError that names the joint if the inertia at a joint is zero for every payload.
     """
     tree = regrouped(KinematicTree.of(robot))
-    some_payload = SX([1.0, 0.1, 0.2, 0.3, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
-    check_accelerations_exist(carrying(tree, some_payload))
+    generic_payload = SX([1.0, 0.1, 0.2, 0.3, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    check_accelerations_exist(with_payload(tree, generic_payload))
 
     def equations(q: SX, qd: SX, tau: SX, wrench: SX, payload: SX) -> SX:
         rates = entries(qd)
         net_torque = _difference(entries(tau), joint_friction(robot, rates))
-        loaded = carrying(tree, payload)
-        return _sum(forward_dynamics(loaded, q, rates, net_torque, at_tip(tree, wrench)))
+        loaded = with_payload(tree, payload)
+        return _sum(forward_dynamics(loaded, q, rates, net_torque, tip_wrench(tree, wrench)))
 
     inputs = ("q", "qd", "tau", "wrench", "payload")
     return _trace("accel", robot, inputs, ("qdd", (robot.n,), "rad/s2"), equations)
@@ -262,7 +262,7 @@ TRACES: Mapping[str, Callable[[Robot], TracedFunction]] = {
     "potential_energy": trace_potential_energy,
     "centre_of_mass": trace_centre_of_mass,
 }
-"""By name: ``TRACES["rne"](robot)``."""
+"""The trace functions by name: ``TRACES["rne"](robot)``."""
 
 
 def _trace(
@@ -288,7 +288,7 @@ def _inputs(robot: Robot, names: Sequence[str]) -> Signature:
     unit = units.pop() if len(units) == 1 else ""
     force = {"rad": "N m", "m": "N"}.get(unit, "")
     n = (robot.n,)
-    known = {
+    slots = {
         "q": Slot("q", n, unit),
         "qd": Slot("qd", n, f"{unit}/s" if unit else ""),
         "qdd": Slot("qdd", n, f"{unit}/s2" if unit else ""),
@@ -296,7 +296,7 @@ def _inputs(robot: Robot, names: Sequence[str]) -> Signature:
         "wrench": WRENCH_SLOT,
         "payload": PAYLOAD_SLOT,
     }
-    return Signature(tuple(known[name] for name in names))
+    return Signature(tuple(slots[name] for name in names))
 
 
 def _body_of_joint(tree: KinematicTree) -> list[int]:

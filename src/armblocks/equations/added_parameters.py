@@ -45,7 +45,7 @@ def with_added_parameters(system: HybridSystem, added: tuple[AddedParameter, ...
             changed[path] = changed[path] + change
     whole = vertcat(*changed.values(), SX(0, 1))
 
-    def widened(traced: TracedFunction) -> TracedFunction:
+    def extended(traced: TracedFunction) -> TracedFunction:
         if "p" not in traced.inputs.names:
             return traced
         index = traced.inputs.names.index("p")
@@ -73,10 +73,10 @@ def with_added_parameters(system: HybridSystem, added: tuple[AddedParameter, ...
         delays=None
         if delays is None
         else dataclasses.replace(
-            delays, **{key: widened(getattr(delays, key)) for key in ("inputs", "times", "bounds")}
+            delays, **{key: extended(getattr(delays, key)) for key in ("inputs", "times", "bounds")}
         ),
         **{
-            field.name: widened(value)
+            field.name: extended(value)
             for field in dataclasses.fields(system)
             if isinstance(value := getattr(system, field.name), TracedFunction)
         },

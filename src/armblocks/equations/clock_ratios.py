@@ -2,7 +2,7 @@
 
 A run treats ticks within 4 units in the last place as simultaneous. The ratio of two sample times is
 therefore the simplest fraction within that tolerance: 0.3 s is three times 0.1 s, and 1/3 s is 10/3 times 0.1
-s, though no double is a third. The common period of any number of clocks follows exactly.
+s, although no double equals 1/3. The common period of any number of clocks follows exactly.
 """
 
 from __future__ import annotations
@@ -52,5 +52,5 @@ def exact_clocks(clocks: Sequence[SampleClock]) -> list[tuple[Fraction, Fraction
 
 def common_period(clocks: Sequence[tuple[Fraction, Fraction]]) -> Fraction:
     """The least common multiple (s) of the periods that :func:`exact_clocks` returns."""
-    below = math.lcm(*(period.denominator for period, _ in clocks))
-    return Fraction(math.lcm(*(int(period * below) for period, _ in clocks)), below)
+    denominator = math.lcm(*(period.denominator for period, _ in clocks))
+    return Fraction(math.lcm(*(int(period * denominator) for period, _ in clocks)), denominator)

@@ -36,10 +36,12 @@ def continuous_system(
         name: str, letters: str, outputs: Signature, results: tuple[SX, ...], traced: TracedFunction | None
     ) -> TracedFunction:
         symbols = flat if traced is None else {**flat, **dict(zip("txp", traced.arguments))}
-        ends = signature(*((letter, () if letter == "t" else (flat[letter].numel(),)) for letter in letters))
+        inputs = signature(
+            *((letter, () if letter == "t" else (flat[letter].numel(),)) for letter in letters)
+        )
         return TracedFunction(
             name if traced is None else traced.name,
-            ends,
+            inputs,
             outputs,
             tuple(symbols[letter] for letter in letters),
             results,

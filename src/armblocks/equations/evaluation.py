@@ -32,7 +32,7 @@ class Point:
     p: Array
 
     @property
-    def ends(self) -> list[Array]:
+    def arguments(self) -> list[Array]:
         """The five arguments in the order of the system's functions."""
         return [np.array([self.t]), self.x, self.z, self.w, self.p]
 
@@ -103,36 +103,36 @@ class EvaluatedSystem:
         whole = _numbers(self._jacobians[traced.name], arguments).reshape(
             (count, 1 + x.numel() + z.numel() + w.numel() + len(self._parameters)), order="F"
         )
-        ends = np.cumsum([1, x.numel(), z.numel(), w.numel()]).tolist()
-        by_t, by_x, by_z, by_w, by_p = np.split(whole, ends, axis=1)
+        offsets = np.cumsum([1, x.numel(), z.numel(), w.numel()]).tolist()
+        by_t, by_x, by_z, by_w, by_p = np.split(whole, offsets, axis=1)
         return Jacobians(t=by_t, x=by_x, z=by_z, w=by_w, p=by_p)
 
     # Values.
 
     def derivative(self, point: Point) -> Array:
         """``x'`` (nx,)."""
-        return self._call(self.system.derivative, point.ends)
+        return self._call(self.system.derivative, point.arguments)
 
     def signals(self, point: Point) -> Array:
-        """The chosen rows of ``y``."""
-        return self._call(self.system.signals, point.ends)
+        """The selected rows of ``y``."""
+        return self._call(self.system.signals, point.arguments)
 
     def residual(self, point: Point) -> Array:
         """``r`` (nw,)."""
-        return self._call(self.system.residual, point.ends)
+        return self._call(self.system.residual, point.arguments)
 
     def guards(self, point: Point) -> Array:
         """``g`` (ng,)."""
-        return self._call(self.system.guards, point.ends)
+        return self._call(self.system.guards, point.arguments)
 
     def update(self, point: Point, ticking: Array) -> Array:
         """``z`` (nz,) after the ticks of the clocks with ``ticking[k] = 1``."""
-        return self._call(self.system.update, [*point.ends, ticking])
+        return self._call(self.system.update, [*point.arguments, ticking])
 
     def consistent_modes(self, point: Point) -> Array:
         """``z`` (nz,) with all modes consistent with the present values."""
         events = np.zeros(len(self.system.guard_directions))
-        reset = self._call(self.system.reset, [*point.ends, events])
+        reset = self._call(self.system.reset, [*point.arguments, events])
         return reset[self.system.states.size :]
 
     def start(self, p: Array) -> tuple[Array, Array, Array]:
@@ -148,33 +148,33 @@ class EvaluatedSystem:
 
     def derivative_jacobians(self, point: Point) -> Jacobians:
         """Derivatives of ``x'``."""
-        return self._differentiate(self.system.derivative, point.ends)
+        return self._differentiate(self.system.derivative, point.arguments)
 
     def signal_jacobians(self, point: Point) -> Jacobians:
-        """Derivatives of the chosen signals."""
-        return self._differentiate(self.system.signals, point.ends)
+        """Derivatives of the selected signals."""
+        return self._differentiate(self.system.signals, point.arguments)
 
     def residual_jacobians(self, point: Point) -> Jacobians:
         """Derivatives of ``r``."""
-        return self._differentiate(self.system.residual, point.ends)
+        return self._differentiate(self.system.residual, point.arguments)
 
     def update_jacobians(self, point: Point, ticking: Array) -> Jacobians:
         """Derivatives of the new ``z`` at a tick."""
-        return self._differentiate(self.system.update, [*point.ends, ticking])
+        return self._differentiate(self.system.update, [*point.arguments, ticking])
 
     # Delays.
 
     def delay_times(self, point: Point) -> Array:
         """The delay of each delayed scalar (nd,), s."""
-        return self._call(self._delays.times, point.ends)
+        return self._call(self._delays.times, point.arguments)
 
     def delay_inputs(self, point: Point) -> Array:
         """The inputs of the delays, and their time derivatives (2 nd,)."""
-        return self._call(self._delays.inputs, point.ends)
+        return self._call(self._delays.inputs, point.arguments)
 
     def delay_input_jacobians(self, point: Point) -> Jacobians:
         """Derivatives of the inputs of the delays."""
-        return self._differentiate(self._delays.inputs, point.ends)
+        return self._differentiate(self._delays.inputs, point.arguments)
 
     @property
     def _delays(self) -> Delays:
@@ -183,7 +183,7 @@ class EvaluatedSystem:
 
     @cached_property
     def sampled(self) -> NDArray[np.bool_]:
-        """The entries of ``z`` that a clock updates (nz,); the others are modes, which events change."""
+        """The entries of ``z`` that a clock updates (nz,); all others are modes, which events change."""
         update = self.system.update
         updated = np.zeros(self.system.discrete.size, dtype=np.bool_)
         if self.system.clocks:

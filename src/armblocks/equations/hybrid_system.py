@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SampleClock:
-    """Ticks at ``offset + k period`` (s), ``k = 0, 1, …``: computed, never accumulated."""
+    """A clock with ticks at ``offset + k period`` (s), ``k = 0, 1, …``. The times are products, not sums."""
 
     period: float
     offset: float = 0.0
@@ -54,10 +54,10 @@ class Delays:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LinearLoops:
-    """Linear loops ``x = M x + c`` that are solved in place, with the data for their condition numbers.
+    """Linear loops ``x = M x + c`` that are solved symbolically, with the data for their condition numbers.
 
-    ``signals``: the names of the unknowns of each. ``matrices``: from ``t, x, z, w, p`` all ``M - 1`` row by
-    row, one after another.
+    ``signals``: the names of the unknowns of each loop. ``matrices``: from ``t, x, z, w, p`` the matrices
+    ``M - 1`` of all loops, row by row.
     """
 
     signals: tuple[tuple[str, ...], ...]
@@ -74,20 +74,20 @@ class HybridSystem:
     The flat vectors ``x`` (states), ``z`` (discrete), ``w`` (algebraic), ``p`` (tunable parameters) and ``y``
     (signals) are laid out by the signatures. Slot names are paths: a signal is ``block/port``, a state
     ``block/state``, a parameter ``block.parameter``; signals are in evaluation order, so the first non-finite
-    signal is the cause of the others.
+    signal causes all others.
 
     All functions have flat inputs and outputs. ``derivative``, ``signals``, ``residual``,
     ``residual_jacobian`` and ``guards``: inputs ``t ()``, ``x (nx,)``, ``z (nz,)``, ``w (nw,)``, ``p (np,)``;
-    one output ``xd (nx,)``, ``y (ny,)``, ``r (nw,)``, ``J (nw, nw)``, ``g (ng,)``. ``update``: one input
-    more, ``m (nclocks,)``; output ``z (nz,)``: the new z at an instant at which the clocks with ``m[k] = 1``
+    one output ``xd (nx,)``, ``y (ny,)``, ``r (nw,)``, ``J (nw, nw)``, ``g (ng,)``. ``update``: the additional
+    input ``m (nclocks,)``; output ``z (nz,)``: the new z at an instant at which the clocks with ``m[k] = 1``
     tick. If ``captures`` is true, it is also evaluated without a ticking clock just before every instant, at
-    a time one unit in the last place earlier: z then stores left limits. ``reset``: one input more, ``e
+    a time one unit in the last place earlier: z then stores left limits. ``reset``: the additional input ``e
     (ng,)``, +1 or -1 where a guard fired upwards or downwards, else 0; outputs ``x (nx,)`` and ``z (nz,)``.
     With all ``e`` zero it gives the consistent modes (for example of a limiter that starts beyond its limit)
-    and the resulting states. A run calls it in this way at the start after the ticks, and whenever no guard
-    fires and some mode is inconsistent. At a breakpoint, as at a tick, the signs of guards before and after
-    it are compared. ``contradictions``: the inputs of ``guards``; output ``c (nm,)``, not 0 where the mode
-    ``z[modes[k]]`` is not consistent with the present values. ``initial_states``, ``initial_discrete``,
+    and the resulting states. A run makes this call at the start after the ticks, and whenever no guard fires
+    and a mode is inconsistent. At a breakpoint, as at a tick, the signs of guards before and after the
+    instant are compared. ``contradictions``: the inputs of ``guards``; output ``c (nm,)``, not 0 where the
+    mode ``z[modes[k]]`` is not consistent with the present values. ``initial_states``, ``initial_discrete``,
     ``initial_algebraic``: input ``p``; output ``x0``, ``z0``, ``w0``. At the start all clocks without an
     offset tick, before the first derivative. ``breakpoints``: input ``p``; output ``times (nb,)``: known
     times at which signals jump (a step source). Signals are right-continuous: at a breakpoint, a tick or an
@@ -133,17 +133,18 @@ class HybridSystem:
     followers: tuple[bool, ...] = ()
     """For each mode, whether it is a following mode: a function of the present signals, possibly with
     hysteresis."""
-    remembered: tuple[tuple[int, int, int], ...] = ()
-    """Indices in ``z``: a hysteresis mode; its previous value, which is the value before the instant or
-    before the latest event at it; and the mode without which the previous value is kept, -1 for none."""
-    recaptured: tuple[int, ...] = ()
+    hysteresis_modes: tuple[tuple[int, int, int], ...] = ()
+    """Three indices in ``z`` for each hysteresis mode: the mode; its previous value; a mode that is 0 while
+    the previous value does not change (-1: none). The previous value is the value before the instant, or
+    before the latest event at this instant."""
+    recaptured_states: tuple[int, ...] = ()
     """The indices in ``z`` of the captured values of hysteresis modes, which are captured again at events."""
-    momentary: tuple[int, ...] = ()
+    momentary_states: tuple[int, ...] = ()
     """The indices in ``z`` of the momentary values, which become 0 at the end of every instant."""
-    silenced: tuple[tuple[int, int], ...] = ()
+    silenced_guards: tuple[tuple[int, int], ...] = ()
     """Guards, each with the index in ``z`` of a momentary value. While that value is nonzero the guard does
     not fire; at the end of the instant its stored sign becomes that of its value."""
-    locating: tuple[int, ...] = ()
+    locating_guards: tuple[int, ...] = ()
     """The guards that only locate changes of following modes."""
     tangents: tuple[int, int, int] | None = None
     """The first indices in ``x``, ``z`` and the guards that belong to derivatives, if there are any."""
@@ -156,4 +157,4 @@ class HybridSystem:
     called: tuple[str, ...] = ()
     """Blocks without equations, whose outputs are computed in Python at their ticks."""
     loops: LinearLoops | None = None
-    """The linear loops that are solved in place."""
+    """The linear loops that are solved symbolically."""

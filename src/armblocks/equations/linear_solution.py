@@ -2,8 +2,8 @@
 
 ``linear_solution(A, b)`` is a call of a CasADi function with a fixed name inside scalar expressions. CasADi
 can differentiate and evaluate it. The compiler translates it to one operation (the tape's ``SOLVE``), and
-expands its derivatives by these rules: ``A dx = db - dA x``, and in reverse ``A' c = seed``, where the
-adjoint of ``b`` is ``c`` and that of ``A`` is ``-c x'`` (Giles, *Collected matrix derivative results for
+expands its derivatives by these rules: ``A dx = db - dA x``, and in reverse ``A' c = seed``. The adjoint of
+``b`` is ``c``, and the adjoint of ``A`` is ``-c x'`` (Giles, *Collected matrix derivative results for
 forward and reverse mode algorithmic differentiation*, 2008, 2.3.1).
 """
 

@@ -12,11 +12,11 @@ from armblocks.errors import check_arguments
 class SimulationOptions:
     """Settings of one run. ``None`` leaves the choice to the simulation, which reports it.
 
-    ``stop_time`` s; ``solver`` a name of ``armblocks.simulation.tableaux`` or ``"auto"``; ``step`` s: size of
-    a fixed step; ``sample_time`` s: interval of the recorded samples (at ``k * sample_time``, computed by a
-    product, and at the stop time); ``max_step`` s; ``rtol``, ``atol``: an adaptive step is accepted where the
-    error is below ``atol + rtol |x|`` in the root-mean-square norm; ``record_jumps``: whether both sides of
-    each jump of a signal are recorded between the samples.
+    ``stop_time``: end of the run, s. ``solver``: a name of ``armblocks.simulation.tableaux``, or ``"auto"``.
+    ``step``: length of a fixed step, s. ``sample_time``: interval of the recorded samples, s; they are at
+    ``k * sample_time``, computed as a product, and at the stop time. ``max_step``: maximum length of a step,
+    s. ``rtol``, ``atol``: an adaptive step is accepted where the error is below ``atol + rtol |x|`` in the
+    root-mean-square norm. ``record_jumps``: whether both sides of each jump are recorded between samples.
     """
 
     stop_time: float = 10.0

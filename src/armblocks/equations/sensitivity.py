@@ -18,7 +18,7 @@ from armblocks.equations.evaluation import refuse_called
 from armblocks.equations.hybrid_system import HybridSystem, LinearLoops
 from armblocks.equations.sensitivity_delays import DelayedSensitivities
 from armblocks.equations.sensitivity_instants import Instants
-from armblocks.equations.sensitivity_layout import OWN, Columns, sensitivity_name
+from armblocks.equations.sensitivity_layout import PREFIX, Columns, sensitivity_name
 from armblocks.equations.sensitivity_start import refuse_moving_start
 from armblocks.equations.signatures import Signature, Slot, signature
 from armblocks.equations.symbols import flatten
@@ -26,7 +26,7 @@ from armblocks.equations.table_reading import tables_read
 from armblocks.equations.traced_function import TracedFunction
 from armblocks.errors import InputError
 
-MIXED = OWN + "mixed"
+MIXED = PREFIX + "mixed"
 """A discrete variable (2,): the first time (s; -1: never) at which events coincided whose times have
 different derivatives with respect to a parameter, and the number of one of their guards, from 1."""
 
@@ -63,7 +63,7 @@ def sensitivity_system(
     _refuse_tables(system, parameters)
     _refuse_whole_numbers(system, parameters)
     refuse_moving_start(system, parameters)
-    return _Augmented(system, parameters, outputs).system()
+    return _AugmentedSystem(system, parameters, outputs).system()
 
 
 def _refuse_tables(system: HybridSystem, parameters: Sequence[str]) -> None:
@@ -77,7 +77,7 @@ def _refuse_tables(system: HybridSystem, parameters: Sequence[str]) -> None:
             )
 
 
-def _refuse(system: HybridSystem, *, sources: bool) -> None:
+def _refuse_implicit_jumps(system: HybridSystem, *, sources: bool) -> None:
     """Raise ``InputError`` for implicit equations whose solutions jump other than at zeros of guards."""
     if system.algebraic.size and (sources or system.delays is not None):
         jumping = "the parameter that determines when a signal jumps"
@@ -128,13 +128,15 @@ def _direction(system: HybridSystem, name: str) -> SX:
     return direction
 
 
-class _Augmented:
+class _AugmentedSystem:
+    """Builds the functions of a system with sensitivities."""
+
     def __init__(self, system: HybridSystem, parameters: Sequence[str], outputs: Sequence[str]) -> None:
         self.old = system
         (p,) = system.breakpoints.arguments
         chosen = vertcat(*(p[system.parameters.ranges[name]] for name in parameters))
         sources = depends_on(vertcat(*system.breakpoints.results, SX(0, 1)), chosen)
-        _refuse(system, sources=sources)
+        _refuse_implicit_jumps(system, sources=sources)
         self.moving = bool(system.guard_directions or system.delays is not None or sources)
         self.outputs = [system.signals_layout[name] for name in outputs]
         self.columns = Columns(system, parameters, moving=self.moving)
@@ -155,9 +157,9 @@ class _Augmented:
     def rate(self, expression: SX, k: int) -> SX:
         """The total derivative of an expression with respect to parameter ``k``."""
         c = self.columns
-        return c.along(expression, t=0.0, x=c.S[k], z=self.delays.Z[k], w=c.W[k], p=c.seeds[k])
+        return c.derivative_along(expression, t=0.0, x=c.S[k], z=self.delays.Z[k], w=c.W[k], p=c.seeds[k])
 
-    def widened(self, expression: SX) -> SX:
+    def extended(self, expression: SX) -> SX:
         """The expression and its derivatives with respect to all parameters in one column."""
         return vertcat(expression, *(self.rate(expression, k) for k in range(len(self.columns.names))))
 
@@ -177,7 +179,7 @@ class _Augmented:
         return TracedFunction(traced.name, traced.inputs, outputs, traced.arguments, (column,))
 
     def residual(self) -> TracedFunction:
-        """The implicit equations, those of the sensitivities, and those of the time derivatives."""
+        """The implicit equations, with their derivatives with respect to parameters and time."""
         c, r = self.columns, self.columns.value(self.old.residual)
         parts = [r, *(self.rate(r, k) for k in range(len(c.names)))]
         if self.instants is not None and r.numel():
@@ -185,13 +187,15 @@ class _Augmented:
             by_time = self.instants.over_time(r)
             parts.append(by_time)
             # If S is the derivative along an instant, W is the derivative along this instant as well.
-            fixed = c.along(r, t=1.0, x=SX.zeros(c.x.numel()), z=self.delays.rate_along, w=zeros, p=0.0 * c.p)
+            fixed = c.derivative_along(
+                r, t=1.0, x=SX.zeros(c.x.numel()), z=self.delays.rate_along, w=zeros, p=0.0 * c.p
+            )
             for k, instant in enumerate(self.instants.instant_p):
                 parts[k + 1] = parts[k + 1] + self.instants.open * instant * fixed
         return c.function("residual", {}, r=vertcat(*parts))
 
     def system(self) -> HybridSystem:
-        """All functions together."""
+        """The augmented system."""
         old, c, instants = self.old, self.columns, self.instants
         m = SX.sym("m", len(old.clocks))
         residual = self.residual()
@@ -207,17 +211,17 @@ class _Augmented:
         directions = () if instants is None else instants.directions()
         e = SX.sym("e", len(old.guard_directions) + len(directions))
         if instants is None:
-            update, guards = self.widened(c.value(old.update, m)), c.value(old.guards)
+            update, guards = self.extended(c.value(old.update, m)), c.value(old.guards)
             after = (vertcat(c.x, *c.S), vertcat(c.z, *c.Z))
         else:
             update, guards, after = instants.update(m), instants.all_guards(), instants.reset(e)
         return dataclasses.replace(
             old,
-            states=c.widened(old.states, "x"),
-            discrete=c.widened(old.discrete, "z"),
-            algebraic=c.widened(old.algebraic, "w"),
+            states=c.extended(old.states, "x"),
+            discrete=c.extended(old.discrete, "z"),
+            algebraic=c.extended(old.algebraic, "w"),
             signals_layout=Signature((*old.signals_layout.slots, *slots)),
-            derivative=c.function("derivative", {}, xd=self.widened(c.value(old.derivative))),
+            derivative=c.function("derivative", {}, xd=self.extended(c.value(old.derivative))),
             signals=c.function("signals", {}, y=vertcat(y, *rates)),
             residual=residual,
             residual_jacobian=dataclasses.replace(
@@ -241,14 +245,16 @@ class _Augmented:
             initial_algebraic=self.start(old.initial_algebraic, "w0"),
             delays=self.delays.delays(),
             captures=old.captures or instants is not None,
-            recaptured=tuple(
-                k * old.discrete.size + index for k in range(len(c.names) + 1) for index in old.recaptured
+            recaptured_states=tuple(
+                k * old.discrete.size + index
+                for k in range(len(c.names) + 1)
+                for index in old.recaptured_states
             ),
             loops=None if old.loops is None else self.loops(old.loops),
         )
 
     def loops(self, old: LinearLoops) -> LinearLoops:
-        """The linear loops of the original system; those of the derivatives have the same matrices."""
+        """The linear loops of the original system; the loops of the derivatives have the same matrices."""
         c = self.columns
         matrices = c.function("loop_matrices", {}, A=c.value(old.matrices))
         return dataclasses.replace(old, matrices=matrices)

@@ -65,7 +65,7 @@ class DelayedSensitivities:
 
     def _along_parameter(self, expression: SX, k: int) -> SX:
         c = self.columns
-        return c.along(expression, t=0.0, x=c.S[k], z=c.Z[k], w=c.W[k], p=c.seeds[k])
+        return c.derivative_along(expression, t=0.0, x=c.S[k], z=c.Z[k], w=c.W[k], p=c.seeds[k])
 
     def _corrected(self, k: int) -> SX:
         """The sensitivities of z. At the index of a delayed value, Z stores only ``u_p(t - d)``."""
@@ -106,14 +106,14 @@ class DelayedSensitivities:
             return
         c = self.columns
         zeros = SX.zeros(c.z.numel())
-        self.delay_rate = c.along(
+        self.delay_rate = c.derivative_along(
             self.tau, t=1.0, x=flow, z=zeros, w=SX.zeros(c.w.numel()), p=SX.zeros(c.p.numel())
         )
         for i, (value, derivative) in enumerate(zip(self.values, self.derivatives)):
             self.rate_along[value] = c.z[derivative] * (1.0 - self.delay_rate[i])
             if self.reads_derivatives:
                 self.rate_along[derivative] = self.curvature[i]
-        self.ddu = c.along(
+        self.ddu = c.derivative_along(
             self.du, t=1.0, x=flow, z=self.rate_along, w=SX.zeros(c.w.numel()), p=SX.zeros(c.p.numel())
         )
 
@@ -180,8 +180,7 @@ class DelayedSensitivities:
     # The delayed signals of the whole system.
 
     def delays(self) -> Delays | None:
-        """All delayed scalars: those of the system, their sensitivities, and the signals that describe
-        jumps."""
+        """All delayed scalars: the system's, their sensitivities, and the signals that describe jumps."""
         if not self.n:
             return None
         c, old, n, nz = self.columns, self._delays, self.n, self.columns.z.numel()
@@ -228,10 +227,10 @@ class DelayedSensitivities:
         )
 
     def _indices(self, name: str, count: int = 1) -> list[list[int]]:
-        """The places of an added variable in the augmented z, in ``count`` parts."""
+        """The indices of an added variable in the augmented z, in ``count`` parts."""
         start = self.columns.index(name)
         return [list(range(start + k * self.n, start + (k + 1) * self.n)) for k in range(count)]
 
     def _sensitivity(self, expression: SX, k: int) -> SX:
         c = self.columns
-        return c.along(expression, t=0.0, x=c.S[k], z=self.Z[k], w=c.W[k], p=c.seeds[k])
+        return c.derivative_along(expression, t=0.0, x=c.S[k], z=self.Z[k], w=c.W[k], p=c.seeds[k])

@@ -12,8 +12,8 @@ For a single jump this is the saltation matrix of Hiskens and Pai, IEEE Trans. C
 ``s_p`` is 0 at ticks. At a zero of a guard it is ``-g_p / g'``. For a source that jumps at a known time it is
 the derivative of this time. For the arrival of a delayed jump see
 :mod:`armblocks.equations.sensitivity_delays`. A guard that fires because of one of these jumps belongs to the
-same instant. If instants with different derivatives coincide, it is unknown to which of them such a guard
-belongs. ``mixed`` then stores the time and one of the guards.
+same instant. If instants with different derivatives coincide, the instant of this guard is unknown. ``mixed``
+then stores the time and one of the guards.
 
 Each jump at an instant is a call of ``reset``. The first call replaces S by S*. An added guard fires after
 all other guards; its call replaces S* by S. There are two such guards, which alternate, because a guard that
@@ -44,14 +44,14 @@ from casadi import (
 from armblocks.equations.sensitivity_delays import DelayedSensitivities
 from armblocks.equations.sensitivity_layout import Columns
 
-LOCATED = 1e-8
+LOCATION_TOLERANCE = 1e-8
 """A guard whose zero is within this relative time counts as located; otherwise it has jumped."""
 SAME_INSTANT = 2.0**-48
 """Relative tolerance of equal times."""
 SAME_DERIVATIVE = 1e-6
 """Relative tolerance of equal time derivatives of events."""
-BEFORE = 1.0 - 2.0**-51
-"""Relative distance of a time just before another one."""
+JUST_BEFORE = 1.0 - 2.0**-51
+"""Factor from a time to a time just before it."""
 NEVER = -1.0
 """The time of an event that has not occurred, s."""
 
@@ -65,8 +65,11 @@ class Instants:
         c, system = columns, columns.system
         self.guards = len(system.guard_directions)
         self.time = c.add("instant", 1, NEVER)
+        """The time of the present or latest instant, s."""
         self.known, self.open = c.add("known", 1), c.add("open", 1)
+        """Whether ``s_p`` of the instant is known, and whether S is S*, the derivative along the instant."""
         self.arms = c.add("arms", 2, 1.0)
+        """The values of the two added guards that end an instant; a change of sign makes a guard fire."""
         self.mixed, self.ticked = c.add("mixed", 2, [NEVER, 0.0]), c.add("ticked", 1)
         self.located = c.add("located", self.guards)
         self.instant_p = [c.add(f"instant by {name}", 1) for name in c.names]
@@ -100,14 +103,14 @@ class Instants:
     def over_time(self, expression: SX) -> SX:
         """The time derivative along the flow."""
         c = self.columns
-        return c.along(
+        return c.derivative_along(
             expression, t=1.0, x=self.flow, z=self.delays.rate_along, w=c.V, p=SX.zeros(c.p.numel())
         )
 
     def by_parameter(self, expression: SX, k: int) -> SX:
         """The total derivative with respect to parameter ``k`` with the present sensitivities."""
         c = self.columns
-        return c.along(expression, t=0.0, x=c.S[k], z=self.delays.Z[k], w=c.W[k], p=c.seeds[k])
+        return c.derivative_along(expression, t=0.0, x=c.S[k], z=self.delays.Z[k], w=c.W[k], p=c.seeds[k])
 
     # Added guards.
 
@@ -133,8 +136,8 @@ class Instants:
         begins = dot(m, m) == 0.0 if m.numel() else SX(1.0)
         updated = c.value(c.system.update, m)
         Z = [self._captured_by(updated, k) for k in range(len(c.names))]
-        near = fabs(self.g) <= LOCATED * fabs(self.g_rate) * fmax(1.0, c.t)
-        located = logic_and(near, logic_and(self.g_rate != 0.0, c.t > 0.0))
+        is_near = fabs(self.g) <= LOCATION_TOLERANCE * fabs(self.g_rate) * fmax(1.0, c.t)
+        located = logic_and(is_near, logic_and(self.g_rate != 0.0, c.t > 0.0))
         left_values = {
             "instant": c.t,
             "known": SX(0.0),
@@ -159,34 +162,34 @@ class Instants:
         along the instant."""
         c, instant = self.columns, self.open * self.instant_p[k]
         z = self.delays.Z[k] + self.delays.rate_along * instant
-        return c.along(updated, t=instant, x=c.S[k], z=z, w=c.W[k], p=c.seeds[k])
+        return c.derivative_along(updated, t=instant, x=c.S[k], z=z, w=c.W[k], p=c.seeds[k])
 
     # At an instant.
 
     def reset(self, e: SX) -> tuple[SX, SX]:
         """All states and discrete variables after the events ``e``, including those of the added guards."""
         c, d, names = self.columns, self.delays, self.columns.names
-        ends = [self.guards, 2, len(self.moving_breakpoints), d.n, d.n]
-        own, arms, sources, arrived, jumped = vertsplit(e, [0, *accumulate(ends)])
-        fired, quiet = _any(own), logic_not(_any(e))
-        others = logic_or(_any(vertcat(own, sources, arrived, jumped)), quiet)
+        counts = [self.guards, 2, len(self.moving_breakpoints), d.n, d.n]
+        own, arms, sources, arrived, jumped = vertsplit(e, [0, *accumulate(counts)])
+        fired, no_event = _any_marked(own), logic_not(_any_marked(e))
+        others = logic_or(_any_marked(vertcat(own, sources, arrived, jumped)), no_event)
         first = logic_not(self.known)
-        instants, mixed = self._instants(own, quiet, sources, arrived)
+        instants, mixed = self._instants(own, no_event, sources, arrived)
         leaves = logic_and(self.open, logic_not(others))
-        enters = logic_and(logic_not(self.open), _any(vertcat(*instants)))
+        enters = logic_and(logic_not(self.open), _any_marked(vertcat(*instants)))
 
         # The derivatives before or after the instant.
-        left_side = logic_and(first, _any(sources))
-        t = if_else(left_side, c.t * BEFORE, c.t)
+        left_side = logic_and(first, _any_marked(sources))
+        t = if_else(left_side, c.t * JUST_BEFORE, c.t)
         flow = c.value_at(c.system.derivative, t, c.x, d.before_arrival(arrived), c.w)
         along = [flow * (if_else(leaves, -1.0, enters) * instant) for instant in instants]
         S = [known + step for known, step in zip(c.S, along)]
         Z = [self._with_left_limits(c.Z[k], first, instants[k]) for k in range(len(names))]
 
-        n, jumps = c.x.numel(), logic_or(fired, quiet)
+        n, jumps = c.x.numel(), logic_or(fired, no_event)
         after = c.value(c.system.reset, own)
         changed = [
-            c.along(
+            c.derivative_along(
                 after,
                 t=instant,
                 x=S[k],
@@ -204,7 +207,7 @@ class Instants:
         repeats = logic_and(opened, others)
         second = logic_and(repeats, arms[0] != 0.0)
         flips = vertcat(logic_and(repeats, logic_not(second)), second)
-        caused = logic_or(logic_not(first), _any(vertcat(sources, arrived)))
+        caused = logic_or(logic_not(first), _any_marked(vertcat(sources, arrived)))
         changes = {
             "known": SX(1.0),
             "open": opened,
@@ -224,10 +227,10 @@ class Instants:
             corrected[index] = corrected[index] + first * instant * self.left_limit_rates[number]
         return corrected
 
-    def _instants(self, own: SX, quiet: SX, sources: SX, arrived: SX) -> tuple[list[SX], SX]:
+    def _instants(self, own: SX, no_event: SX, sources: SX, arrived: SX) -> tuple[list[SX], SX]:
         """The derivatives of this instant with respect to the parameters, and the number (from 1) of a guard
         with different derivatives, or 0."""
-        located = logic_and(logic_or(own != 0.0, quiet), self.located)
+        located = logic_and(logic_or(own != 0.0, no_event), self.located)
         marks = vertcat(located, SX.zeros(2), sources != 0.0, arrived != 0.0)
         # A guard that fired without a located zero was moved by a jump, perhaps by one at a fixed time.
         at_fixed = [
@@ -236,7 +239,7 @@ class Instants:
         ]
         jumped = logic_and(own != 0.0, logic_not(self.located))
         follows = vertcat(jumped, SX.zeros(2), sources != 0.0, SX.zeros(arrived.numel()))
-        follows = logic_and(follows, _any(vertcat(*at_fixed)))
+        follows = logic_and(follows, _any_marked(vertcat(*at_fixed)))
         instants: list[SX] = []
         apart = SX.zeros(marks.numel())
         for k, known in enumerate(self.instant_p):
@@ -264,5 +267,5 @@ class Instants:
         return densify(jtimes(moving, c.p, c.seeds[k])) if self.moving_breakpoints else moving
 
 
-def _any(marks: SX) -> SX:
+def _any_marked(marks: SX) -> SX:
     return dot(marks, marks) > 0.0 if marks.numel() else SX(0.0)

@@ -10,7 +10,7 @@ from armblocks.equations.hybrid_system import HybridSystem
 from armblocks.equations.signatures import Signature, Slot
 from armblocks.equations.traced_function import TracedFunction
 
-OWN = "sensitivity/"
+PREFIX = "sensitivity/"
 """Prefix of the names of discrete variables that only the sensitivities need."""
 
 
@@ -72,20 +72,20 @@ class Columns:
         (result,) = function.call([t, x, z, w, self.p, *arguments], True, False)
         return densify(result)
 
-    def along(self, expression: SX, *, t: SX | float, x: SX, z: SX, w: SX, p: SX) -> SX:
+    def derivative_along(self, expression: SX, *, t: SX | float, x: SX, z: SX, w: SX, p: SX) -> SX:
         """The directional derivative of an expression in these symbols."""
         if not expression.numel():
             return SX(0, 1)
         by = vertcat(self.t, self.x, self.z, self.w, self.p)
         return densify(jtimes(expression, by, vertcat(t, x, z, w, p)))
 
-    def widened(self, layout: Signature, letter: str) -> Signature:
+    def extended(self, layout: Signature, letter: str) -> Signature:
         """The slots of ``x``, ``z`` or ``w`` with those of their sensitivities."""
         added = [
             Slot(sensitivity_name(slot.name, name), slot.shape) for name in self.names for slot in layout
         ]
         if letter == "z":
-            added += [Slot(OWN + name, (symbol.numel(),)) for name, symbol in self.added.items()]
+            added += [Slot(PREFIX + name, (symbol.numel(),)) for name, symbol in self.added.items()]
         if letter == "w" and self.V.numel():
             added += [Slot(f"{slot.name}'", slot.shape) for slot in layout]
         return Signature((*layout.slots, *added))

@@ -1,8 +1,8 @@
 """Events at the start of a run that a change of a parameter would move into the run or before it.
 
-A change that moves the event into the run and a change that moves it before the run have different
-derivatives, unless flow and signals are the same on both sides of the event. The start is evaluated once, in
-Python, before a run.
+The derivatives for a change that moves the event into the run, and for a change that moves it before the run,
+differ. They are equal only if flow and signals are the same on both sides of the event. The start is
+evaluated once, in Python, before a run.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from armblocks.errors import InputError
 
 Array = NDArray[np.float64]
 
-AT_ZERO = 1e-8
+ZERO_TOLERANCE = 1e-8
 """A guard whose zero is within this time (s) counts as 0."""
-ALIKE = 1e-9
+DERIVATIVE_TOLERANCE = 1e-9
 """Relative tolerance of equal derivatives of states and signals."""
 
 
@@ -56,9 +56,9 @@ class _Start:
         if marks.any():
             (z,) = self._at(system.update, x, z, marks)
         self.before = (x, z)
-        quiet = np.zeros(len(system.guard_directions))
-        for _ in range(quiet.size):
-            after = self._at(system.reset, x, z, quiet)
+        no_event = np.zeros(len(system.guard_directions))
+        for _ in range(no_event.size):
+            after = self._at(system.reset, x, z, no_event)
             same = np.array_equal(after[0], x) and np.array_equal(after[1], z)
             x, z = after
             if same:
@@ -73,8 +73,8 @@ class _Start:
         guards: set[int] = set()
         for point in (self.before, self.after):
             g, rate, moves = self._guards(*point, entries)
-            zero = np.isfinite(rate) & (np.abs(g) <= AT_ZERO * np.abs(rate)) & (rate != 0.0)
-            for guard in np.flatnonzero(zero & (moves > AT_ZERO * np.abs(rate))).tolist():
+            zero = np.isfinite(rate) & (np.abs(g) <= ZERO_TOLERANCE * np.abs(rate)) & (rate != 0.0)
+            for guard in np.flatnonzero(zero & (moves > ZERO_TOLERANCE * np.abs(rate))).tolist():
                 direction = self.system.guard_directions[guard]
                 # A guard of one direction fires in that direction only.
                 fires = direction * rate[guard] > 0.0
@@ -94,7 +94,7 @@ class _Start:
         values = self._numbers([t, x, z, w, p, e], changes, self.after, np.zeros(e.numel()))
         largest = np.abs(np.array(values)).max(axis=0)
         names = [element for slot in system.states for element in slot.elements]
-        return [names[index].rpartition("/")[0] for index in np.flatnonzero(largest > AT_ZERO)]
+        return [names[index].rpartition("/")[0] for index in np.flatnonzero(largest > ZERO_TOLERANCE)]
 
     def _initial_rates(self, p: SX, entries: slice) -> list[tuple[SX, SX, SX]]:
         """For each parameter entry the derivatives of the initial states and discrete variables, and its unit
@@ -147,4 +147,4 @@ class _Start:
             for side in (self.after, other)
         )
         with np.errstate(invalid="ignore"):
-            return bool((np.abs(before - after) > ALIKE * (1.0 + np.abs(before))).any())
+            return bool((np.abs(before - after) > DERIVATIVE_TOLERANCE * (1.0 + np.abs(before))).any())

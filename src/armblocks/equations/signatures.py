@@ -110,7 +110,7 @@ class Signature:
         return self._by_name[name]
 
     def with_entries(self, entries: Mapping[str, tuple[str, ...]]) -> Signature:
-        """The same quantities, with ``entries`` as the names of the entries of some."""
+        """The same quantities, with names of entries for the quantities in ``entries``."""
         if not entries:
             return self
         return Signature(
@@ -159,7 +159,7 @@ class Signature:
 
 
 def signature(*slots: Slot | tuple[str, Sequence[int]] | tuple[str, Sequence[int], str]) -> Signature:
-    """Short form: ``signature(("q", (n,), "rad"), ("qd", (n,), "rad/s"))``."""
+    """A signature from slots or tuples: ``signature(("q", (n,), "rad"), ("qd", (n,), "rad/s"))``."""
     return Signature(
         tuple(
             slot

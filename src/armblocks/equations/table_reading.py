@@ -1,7 +1,7 @@
 """Indexed reads of table entries at run time.
 
 CasADi's scalar expressions have no indexed read, so a table of n entries would cost n operations. An indexed
-read is represented by CasADi's operation ``printme(x, y)``, whose value is x and which is not used elsewhere,
+read is represented by CasADi's operation ``printme(x, y)``, whose value is x and which has no other use here,
 as ``printme(printme(first, -n), index)``: ``first`` is the symbol of the table's first entry. The compiler
 translates it to one load, and nothing is printed. A table must be an input of the function (a parameter of
 the system), so that its entries are contiguous.

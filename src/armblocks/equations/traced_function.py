@@ -19,7 +19,7 @@ from armblocks.errors import InputError
 class TracedFunction:
     """``results = f(arguments)`` in symbols.
 
-    ``arguments[i]`` is the flat column of symbols of input slot ``i`` and ``results[j]`` the flat dense
+    ``arguments[i]`` is the flat column of symbols of input slot ``i``. ``results[j]`` is the flat dense
     column of output slot ``j`` (both row by row, see :mod:`armblocks.equations.signatures`).
 
     ``rounded``: products that are separate values, such as signals. The compiler rounds them even if they
@@ -59,7 +59,7 @@ class TracedFunction:
         return cls(name=name, inputs=inputs, outputs=outputs, arguments=symbols, results=results)
 
     def joined(self, other: TracedFunction) -> TracedFunction:
-        """This function with the results of another one with the same inputs appended."""
+        """This function with the results of another function of the same inputs appended."""
         *results, rounded = Function("f", list(other.arguments), [*other.results, other.rounded]).call(
             list(self.arguments), True, False
         )

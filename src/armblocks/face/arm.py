@@ -26,19 +26,19 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class OfConfiguration(Protocol):
+class ConfigurationFunction(Protocol):
     """``f(q)``: ``q`` (n,) or (N, n); one result, or N of them stacked. ``out`` receives the result."""
 
     def __call__(self, q: ArrayLike, *, out: Array | None = None, threads: int = 1) -> Array: ...
 
 
-class OfSpeed(Protocol):
+class SpeedFunction(Protocol):
     """``f(qd)``: ``qd`` (n,) or (N, n)."""
 
     def __call__(self, qd: ArrayLike, *, out: Array | None = None, threads: int = 1) -> Array: ...
 
 
-class OfState(Protocol):
+class StateFunction(Protocol):
     """``f(q, qd)``: each (n,) or (N, n)."""
 
     def __call__(
@@ -46,7 +46,7 @@ class OfState(Protocol):
     ) -> Array: ...
 
 
-class OfMotion(Protocol):
+class MotionFunction(Protocol):
     """``f(q, qd, qdd)``, with an optional wrench (6,) or (N, 6) and payload."""
 
     def __call__(
@@ -62,7 +62,7 @@ class OfMotion(Protocol):
     ) -> Array: ...
 
 
-class OfDrivenState(Protocol):
+class DrivenStateFunction(Protocol):
     """``f(q, qd, tau)``, with an optional wrench (6,) or (N, 6) and payload."""
 
     def __call__(
@@ -136,17 +136,17 @@ class Arm:
 
     # ---- kinematics --------------------------------------------------------------------------------------
     @cached_property
-    def fkine(self) -> OfConfiguration:
+    def fkine(self) -> ConfigurationFunction:
         """``fkine(q)`` → T (4, 4): pose of the tool in the world, lengths in m."""
         return self._entry("fkine")
 
     @cached_property
-    def link_poses(self) -> OfConfiguration:
+    def link_poses(self) -> ConfigurationFunction:
         """``link_poses(q)`` → (L + 2, 4, 4): poses in the world of the base, the L links and the tool."""
         return self._entry("link_poses")
 
     @cached_property
-    def jacob0(self) -> OfConfiguration:
+    def jacob0(self) -> ConfigurationFunction:
         """``jacob0(q)`` → J (6, n): velocity of the tool in world axes is ``J qd``.
 
         Rows: linear velocity x y z in m/s, then angular velocity x y z in rad/s.
@@ -154,63 +154,63 @@ class Arm:
         return self._entry("jacob0")
 
     @cached_property
-    def jacobe(self) -> OfConfiguration:
-        """``jacobe(q)`` → J (6, n): as ``jacob0``, the velocity of the tool in its own axes."""
+    def jacobe(self) -> ConfigurationFunction:
+        """``jacobe(q)`` → J (6, n): velocity of the tool in tool axes is ``J qd``, rows as ``jacob0``."""
         return self._entry("jacobe")
 
     @cached_property
-    def manipulability(self) -> OfConfiguration:
+    def manipulability(self) -> ConfigurationFunction:
         """``manipulability(q)`` → one number, Yoshikawa's sqrt(det(J J')): 0 at a singularity."""
         return self._entry("manipulability")
 
     # ---- dynamics ----------------------------------------------------------------------------------------
     @cached_property
-    def rne(self) -> OfMotion:
+    def rne(self) -> MotionFunction:
         """``rne(q, qd, qdd)`` → tau (n,) N m or N: joint torques of a motion, with motors and friction.
 
         ``wrench=`` [fx fy fz mx my mz] in the last link's frame, ``payload=`` a :class:`Payload` at the tool,
         or the mass (kg) of a point mass at the tool.
         """
-        return self._loadable("rne")
+        return self._loaded_method("rne")
 
     @cached_property
-    def accel(self) -> OfDrivenState:
+    def accel(self) -> DrivenStateFunction:
         """``accel(q, qd, tau)`` → qdd (n,) rad/s² or m/s²: accelerations under joint torques and friction."""
-        return self._loadable("accel")
+        return self._loaded_method("accel")
 
     @cached_property
-    def gravload(self) -> OfConfiguration:
+    def gravload(self) -> ConfigurationFunction:
         """``gravload(q)`` → (n,) N m or N: torques that hold the arm at rest."""
         return self._entry("gravload")
 
     @cached_property
-    def inertia(self) -> OfConfiguration:
+    def inertia(self) -> ConfigurationFunction:
         """``inertia(q)`` → M (n, n) kg m² or kg: joint-space mass matrix, motor inertia included."""
         return self._entry("inertia")
 
     @cached_property
-    def coriolis(self) -> OfState:
+    def coriolis(self) -> StateFunction:
         """``coriolis(q, qd)`` → C (n, n): ``C qd`` are the velocity torques (N m, N); dM/dt - 2 C is skew."""
         return self._entry("coriolis")
 
     @cached_property
-    def friction(self) -> OfSpeed:
+    def friction(self) -> SpeedFunction:
         """``friction(qd)`` → (n,) N m or N: joint torques that overcome friction, a part of ``rne``."""
         return self._entry("friction")
 
     @cached_property
-    def kinetic_energy(self) -> OfState:
+    def kinetic_energy(self) -> StateFunction:
         """``kinetic_energy(q, qd)`` → energy in J, including the rotors of the motors."""
         return self._entry("kinetic_energy")
 
     @cached_property
-    def potential_energy(self) -> OfConfiguration:
+    def potential_energy(self) -> ConfigurationFunction:
         """``potential_energy(q)`` → energy in J, zero if the centre of mass is at the height of the
         origin."""
         return self._entry("potential_energy")
 
     @cached_property
-    def centre_of_mass(self) -> OfConfiguration:
+    def centre_of_mass(self) -> ConfigurationFunction:
         """``centre_of_mass(q)`` → (3,) m: centre of mass of all links, in the world."""
         return self._entry("centre_of_mass")
 
@@ -237,17 +237,20 @@ class Arm:
     def _entry(self, method: str) -> Callable[..., Array]:
         """The native function of a method; pickling stores the robot and the name of the method."""
         kernel = self._kernel(method)
-        return kernel.entry_before(kernel.__call__, maker=(Arm, (self.robot,)))
+        return kernel.entry_with_fallback(kernel.__call__, maker=(Arm, (self.robot,)))
 
-    def _loadable(self, method: str) -> Callable[..., Array]:
-        """The plain kernel, and the kernel with wrench and payload, which is compiled at its first use."""
-        plain = self._kernel(method)
+    def _loaded_method(self, method: str) -> Callable[..., Array]:
+        """A function that calls the kernel of a method, or with a wrench or payload a second kernel.
+
+        The second kernel is compiled at its first use.
+        """
+        kernel = self._kernel(method)
 
         @cache
         def loaded() -> Callable[..., Array]:
             return self._kernel(f"{method}_loaded").entry
 
-        def general(
+        def call(
             *arguments: ArrayLike,
             wrench: ArrayLike | None = None,
             payload: Payload | ArrayLike | None = None,
@@ -256,18 +259,20 @@ class Arm:
             **named: ArrayLike,
         ) -> Array:
             if named:
-                arguments = in_order(method, plain.inputs, arguments, named, _OPTIONS)
+                arguments = in_order(method, kernel.inputs, arguments, named, _OPTIONS)
             if wrench is None and payload is None:
-                return (plain.entry if named else plain)(*arguments, out=out, threads=threads)
+                return (kernel.entry if named else kernel)(*arguments, out=out, threads=threads)
             force = _NO_WRENCH if wrench is None else wrench
-            carried = payload.numbers if isinstance(payload, Payload) else payload_numbers(payload)
+            payload_values = payload.numbers if isinstance(payload, Payload) else payload_numbers(payload)
             try:
-                return loaded()(*arguments, force, carried, out=out, threads=threads)
+                return loaded()(*arguments, force, payload_values, out=out, threads=threads)
             except InputError:
-                check_count(method, plain.inputs, arguments)  # the message is about positional arguments only
+                check_count(
+                    method, kernel.inputs, arguments
+                )  # the message is about positional arguments only
                 raise
 
-        return plain.entry_before(general, maker=(Arm, (self.robot,)))
+        return kernel.entry_with_fallback(call, maker=(Arm, (self.robot,)))
 
     def __repr__(self) -> str:
         return f"<Arm {self.name}: {self.n} joints {self.robot.joint_letters}>"

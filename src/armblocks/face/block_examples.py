@@ -48,8 +48,8 @@ def block_example(kind: str | type[Block]) -> Diagram:
     Raises UnknownNameError for an unknown name.
     """
     check_type(kind, (str, type), "a block class or its name", where="block_example")
-    chosen = BLOCKS[kind] if isinstance(kind, str) else kind
-    return _Assembly(chosen).diagram()
+    block_type = BLOCKS[kind] if isinstance(kind, str) else kind
+    return _ExampleBuilder(block_type).diagram()
 
 
 def example_block(kind: type[Block]) -> Block:
@@ -74,7 +74,7 @@ def block_name(kind: type[Block]) -> str:
     ).replace("/", "-")
 
 
-class _Assembly:
+class _ExampleBuilder:
     """Builds the diagram of one example: blocks first, then connections."""
 
     def __init__(self, kind: type[Block]) -> None:
@@ -175,7 +175,7 @@ def shipped_robot(name: str) -> Robot:
         return formats.load_robot(name)
 
 
-def fitting_drivers(block: Block, stated: Mapping[str, Driver]) -> Mapping[str, Driver]:
+def fitting_drivers(block: Block, given_drivers: Mapping[str, Driver]) -> Mapping[str, Driver]:
     """The driver of each input: the given one, else a signal with a shape that the block accepts."""
     shapes = _fitting_shapes(block)
     ports = block.input_ports()
@@ -184,8 +184,8 @@ def fitting_drivers(block: Block, stated: Mapping[str, Driver]) -> Mapping[str, 
     )
     drivers: dict[str, Driver] = {}
     for number, port in enumerate(ports):
-        if port.name in stated:
-            drivers[port.name] = stated[port.name]
+        if port.name in given_drivers:
+            drivers[port.name] = given_drivers[port.name]
             continue
         signal = _signal(port, shapes[port.name], number, robot)
         drivers[port.name] = signal if signal.name or len(ports) == 1 else signal.named(port.name)
@@ -211,9 +211,9 @@ def _signal(port: Port, shape: Shape, number: int, robot: Robot | None) -> Examp
         start, end = [0.0] * robot.n, [1.0 - 0.5 * j for j in range(robot.n)]
         return driver("JTraj", q0=start, qf=end, tmax=8.0).named("motion").at(port.name)
     if shape == (4, 4):
-        return turning_pose().named(port.name)
+        return rotating_pose().named(port.name)
     if shape == (3, 3) and port.name == "R":
-        return driver("T2Rp").by(T=turning_pose()).at("R")
+        return driver("T2Rp").by(T=rotating_pose()).at("R")
     entries = np.arange(int(np.prod(shape)), dtype=np.float64).reshape(shape)
     if len(shape) == 2 and shape[0] == shape[1]:
         # regular at all times: diagonally dominant
@@ -226,7 +226,7 @@ def _signal(port: Port, shape: Shape, number: int, robot: Robot | None) -> Examp
     return driver("SineWave", frequency=1.0 + 0.5 * number, phase=entries.tolist() if shape else 0.0)
 
 
-def turning_pose() -> ExampleBlock:
+def rotating_pose() -> ExampleBlock:
     """A pose that rotates about z with a period of ten seconds."""
     zero = driver("Ground").named("zero")
     return driver("Rpy2T").by(roll=zero, pitch=zero, yaw=driver("Ramp", slope=0.6).named("yaw"))

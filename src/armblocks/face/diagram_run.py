@@ -1,4 +1,4 @@
-"""A run of a diagram that can be paused, inspected, tuned and continued, by block names."""
+"""A run that can be paused, inspected, tuned and continued; parameters and signals have block paths."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 class DiagramRun:
-    """One run of a diagram, made by :func:`armblocks.begin`.
+    """A run of a diagram, created by :func:`armblocks.begin`.
 
     >>> run = begin("van_der_pol_pid")
     >>> run.advance(10.0)
@@ -43,7 +43,7 @@ class DiagramRun:
 
     @property
     def time(self) -> float:
-        """Present time of the run, s."""
+        """Current time of the run, s."""
         return self.simulation.time
 
     @property
@@ -63,7 +63,7 @@ class DiagramRun:
 
     @property
     def parameters(self) -> Mapping[str, Array]:
-        """The present values of the tunable parameters, by ``block.parameter``."""
+        """The current values of the tunable parameters, by ``block.parameter``."""
         return self.simulation.parameters
 
     def advance(
@@ -84,7 +84,7 @@ class DiagramRun:
         self.simulation.advance(until, steps=steps, wall_time=wall_time, exactly=exactly)
 
     def set(self, path: str, value: ArrayLike) -> None:
-        """Change a tunable parameter, ``"block.parameter"``, from the present time on.
+        """Change a tunable parameter, ``"block.parameter"``, from the current time on.
 
         Nothing is compiled. Raises ``UnknownNameError`` for a name that does not exist, ``InputError`` for
         one that is not tunable, a value that its block does not allow, and a run that has ended.
@@ -101,13 +101,13 @@ class DiagramRun:
         tuned = tuned_parameters(self.diagram, changed)
         if tuned is None:
             masks = mask_parameters(self.diagram)
-            follows = [
+            dependents = [
                 name
                 for path in values
                 if path in masks
                 for name in dependent_parameters(self.diagram, path).structural
             ]
-            why = f": '{follows[0]}', which depends on it, is not tunable" if follows else ""
+            why = f": '{dependents[0]}', which depends on it, is not tunable" if dependents else ""
             shown = ", ".join(f"'{path}'" for path in values)
             names = [name for name, _, _ in tunable_parameters(self.diagram)]
             raise InputError(
@@ -124,11 +124,11 @@ class DiagramRun:
         return self.simulation.samples(begin)
 
     def state(self) -> RunState:
-        """The present state; another run continues from it: ``simulate(…, initial_state=run.state())``."""
+        """The current state; another run continues from it: ``simulate(…, initial_state=run.state())``."""
         return self.simulation.state()
 
     def stop(self, message: str = "stopped") -> None:
-        """End the run at the present time."""
+        """End the run at the current time."""
         self.simulation.stop(message)
 
     def result(self) -> SimulationResult:
@@ -139,12 +139,12 @@ class DiagramRun:
 def tuned_parameters(before: Diagram, after: Diagram) -> dict[str, Array] | None:
     """The tunable parameters, ``block.parameter``, that differ; ``None`` if the equations differ too."""
     flat = flat_diagram(before)
-    blocks, others = flat.blocks, flat_diagram(after).blocks
-    if list(blocks) != list(others):
+    blocks, other_blocks = flat.blocks, flat_diagram(after).blocks
+    if list(blocks) != list(other_blocks):
         return None
     tuned: dict[str, Array] = {}
     for name, block in blocks.items():
-        other = others[name]
+        other = other_blocks[name]
         if other is block:
             continue
         if type(other) is not type(block):

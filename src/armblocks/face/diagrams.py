@@ -19,8 +19,8 @@ def load_diagram(
 
     ``blocks``: additional block classes that the file may contain.
 
-    A diagram may name functions in Python files beside it. With ``trust`` these files are run; without it,
-    such a diagram is an error.
+    A diagram may refer to functions in Python files. With ``trust`` these files are run; without it, a
+    diagram with such functions is an error.
     """
     return formats.load_diagram(name_or_path, BLOCKS.with_kinds("own", blocks), trust=trust)
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from armblocks.diagram import Diagram, flat_diagram
 from armblocks.report.motion import MovingArm, moving_arms
 from armblocks.report.motion_summary import limit_findings, warn_of_limits
-from armblocks.robot.plausibility import LARGEST_ANGLE, warn_of_degrees
+from armblocks.robot.plausibility import MAX_MOTION_ANGLE, warn_of_degrees
 from armblocks.simulation import SimulationResult
 
 _Array = NDArray[np.float64]
@@ -21,7 +21,9 @@ class LimitWatch:
 
     def __init__(self, diagram: Diagram, result: SimulationResult) -> None:
         self._arms = [(arm, *_limits(arm)) for arm in moving_arms(diagram, result)]
-        self._turning = [np.array([unit == "rad" for unit in arm[0].robot.joint_units]) for arm in self._arms]
+        self._is_revolute = [
+            np.array([unit == "rad" for unit in arm[0].robot.joint_units]) for arm in self._arms
+        ]
         _warn_of_angles(diagram)
 
     def warn(self, result: SimulationResult) -> None:
@@ -29,16 +31,16 @@ class LimitWatch:
 
         Joint angles at the start that look like degrees give an ``ArmblocksWarning``.
         """
-        for (arm, q_low, q_high, qd_most, tau_most), turning in zip(self._arms, self._turning):
+        for (arm, q_low, q_high, qd_max, tau_max), is_revolute in zip(self._arms, self._is_revolute):
             q = result[arm.q]
-            if any(abs(value) > LARGEST_ANGLE for value in q[:1].ravel().tolist()):
-                warn_of_degrees(q[:1, turning], f"{arm.q} at the start")
+            if any(abs(value) > MAX_MOTION_ANGLE for value in q[:1].ravel().tolist()):
+                warn_of_degrees(q[:1, is_revolute], f"{arm.q} at the start")
             qd = None if arm.qd is None else result[arm.qd]
             tau = None if arm.tau is None else result[arm.tau]
             if (
-                _beyond(q, q_low, q_high)
-                or (qd is not None and _beyond(qd, -qd_most, qd_most))
-                or (tau is not None and _beyond(tau, -tau_most, tau_most))
+                _exceeds(q, q_low, q_high)
+                or (qd is not None and _exceeds(qd, -qd_max, qd_max))
+                or (tau is not None and _exceeds(tau, -tau_max, tau_max))
             ):
                 warn_of_limits(limit_findings(arm.robot, result.time, q, qd, tau))
 
@@ -48,7 +50,7 @@ def _limits(arm: MovingArm) -> tuple[_Array, _Array, _Array, _Array]:
     return robot.qlim[:, 0], robot.qlim[:, 1], robot.speed_limits, robot.torque_limits
 
 
-def _beyond(values: _Array, low: _Array, high: _Array) -> bool:
+def _exceeds(values: _Array, low: _Array, high: _Array) -> bool:
     return bool((values.min(axis=0) < low).any() or (values.max(axis=0) > high).any())
 
 

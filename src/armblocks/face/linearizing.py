@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.analysis.linear_system import LinearSystem
-from armblocks.analysis.linearisation import exact_response, input_ends, linearise, output_ends
+from armblocks.analysis.linearisation import exact_response, input_scalars, linearise, output_scalars
 from armblocks.analysis.operating_point import (
     OperatingPoint,
     initial_point,
@@ -79,8 +79,8 @@ def linearize(
     ``inputs``: perturbed signals. ``"step"`` or ``"step/y"`` adds a perturbation to that output,
     ``"plant/u"`` to that input only; ``"const.value"`` perturbs a tunable parameter, also of a mask.
     ``outputs``: signal names as in a result. An output port is read before a perturbation that is added to
-    it, an input port after it. ``open``: loop openings; the signal after an opening keeps its value at the
-    operating point, plus the perturbation of an input at the same port. So ``inputs="e", outputs="e",
+    it, an input port after it. ``open``: loop openings. The signal after an opening is constant at its value
+    at the operating point, plus the perturbation of an input at the same port. So ``inputs="e", outputs="e",
     open="e"`` is the loop transfer function, signs included.
 
     ``at``: a time of a run (0: the start), several times (one system each), the final state of a run
@@ -96,23 +96,23 @@ def linearize(
     run or a derivative is not finite.
     """
     check_settings(settings, linearize)
-    described = described_diagram(diagram, parameters)
+    resolved = resolved_diagram(diagram, parameters)
     input_names, output_names, opening_names = _names(inputs), _names(outputs), _names(open)
     if isinstance(at, float | int | RunState | OperatingPoint):
         return _linearized(
-            described,
+            resolved,
             input_names,
             output_names,
             opening_names,
-            operating_point_at(described, at, **settings),
+            operating_point_at(resolved, at, **settings),
             delay_order,
         )
-    points = operating_points_at(described, at, **settings)
-    prepared = _Prepared(described, input_names, output_names, opening_names)
+    points = operating_points_at(resolved, at, **settings)
+    prepared = _PreparedLinearisation(resolved, input_names, output_names, opening_names)
     return tuple(prepared.at(point, delay_order) for point in points)
 
 
-def described_diagram(
+def resolved_diagram(
     diagram: Diagram | CompiledDiagram | str | PathLike[str], parameters: Mapping[str, object] | None
 ) -> Diagram:
     """The diagram, with the given parameter values."""
@@ -135,7 +135,7 @@ def _linearized(
     point: OperatingPoint,
     delay_order: int | None,
 ) -> LinearSystem:
-    return _Prepared(diagram, inputs, outputs, opened).at(point, delay_order)
+    return _PreparedLinearisation(diagram, inputs, outputs, opened).at(point, delay_order)
 
 
 @takes_settings
@@ -153,16 +153,16 @@ def frequency_response(
     """The response (N, ny, nu) of a diagram's linear system at angular frequencies (N,) in rad/s.
 
     Dead time is exact, ``exp(-j w T)``, also inside loops. Arguments and errors are those of
-    :func:`linearize`; dead time beside sampled blocks raises ``InputError``.
+    :func:`linearize`; dead time together with sampled blocks raises ``InputError``.
     """
     check_settings(settings, frequency_response)
-    described = described_diagram(diagram, parameters)
-    prepared = _Prepared(described, _names(inputs), _names(outputs), _names(open))
-    along = np.asarray(frequencies, dtype=np.float64).reshape(-1)
-    return prepared.response(operating_point_at(described, at, **settings), along)
+    resolved = resolved_diagram(diagram, parameters)
+    prepared = _PreparedLinearisation(resolved, _names(inputs), _names(outputs), _names(open))
+    frequency_vector = np.asarray(frequencies, dtype=np.float64).reshape(-1)
+    return prepared.response(operating_point_at(resolved, at, **settings), frequency_vector)
 
 
-class _Prepared:
+class _PreparedLinearisation:
     """A traced diagram with linearisation points, for repeated linearisation."""
 
     def __init__(
@@ -179,23 +179,23 @@ class _Prepared:
             else trace_diagram(self.points.diagram)
         )
         system = with_mask_parameters(system, diagram, self.points.inputs.values())
-        indices, names = input_ends(system, self.points.inputs)
+        indices, names = input_scalars(system, self.points.inputs)
         # The flat diagram with linearisation points has no ports of subsystems.
         aliases = flatten_hierarchy(diagram).aliases
         known = (name if name in system.aliases else str(aliases.get(name, name)) for name in outputs)
-        rows, ends = output_ends(system, dict(zip(outputs, known)))
+        rows, ports = output_scalars(system, dict(zip(outputs, known)))
         units = tuple(unit for path in self.points.inputs.values() for unit in _units(system, path))
-        self.ends = dataclasses.replace(ends, inputs=names, input_units=units)
+        self.ports = dataclasses.replace(ports, inputs=names, input_units=units)
         self.evaluated = EvaluatedSystem(system, indices, rows)
         self.system = system
 
     def at(self, known: OperatingPoint, delay_order: int | None) -> LinearSystem:
         """The linear system about an operating point of the diagram without linearisation points."""
-        return linearise(self.evaluated, self._point(known), self.ends, known, delay_order=delay_order)
+        return linearise(self.evaluated, self._point(known), self.ports, known, delay_order=delay_order)
 
     def response(self, known: OperatingPoint, frequencies: NDArray[np.float64]) -> NDArray[np.complex128]:
         """The frequency response about an operating point."""
-        return exact_response(self.evaluated, self._point(known), self.ends, frequencies)
+        return exact_response(self.evaluated, self._point(known), self.ports, frequencies)
 
     def _point(self, known: OperatingPoint) -> Point:
         layout = self.system.parameters
@@ -223,7 +223,7 @@ def operating_point_at(diagram: Diagram, at: Where, **settings: Unpack[RunSettin
     if isinstance(at, float | int):
         return operating_points_at(diagram, [float(at)], **settings)[0]
     evaluated = EvaluatedSystem(compile_diagram(diagram).system)
-    return _of_state(evaluated, at)
+    return _point_from_state(evaluated, at)
 
 
 def operating_points_at(
@@ -250,11 +250,11 @@ def operating_points_at(
         result = simulate(compiled, initial_state=state, **run)
         state = result.final_state
         assert state is not None  # a failed run has raised an error
-        points[time] = _of_state(evaluated, state)
+        points[time] = _point_from_state(evaluated, state)
     return [points[time] for time in times]
 
 
-def _of_state(evaluated: EvaluatedSystem, state: RunState) -> OperatingPoint:
+def _point_from_state(evaluated: EvaluatedSystem, state: RunState) -> OperatingPoint:
     system = evaluated.system
     layouts = (system.states, system.discrete, system.algebraic)
     if state.names != tuple(layout.names for layout in layouts):

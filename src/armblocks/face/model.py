@@ -1,4 +1,4 @@
-"""Running diagrams: traced and compiled once, run any number of times with different parameters."""
+"""Runs of diagrams: a diagram is traced and compiled once, and can run with different parameters."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from armblocks.diagram.entry_names import entry_names
 from armblocks.diagram.signal_names import signal_titles
 from armblocks.equations import HybridSystem, Signature, SimulationOptions
 from armblocks.errors import InputError
-from armblocks.face.called import called_functions
 from armblocks.face.diagram_run import DiagramRun, tuned_parameters
 from armblocks.face.diagrams import load_diagram
 from armblocks.face.limit_watch import LimitWatch
+from armblocks.face.python_calls import called_functions
 from armblocks.face.settings import RunSettings, check_settings, takes_settings, with_settings
 from armblocks.integration.system import CompiledSystem, cached_system, compile_system
 from armblocks.simulation import LogRequest, RunState, Simulation, SimulationResult
@@ -106,7 +106,7 @@ class CompiledDiagram:
     def _tuned(
         self, parameters: Mapping[str, object] | None
     ) -> tuple[CompiledDiagram, NDArray[np.float64] | None]:
-        """The model for other parameters: itself with a new vector, or a new model for structural ones."""
+        """This model with a new parameter vector, or a new model if a structural parameter changes."""
         if not parameters:
             return self, None
         changed = with_parameters(self.diagram, parameters)
@@ -170,7 +170,7 @@ def simulate(
     ones need no new compilation. ``progress(time, fraction, real_time_factor)`` is called repeatedly during
     a long run. ``initial_state``: another run's ``final_state``, or the file that its ``save`` wrote; the
     run continues from there to ``stop_time``. Without other changes the result is exactly that of one longer
-    run. An operating point, such as that of ``trim``, is also valid: the run begins there, at its time.
+    run. An operating point, such as that of ``trim``, is also valid: the run begins at its time.
     ``log``: a ``.parquet`` or ``.csv`` file to which all signals, or the ``log_signals``, are written during
     the run. Memory use is then independent of the duration, and the result holds a subset of rows with all
     extremes.

@@ -65,10 +65,10 @@ class Payload:
 
 
 def payload_numbers(payload: ArrayLike | None) -> ArrayLike:
-    """The ten numbers of a payload that is given as a mass (kg), nothing, or the numbers themselves."""
+    """The ten numbers of a payload that is given as a mass (kg), ``None`` or ten numbers."""
     if payload is None:
-        return _NOTHING
+        return _ZERO_PAYLOAD
     return Payload(mass=float(payload)).numbers if isinstance(payload, float | int) else payload
 
 
-_NOTHING = Payload(mass=0.0).numbers
+_ZERO_PAYLOAD = Payload(mass=0.0).numbers

@@ -19,18 +19,18 @@ STYLE = """
 .ab-robot th:first-child,.ab-robot td:first-child{text-align:left}
 """
 
-HEAD = ("link", "joint", "α °", "a m", "θ °", "d m", "range", "speed", "mass kg", "G")
+HEADINGS = ("link", "joint", "α °", "a m", "θ °", "d m", "range", "speed", "mass kg", "G")
 
 
 def robot_html(robot: Robot, picture_svg: str) -> str:
-    """``picture_svg`` beside a row for each link: D-H row, limits in degrees or m, mass, gear ratio."""
+    """A picture, and a table of the links: D-H row, limits in degrees or m, mass in kg, gear ratio."""
     about = " · ".join(text for text in (robot.manufacturer, robot.comment) if text)
     rows = "".join(_row("td", _cells(link)) for link in robot.links)
     return (
         f'<div class="ab-robot"><style>{STYLE}</style>{picture_svg}<div>'
         f"<h3>{escape(robot.name)}</h3><p>{robot.n} joints {robot.joint_letters}"
         f"{' · ' + escape(about) if about else ''}</p>"
-        f"<table>{_row('th', HEAD)}{rows}</table></div></div>"
+        f"<table>{_row('th', HEADINGS)}{rows}</table></div></div>"
     )
 
 
@@ -39,8 +39,8 @@ def _row(kind: str, cells: Sequence[str]) -> str:
 
 
 def _cells(link: Link) -> list[str]:
-    turns = link.joint.unit == "rad"
-    scale, unit = (180 / np.pi, "°") if turns else (1.0, " m")
+    is_revolute = link.joint.unit == "rad"
+    scale, unit = (180 / np.pi, "°") if is_revolute else (1.0, " m")
     limits = link.joint.limits
     span = "" if limits.position is None else " … ".join(f"{end * scale:g}" for end in limits.position) + unit
     speed = "" if limits.speed is None else f"{limits.speed * scale:g}{unit}/s"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 
@@ -17,22 +18,38 @@ def load_robot(
     *,
     name: str | None = None,
     friction_model: FrictionModel | str | None = None,
+    tip: str | None = None,
+    packages: Mapping[str, str | PathLike[str]] | None = None,
+    arguments: Mapping[str, object] | None = None,
 ) -> Arm:
-    """A shipped robot by name (``"kr180"``), or a robot from a file (``.json``, a toolbox script ``.m``).
+    """A shipped robot by name (``"kr180"``), or a robot from a file.
+
+    Files: ``.json``, ``.urdf``, ``.xacro``, and toolbox scripts ``.m``.
 
     ``name`` selects one of several robots in a script. ``friction_model``: the formula of another toolbox
-    release, see :class:`FrictionModel`; by default that of the file. Raises UnknownNameError for a name that
-    is not shipped, FormatError for a file that cannot be read.
+    release, see :class:`FrictionModel`; by default that of the file. ``tip``: the link that carries the tool,
+    by default the last one; in a URDF file, the end of the chain with the most joints. If the joint of
+    ``tip`` moves, its coordinate is the last one in q. ``packages``: folders of ROS packages by name, for
+    ``package://`` in URDF files; others are searched for in the folders above the file. ``arguments``: values
+    of the arguments of a xacro file, which needs the extra ``xacro``.
+
+    Raises UnknownNameError for a name that is not shipped and a tip that is not in the file, FormatError for
+    a file that cannot be read.
     """
-    arm = Arm(formats.load_robot(name_or_path, name=name))
+    arm = Arm(formats.load_robot(name_or_path, name=name, tip=tip, packages=packages, arguments=arguments))
     return arm if friction_model is None else arm.with_friction_model(friction_model)
 
 
 def save_robot(robot: Robot | Arm, path: str | PathLike[str]) -> Path:
-    """Write a robot as canonical JSON, atomically; returns the path."""
+    """Write a robot as canonical JSON, or as URDF for the suffix ``.urdf``, atomically; returns the path.
+
+    URDF has no gravity, and friction at the joint only: other data are left out with a warning. Raises
+    FormatError for joint types that URDF does not have.
+    """
     check_type(robot, (Robot, Arm), "a Robot or an Arm", where="save_robot")
     target = Path(path)
-    write_atomically(target, formats.write_robot(robot.robot if isinstance(robot, Arm) else robot))
+    described = robot.robot if isinstance(robot, Arm) else robot
+    write_atomically(target, formats.robot_bytes(described, target.name))
     return target
 
 

@@ -15,7 +15,7 @@ from armblocks.diagram.mask_tuning import mask_parameters, with_mask_parameters
 from armblocks.equations import Signature
 from armblocks.equations.sensitivity import MIXED, sensitivity_name, sensitivity_system
 from armblocks.errors import InputError, SimulationError, UnknownNameError
-from armblocks.face.linearizing import described_diagram
+from armblocks.face.linearizing import resolved_diagram
 from armblocks.face.model import CompiledDiagram, compile_diagram
 from armblocks.face.settings import RunSettings, check_settings, takes_settings, with_settings
 from armblocks.integration.system import CompiledSystem, compile_system
@@ -43,7 +43,7 @@ class SensitivityResult:
 
     @property
     def time(self) -> Array:
-        """Instants (N,), s."""
+        """Recorded times (N,), s."""
         return self.run.time
 
     def __getitem__(self, key: tuple[str, str]) -> Array:
@@ -84,16 +84,19 @@ def sensitivity(
     delayed jumps are differentiated too, and so are implicit equations. ``values``: other values of
     parameters. The settings of the run are as in :func:`simulate`.
 
-    Raises ``UnknownNameError`` for unknown names. Raises ``InputError`` for a table that is read by index,
-    for a parameter of which only the integer part has an effect, for a parameter that shifts an event at the
-    start, and for implicit equations together with delays or with a parameter that determines a jump time.
-    Raises ``SimulationError`` like a run, and if a parameter change would separate coinciding events, because
-    the derivative does not exist then.
+    Raises ``UnknownNameError`` for unknown names, and ``SimulationError`` like a run. ``SimulationError`` is
+    also raised if a parameter change would separate coinciding events, because the derivative does not exist.
+    Raises ``InputError`` for
+
+    - a table that is read by index,
+    - a parameter of which only the integer part has an effect,
+    - a parameter that shifts an event at the start,
+    - implicit equations together with delays, or with a parameter that determines a jump time.
     """
     check_settings(settings, sensitivity)
-    described = described_diagram(diagram, values)
+    resolved = resolved_diagram(diagram, values)
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
-    system = with_mask_parameters(compile_diagram(described).system, described, names)
+    system = with_mask_parameters(compile_diagram(resolved).system, resolved, names)
     output_names = (outputs,) if isinstance(outputs, str) else tuple(outputs)
     if not names or not output_names:
         raise InputError(
@@ -104,7 +107,7 @@ def sensitivity(
         )
     for name in names:
         if name not in system.parameters.ranges:
-            known = [*mask_parameters(described), *system.parameters.names]
+            known = [*mask_parameters(resolved), *system.parameters.names]
             raise UnknownNameError("tunable parameter", name, known, where=system.name)
     paths = [system.aliases.get(name, name) for name in output_names]
     for path in paths:
@@ -112,15 +115,15 @@ def sensitivity(
             known = [*system.signals_layout.names, *system.aliases]
             raise UnknownNameError("signal", path, known, where=system.name)
     augmented = sensitivity_system(system, names, paths)
-    options = with_settings(described.settings, settings)
+    options = with_settings(resolved.settings, settings)
     compiled = compile_system(augmented)
     run = run_system(compiled, options)
-    _check_instants(compiled, run)
+    _check_coinciding_events(compiled, run)
     slots = Signature(tuple(system.parameters[name] for name in dict.fromkeys(names)))
     return SensitivityResult(run=run, outputs=output_names, parameters=names, slots=slots)
 
 
-def _check_instants(compiled: CompiledSystem, run: SimulationResult) -> None:
+def _check_coinciding_events(compiled: CompiledSystem, run: SimulationResult) -> None:
     """Raise ``SimulationError`` for coinciding events that a parameter change would separate."""
     entry = compiled.discrete.ranges.get(MIXED)
     if entry is None or run.final_state is None:

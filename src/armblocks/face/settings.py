@@ -29,8 +29,8 @@ class RunSettings(TypedDict, total=False):
 _NAMES = frozenset(RunSettings.__annotations__)
 
 
-class _OfTheDiagram:
-    """Default of a setting in signatures: the diagram's own value."""
+class _DiagramDefault:
+    """Default of a setting in signatures: the value of the diagram."""
 
     def __repr__(self) -> str:
         return "<the diagram's>"
@@ -42,13 +42,15 @@ def takes_settings(call: Call) -> Call:
     Type checkers read the annotation; ``help``, notebooks and the documentation read the signature.
     """
     signature = inspect.signature(call)
-    hints, default = get_type_hints(RunSettings), _OfTheDiagram()
-    plain = [entry for entry in signature.parameters.values() if entry.kind is not entry.VAR_KEYWORD]
+    hints, default = get_type_hints(RunSettings), _DiagramDefault()
+    other_parameters = [
+        entry for entry in signature.parameters.values() if entry.kind is not entry.VAR_KEYWORD
+    ]
     settings = [
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hint)
         for name, hint in hints.items()
     ]
-    changed = signature.replace(parameters=[*plain, *settings])
+    changed = signature.replace(parameters=[*other_parameters, *settings])
     cast("Any", call).__signature__ = changed
     return call
 

@@ -52,7 +52,7 @@ def jtraj(
     """Quintic motion from ``q0`` to ``qf`` (n,), zero acceleration at both ends.
 
     ``t`` is either the times (N,) in s, from 0 to the end of the motion, or a number of samples N: then the
-    time is normalised as in the toolbox, ``linspace(0, 1, N)``, and rates are per unit of it. ``qd0``,
+    time is normalised as in the toolbox, ``linspace(0, 1, N)``, and rates are per unit of this time. ``qd0``,
     ``qd1`` (n,): speeds at the ends, zero by default. Same polynomial as the toolbox's ``jtraj``. ``q, qd,
     qdd = jtraj(…)`` unpacks the motion. Warns of angles that look like degrees.
     """
@@ -100,8 +100,8 @@ def _times(t: ArrayLike | int) -> NDArray[np.float64]:
             )
         return np.linspace(0.0, 1.0, t)
     times = np.asarray(t, dtype=np.float64)
-    rising = times.ndim == 1 and times.size >= 2 and bool((np.diff(times) > 0).all())
-    if not (rising and np.isfinite(times).all() and times[0] == 0.0):
+    is_ascending = times.ndim == 1 and times.size >= 2 and bool((np.diff(times) > 0).all())
+    if not (is_ascending and np.isfinite(times).all() and times[0] == 0.0):
         raise InputError(
             f"t of shape {times.shape}",
             where="jtraj",

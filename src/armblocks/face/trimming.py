@@ -15,7 +15,7 @@ from armblocks.equations import HybridSystem, Signature
 from armblocks.equations.evaluation import Point
 from armblocks.equations.sensitivity import parameters_read_by_index
 from armblocks.errors import InputError, UnknownNameError
-from armblocks.face.linearizing import Where, described_diagram, operating_point_at
+from armblocks.face.linearizing import Where, operating_point_at, resolved_diagram
 from armblocks.face.model import CompiledDiagram, compile_diagram
 from armblocks.face.settings import RunSettings, check_settings, takes_settings
 
@@ -52,12 +52,12 @@ def trim(
     its own unit.
 
     Raises ``SimulationError``, with the equations that are not satisfied, the reason, and the best point
-    found as ``partial``; ``UnknownNameError`` and ``InputError`` for names and values that do not fit.
+    found as ``partial``; ``UnknownNameError`` and ``InputError`` for invalid names and values.
     """
     check_settings(settings, trim)
-    described = described_diagram(diagram, parameters)
-    system = compile_diagram(described).system
-    known = operating_point_at(described, at, **settings)
+    resolved = resolved_diagram(diagram, parameters)
+    system = compile_diagram(resolved).system
+    known = operating_point_at(resolved, at, **settings)
     x = system.states.pack(known.states)
     p = system.parameters.pack(known.parameters)
     fixed_states = _values(system.states, states or {}, "state", system)
@@ -97,10 +97,10 @@ def _slot_name(layout: Signature, name: str, kind: str, system: HybridSystem) ->
     if name in layout.ranges:
         return name
     separator = "." if kind == "parameter" else "/"
-    own = [slot.name for slot in layout if slot.name.rpartition(separator)[0] == name]
-    if len(own) != 1:
+    matches = [slot.name for slot in layout if slot.name.rpartition(separator)[0] == name]
+    if len(matches) != 1:
         raise UnknownNameError(kind, name, layout.names, where=system.name)
-    return own[0]
+    return matches[0]
 
 
 def _indices(layout: Signature, name: str, kind: str, system: HybridSystem) -> list[int]:

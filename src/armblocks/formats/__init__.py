@@ -18,10 +18,11 @@ if TYPE_CHECKING:
     from armblocks.formats.diagram_python import diagram_to_python
     from armblocks.formats.document_kinds import DocumentKind, kind_of_data, kind_of_document
     from armblocks.formats.matlab_script import Script, read_script
-    from armblocks.formats.robot_files import load_robot, read_robots
+    from armblocks.formats.robot_files import load_robot, read_robots, robot_bytes
     from armblocks.formats.robot_format import RobotFormat
     from armblocks.formats.robot_formats import ROBOT_FORMATS, ROBOT_SUFFIXES
     from armblocks.formats.robot_json import read_robot, write_robot
+    from armblocks.formats.robot_lint import lint_robot
     from armblocks.formats.robot_references import ResolveRobot
     from armblocks.formats.shipped import list_examples, list_libraries, list_robots
     from armblocks.formats.table_files import load_table
@@ -41,6 +42,7 @@ else:
             "example_descriptions": "armblocks.formats.diagram_files",
             "kind_of_data": "armblocks.formats.document_kinds",
             "kind_of_document": "armblocks.formats.document_kinds",
+            "lint_robot": "armblocks.formats.robot_lint",
             "list_examples": "armblocks.formats.shipped",
             "list_libraries": "armblocks.formats.shipped",
             "list_robots": "armblocks.formats.shipped",
@@ -52,6 +54,7 @@ else:
             "read_robot": "armblocks.formats.robot_json",
             "read_robots": "armblocks.formats.robot_files",
             "read_script": "armblocks.formats.matlab_script",
+            "robot_bytes": "armblocks.formats.robot_files",
             "write_diagram": "armblocks.formats.diagram_files",
             "write_library": "armblocks.formats.diagram_files",
             "write_robot": "armblocks.formats.robot_json",
@@ -71,6 +74,7 @@ __all__ = [
     "example_descriptions",
     "kind_of_data",
     "kind_of_document",
+    "lint_robot",
     "list_examples",
     "list_libraries",
     "list_robots",
@@ -82,6 +86,7 @@ __all__ = [
     "read_robot",
     "read_robots",
     "read_script",
+    "robot_bytes",
     "write_diagram",
     "write_library",
     "write_robot",

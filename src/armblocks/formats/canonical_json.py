@@ -1,7 +1,7 @@
 """Canonical JSON: the same bytes for the same content, and small differences for small changes.
 
-Keys are sorted, every level is indented by two spaces, every member has a line, and rows of numbers are on
-one line. Floats have the fewest digits that read back to the same bits. The text ends with a newline.
+Keys are sorted, every level is indented by two spaces, every member has its own line, and a row of numbers is
+on one line. Floats have the fewest digits that read back to the same bits. The text ends with a newline.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from armblocks.formats.json_document import MAX_DEPTH, KeyPath, path_text
 
 
 def canonical_bytes(
-    value: object, *, one_line: Callable[[KeyPath], bool] = lambda path: False, deepest: int = MAX_DEPTH
+    value: object, *, one_line: Callable[[KeyPath], bool] = lambda path: False, max_depth: int = MAX_DEPTH
 ) -> bytes:
     """The canonical text of a document of dicts, lists, texts, numbers, booleans and ``None``.
 
-    ``one_line`` returns for the path of an object or array whether it is written on one line. ``deepest`` is
+    ``one_line`` returns for the path of an object or array whether it is written on one line. ``max_depth``:
     the maximum nesting. Raises ``FormatError`` for numbers that are not finite, texts that are not valid
     Unicode, keys that are not texts, and unsupported types.
     """
-    pieces: list[str] = []
-    _check_depth(value, deepest)
-    _write(value, (), 0, one_line, pieces.append)
+    parts: list[str] = []
+    _check_depth(value, max_depth)
+    _write(value, (), 0, one_line, parts.append)
     try:
-        return ("".join(pieces) + "\n").encode("utf-8")
+        return ("".join(parts) + "\n").encode("utf-8")
     except UnicodeEncodeError as error:
         raise FormatError(
             "a text cannot be written, as it is not valid Unicode",
@@ -37,27 +37,31 @@ def canonical_bytes(
         ) from error
 
 
-def _check_depth(value: object, deepest: int) -> None:
+def _check_depth(value: object, max_depth: int) -> None:
     level, depth = [value], 0
     while level:
-        if depth > deepest:
+        if depth > max_depth:
             raise FormatError(
                 "objects and arrays are nested too deeply",
-                allowed=f"{deepest} levels",
+                allowed=f"{max_depth} levels",
                 where="JSON document",
                 fix="reduce the nesting",
             )
-        inside: list[object] = []
+        next_level: list[object] = []
         for entry in level:
             if isinstance(entry, Mapping):
-                inside += cast("Mapping[object, object]", entry).values()
+                next_level += cast("Mapping[object, object]", entry).values()
             elif isinstance(entry, list | tuple):
-                inside += cast("list[object] | tuple[object, ...]", entry)
-        level, depth = inside, depth + 1
+                next_level += cast("list[object] | tuple[object, ...]", entry)
+        level, depth = next_level, depth + 1
 
 
 def _write(
-    value: object, path: KeyPath, depth: int, one_line: Callable[[KeyPath], bool], put: Callable[[str], None]
+    value: object,
+    path: KeyPath,
+    depth: int,
+    one_line: Callable[[KeyPath], bool],
+    append: Callable[[str], None],
 ) -> None:
     """Append the text of one value."""
     match value:
@@ -75,7 +79,7 @@ def _write(
             _write_group(
                 "{}",
                 [(json.dumps(key, ensure_ascii=False) + ": ", key, members[key]) for key in sorted(keys)],
-                (path, depth, flat, one_line, put),
+                (path, depth, flat, one_line, append),
             )
         case list() | tuple():
             elements = cast("list[object] | tuple[object, ...]", value)
@@ -83,10 +87,10 @@ def _write(
             _write_group(
                 "[]",
                 [("", i, element) for i, element in enumerate(elements)],
-                (path, depth, flat or not elements or one_line(path), one_line, put),
+                (path, depth, flat or not elements or one_line(path), one_line, append),
             )
         case _:
-            put(_scalar(value, path))
+            append(_scalar(value, path))
 
 
 def _write_group(
@@ -94,13 +98,13 @@ def _write_group(
     entries: list[tuple[str, str | int, object]],
     context: tuple[KeyPath, int, bool, Callable[[KeyPath], bool], Callable[[str], None]],
 ) -> None:
-    path, depth, flat, one_line, put = context
+    path, depth, flat, one_line, append = context
     outer, inner = ("", "") if flat else ("\n" + "  " * depth, "\n" + "  " * (depth + 1))
-    put(brackets[0])
+    append(brackets[0])
     for position, (label, step, entry) in enumerate(entries):
-        put(("," + (" " if flat else "") if position else "") + inner + label)
-        _write(entry, (*path, step), depth + 1, (lambda path: True) if flat else one_line, put)
-    put((outer if entries else "") + brackets[1])
+        append(("," + (" " if flat else "") if position else "") + inner + label)
+        _write(entry, (*path, step), depth + 1, (lambda path: True) if flat else one_line, append)
+    append((outer if entries else "") + brackets[1])
 
 
 def _scalar(value: object, path: KeyPath) -> str:
@@ -122,14 +126,14 @@ def _scalar(value: object, path: KeyPath) -> str:
                     fix="replace it by a finite number",
                 )
             # 10.0 is written as 10, as in JavaScript, but not -0.0, whose sign would be lost.
-            whole = (
+            is_whole = (
                 value.is_integer() and abs(value) < 1e15 and math.copysign(1.0, value) * (value or 1.0) > 0
             )
-            return str(int(value)) if whole else repr(value)
+            return str(int(value)) if is_whole else repr(value)
         case _:
             raise FormatError(
                 f"a {type(value).__name__} cannot be written",
                 where=path_text(path),
-                allowed="JSON's own types",
+                allowed="null, booleans, numbers, texts, arrays and objects",
                 fix="convert it to numbers, texts, lists and objects",
             )

@@ -22,7 +22,10 @@ from armblocks.formats.table_files import load_table
 
 @dataclass(frozen=True, kw_only=True)
 class TableReference:
-    """A file with a table, and the columns that a block uses; empty names are chosen by the file."""
+    """A file with a table, and the columns that a block uses.
+
+    Without names, :func:`~armblocks.formats.load_table` chooses the columns.
+    """
 
     file: str
     time: str = ""
@@ -42,8 +45,8 @@ class DataFiles(ABC):
 
 
 @dataclass(frozen=True)
-class FilesAnywhere(DataFiles):
-    """Reads tables in any folder, and runs the files of functions if they are trusted."""
+class UnrestrictedFiles(DataFiles):
+    """Reads tables from any folder. Runs the files of functions only with ``trust``."""
 
     trust: bool = False
 

@@ -51,7 +51,7 @@ def load_diagram(
 
     A text with a path separator or the suffix ``.json`` is a path, any other text a name. Raises
     ``UnknownNameError`` for a name that is not shipped, and the errors of :func:`read_diagram`. With
-    ``trust`` the files of the diagram's Python functions are run; without it, such a diagram is an error.
+    ``trust`` the files of the diagram's Python functions are run; without it, Python functions are an error.
     With ``draft`` the diagram is not checked or traced, which is sufficient for drawing.
     """
     check_type(
@@ -80,7 +80,7 @@ def read_diagram(
 ) -> Diagram:
     """The diagram of a file, checked unless ``draft``; ``library`` holds the block types that it may use.
 
-    ``resolve_robot`` turns a shipped name or a path into a robot; paths in the file are relative to the
+    ``resolve_robot`` returns the robot of a shipped name or a path. Paths in the file are relative to the
     file's folder. Raises ``FormatError`` for a missing or unreadable file and for violations of the format,
     ``UnknownNameError`` for unknown types, parameters, blocks, ports and robots, ``DiagramError`` for a
     diagram that cannot be built. All name the file, and the line if known.

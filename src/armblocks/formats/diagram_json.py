@@ -1,7 +1,7 @@
 """Diagrams as canonical JSON: small differences in a diagram are small differences in its file.
 
-Blocks are keyed by name and sorted, connections are sorted texts (``"jtraj/q -> fkine/q"``), the layout is
-separate from the content, and no derived values, ids or times are written. A changed parameter is one line, a
+Blocks are keyed by name and sorted. Connections are sorted texts (``"jtraj/q -> fkine/q"``). The layout is
+separate from the content. No derived values, ids or times are written. A changed parameter is one line, a
 moved block is one line of the layout, and additions of different blocks do not conflict in version control.
 The layout also has user-drawn routes, under the text of the connection, and notes, under names that begin
 with ``/``, which block names cannot::
@@ -23,7 +23,9 @@ for the outermost diagram under ``parameters`` of the document.
 ``parameter_sets`` has named values of parameters by path, ``{"stiff": {"pid.kp": 40, "kp": 2}}``, see
 :mod:`armblocks.diagram.parameter_sets`. Each is checked by the rule of its parameter.
 
-A block that takes no part in the model has ``"commented": "out"`` or ``"through"``, see
+``bookmarks`` has parts of the sheet by name, ``{"motor": {"height": 90, "width": 160, "x": 0, "y": 40}}``.
+
+A commented block has ``"commented": "out"`` or ``"through"``, see
 :mod:`armblocks.diagram.comments`.
 
 A block that is linked to an entry of a library has ``library`` instead of ``diagram``: see
@@ -45,7 +47,7 @@ from pathlib import Path
 
 from armblocks.diagram import BlockLibrary, Diagram
 from armblocks.formats.canonical_json import canonical_bytes
-from armblocks.formats.data_files import DataFiles, FilesAnywhere
+from armblocks.formats.data_files import DataFiles, UnrestrictedFiles
 from armblocks.formats.diagram_reading import INNER_KEYS, DiagramReader
 from armblocks.formats.diagram_writing import DiagramWriter
 from armblocks.formats.json_document import KeyPath, Node, read_document, split_members
@@ -88,7 +90,7 @@ def diagram_from_bytes(
     root = read_document(data, name, MAX_BYTES, MAX_DEPTH)
     members, _ = split_members(root, _DOCUMENT_KEYS)
     _check_version(root, members)
-    files = read_data or FilesAnywhere(trust)
+    files = read_data or UnrestrictedFiles(trust)
     robots = RobotReader(members.get("robots"), folder, resolve_robot, files)
     libraries = Libraries(folder, _entry_reader(library, resolve_robot, files), read_library)
     reader = DiagramReader(library, robots, libraries, draft=draft)
@@ -115,7 +117,7 @@ def diagram_to_bytes(
         document["parameters"] = writer.values(diagram)
     if writer.robots.table:
         document["robots"] = writer.robots.table
-    return canonical_bytes(document, one_line=_is_placement, deepest=MAX_DEPTH)
+    return canonical_bytes(document, one_line=_is_layout_entry, max_depth=MAX_DEPTH)
 
 
 def read_library(
@@ -126,7 +128,7 @@ def read_library(
     trust: bool = False,
 ) -> Mapping[str, Diagram]:
     """All diagrams of a library file, each linked to it. Raises the errors of :func:`diagram_from_bytes`."""
-    return Libraries(None, _entry_reader(library, resolve_robot, FilesAnywhere(trust))).entries(path)
+    return Libraries(None, _entry_reader(library, resolve_robot, UnrestrictedFiles(trust))).entries(path)
 
 
 def library_to_bytes(
@@ -136,15 +138,15 @@ def library_to_bytes(
     writer = DiagramWriter(RobotWriter(folder, resolve_robot), folder)
     document: dict[str, object] = {
         "format": FORMAT_VERSION,
-        "library": {name: writer.inside(diagram) for name, diagram in entries.items()},
+        "library": {name: writer.inner_diagram(diagram) for name, diagram in entries.items()},
     }
     if writer.robots.table:
         document["robots"] = writer.robots.table
-    return canonical_bytes(document, one_line=_is_placement, deepest=MAX_DEPTH)
+    return canonical_bytes(document, one_line=_is_layout_entry, max_depth=MAX_DEPTH)
 
 
 def _entry_reader(library: BlockLibrary, resolve_robot: ResolveRobot, files: DataFiles) -> ReadEntry:
-    """Builds the diagrams of library entries, as for any document."""
+    """The function that builds the diagram of a library entry."""
 
     def read(root: Node, entry: Node, name: str, folder: Path, libraries: Libraries) -> Diagram:
         members, _ = split_members(root, _LIBRARY_KEYS)
@@ -170,9 +172,9 @@ def _check_version(root: Node, members: Mapping[str, Node]) -> None:
         )
 
 
-def _is_placement(path: KeyPath) -> bool:
+def _is_layout_entry(path: KeyPath) -> bool:
     if len(path) > 2 and path[0] == "library":
         path = path[2:]
     while len(path) > 3 and path[0] == "blocks" and path[2] == "diagram":
         path = path[3:]
-    return len(path) == 2 and path[0] == "layout"
+    return len(path) == 2 and path[0] in ("layout", "bookmarks")

@@ -38,9 +38,9 @@ from armblocks.formats.shipped import list_robots
 from armblocks.robot import Robot
 
 _Named = TypeVar("_Named", Robot, str)
-_PACKAGE_NAMES = ("ab", "builder", "diagram", "result")
-_WIDTH = 92
-_WITHOUT_FRICTION = {
+_RESERVED_NAMES = ("ab", "builder", "diagram", "result")
+_MAX_LINE_LENGTH = 92
+_FRICTION_METHODS = {
     "": "",
     "none": ".nofriction()",
     "viscous": ".nofriction(viscous=False)",
@@ -54,38 +54,38 @@ def diagram_to_python(diagram: Diagram) -> str:
     Robots must be shipped or from a file. Raises ``FormatError`` for another robot. Layout, description and
     unknown keys of a file are not written.
     """
-    diagrams = list(_own_diagrams(diagram))
+    diagrams = list(_unlinked_diagrams(diagram))
     blocks = [block for level in diagrams for block in level.blocks.values()]
     kinds = sorted({block.type_name() for block in blocks if not _is_whole_link(block)})
     robots = _robots(diagrams)
-    shown = _identifiers({robot: name for robot, (name, _) in robots.items()}, _PACKAGE_NAMES)
-    listing = _Listing(shown)
+    shown = _identifiers({robot: name for robot, (name, _) in robots.items()}, _RESERVED_NAMES)
+    writer = _ProgramWriter(shown)
     lines = ["import armblocks as ab", *_import(kinds), ""]
     lines += [f"{shown[robot]} = {expression}" for robot, (_, expression) in robots.items()]
-    lines += listing.lines(diagram, "builder")
+    lines += writer.lines(diagram, "builder")
     lines += ["diagram = builder.build()", "", f"result = ab.simulate({', '.join(_settings(diagram))})"]
     return "\n".join(lines) + "\n"
 
 
-class _Listing:
+class _ProgramWriter:
     """Writes diagrams, inner diagrams before their blocks. Every name in the program is unique."""
 
     def __init__(self, robots: Mapping[Robot, str]) -> None:
         self._robots = robots
-        self._used_names = {*_PACKAGE_NAMES, *robots.values()}
+        self._used_names = {*_RESERVED_NAMES, *robots.values()}
 
-    def lines(self, diagram: Diagram, builder: str, *, inside: bool = False) -> list[str]:
+    def lines(self, diagram: Diagram, builder: str, *, is_inner: bool = False) -> list[str]:
         """The lines that add the blocks and connections to a builder of this name."""
         order = _reading_order(diagram)
         names = _identifiers({name: name for name in order}, self._used_names)
         self._used_names |= set(names.values())
         written = [f"{builder} = ab.DiagramBuilder({_text(diagram.name)})"]
         for rule in diagram.mask:
-            written += _call(f"{builder}.parameter", self._declaration(diagram, rule, inside=inside))
+            written += _call(f"{builder}.parameter", self._declaration(diagram, rule, is_inner=is_inner))
         added: set[str] = set()
-        late_connections = _late(diagram, order)
+        backward_connections = _backward_connections(diagram, order)
         used = {wire.source.block for wire in diagram.connections} | {
-            wire.target.block for wire in late_connections
+            wire.target.block for wire in backward_connections
         }
         used |= {ref.block for ref in (*diagram.logged, *diagram.signal_names)} | set(diagram.commented)
         before: list[str] = []
@@ -96,12 +96,12 @@ class _Listing:
             target = f"{names[name]} = " if name in used else ""
             written += _call(f"{target}{builder}.add", arguments)
             added.add(name)
-        for wire in late_connections:
-            source = _end(diagram, wire.source, names)
+        for wire in backward_connections:
+            source = _output_expression(diagram, wire.source, names)
             written.append(f'{builder}.connect({source}, {names[wire.target.block]}["{wire.target.port}"])')
-        written += [f"{builder}.log({_end(diagram, ref, names)})" for ref in diagram.logged]
+        written += [f"{builder}.log({_output_expression(diagram, ref, names)})" for ref in diagram.logged]
         written += [
-            f"{builder}.name_signal({_end(diagram, ref, names)}, {_text(name)})"
+            f"{builder}.name_signal({_output_expression(diagram, ref, names)}, {_text(name)})"
             for ref, name in diagram.signal_names.items()
         ]
         for name, values in diagram.parameter_sets.items():
@@ -111,8 +111,7 @@ class _Listing:
         return [*before, *written]
 
     def _construction(self, block: Block, name: str, before: list[str]) -> str:
-        """The expression that creates a block; lines that build its inner diagram are appended to
-        ``before``."""
+        """The expression that creates a block. Appends the lines of its inner diagram to ``before``."""
         formulas = dict(block.formulas)
 
         def written(rule: Parameter) -> str:
@@ -121,52 +120,52 @@ class _Listing:
             value = block.parameter_value(rule.name)
             return self._robots[value] if isinstance(value, Robot) else _value(value)
 
-        def own(rules: Iterable[Parameter]) -> list[str]:
+        def keyword_arguments(rules: Iterable[Parameter]) -> list[str]:
             return [
                 f"{rule.name}={written(rule)}"
                 for rule in rules
-                if rule.kind is not ParameterKind.DIAGRAM and _is_stated(block, rule)
+                if rule.kind is not ParameterKind.DIAGRAM and _is_written(block, rule)
             ]
 
-        stated = own(block.parameters())
+        argument_texts = keyword_arguments(block.parameters())
         if not isinstance(block, DiagramBlock):
-            return f"{block.type_name()}({', '.join(stated)})"
+            return f"{block.type_name()}({', '.join(argument_texts)})"
         if _is_whole_link(block):
             expression = _library_block(block.diagram.link)
         elif block.diagram.link:
             linked = f"diagram={_library_block(block.diagram.link)}.diagram"
-            expression = f"{block.type_name()}({', '.join([linked, *stated])})"
+            expression = f"{block.type_name()}({', '.join([linked, *argument_texts])})"
         else:
             inner = next(iter(_identifiers({"": f"{name} inside"}, self._used_names).values()))
             self._used_names.add(inner)
-            before += [*self.lines(block.diagram, inner, inside=True), ""]
-            expression = f"{block.type_name()}({', '.join([f'diagram={inner}.build()', *stated])})"
-        masked = own(block.diagram.mask)
+            before += [*self.lines(block.diagram, inner, is_inner=True), ""]
+            expression = f"{block.type_name()}({', '.join([f'diagram={inner}.build()', *argument_texts])})"
+        masked = keyword_arguments(block.diagram.mask)
         return f"{expression}.with_parameters({', '.join(masked)})" if masked else expression
 
-    def _declaration(self, diagram: Diagram, rule: Parameter, *, inside: bool) -> list[str]:
+    def _declaration(self, diagram: Diagram, rule: Parameter, *, is_inner: bool) -> list[str]:
         def shown(value: object) -> str:
             return self._robots[value] if isinstance(value, Robot) else _value(value)
 
-        stated = [_text(rule.name), shown(rule.default)]
-        if not inside and diagram.mask_values[rule.name] != rule.default:
-            stated.append(f"value={shown(diagram.mask_values[rule.name])}")
+        argument_texts = [_text(rule.name), shown(rule.default)]
+        if not is_inner and diagram.mask_values[rule.name] != rule.default:
+            argument_texts.append(f"value={shown(diagram.mask_values[rule.name])}")
         if rule.kind is not kind_of(rule.default, {"choices": rule.choices} if rule.choices else {}):
-            stated.append(f"kind={_text(rule.kind.value)}")
-        plain = mask_parameter(rule.name, rule.default, kind=rule.kind, **_needed(rule))
-        return stated + [
+            argument_texts.append(f"kind={_text(rule.kind.value)}")
+        default_rule = mask_parameter(rule.name, rule.default, kind=rule.kind, **_required_fields(rule))
+        return argument_texts + [
             f"{key}={_value(getattr(rule, key))}"
             for key in ("unit", "doc", "minimum", "above", "maximum", "choices", "dimensions")
-            if getattr(rule, key) != getattr(plain, key) or key in _needed(rule)
+            if getattr(rule, key) != getattr(default_rule, key) or key in _required_fields(rule)
         ]
 
 
-def _needed(rule: Parameter) -> dict[str, Any]:
+def _required_fields(rule: Parameter) -> dict[str, Any]:
     """The fields of a declared parameter that its kind requires: the choices of a choice."""
     return {"choices": rule.choices} if rule.choices else {}
 
 
-def _is_stated(block: Block, rule: Parameter) -> bool:
+def _is_written(block: Block, rule: Parameter) -> bool:
     """Whether a parameter must be written: it has a formula, or differs from its default."""
     if rule.required or rule.name in dict(block.formulas):
         return True
@@ -174,7 +173,7 @@ def _is_stated(block: Block, rule: Parameter) -> bool:
 
 
 def _is_whole_link(block: Block) -> bool:
-    """Whether a block can be loaded from a library: a plain, linked subsystem."""
+    """Whether a block can be loaded from a library: a linked ``Subsystem``."""
     return isinstance(block, Subsystem) and bool(block.diagram.link)
 
 
@@ -183,30 +182,30 @@ def _library_block(link: str) -> str:
     return f"ab.load_library({_text(file)})[{_text(entry)}]"
 
 
-def _own_diagrams(diagram: Diagram) -> Iterator[Diagram]:
+def _unlinked_diagrams(diagram: Diagram) -> Iterator[Diagram]:
     """A diagram and the diagrams inside its blocks, without those of libraries."""
     yield diagram
     for block in diagram.blocks.values():
         if isinstance(block, DiagramBlock) and not block.diagram.link:
-            yield from _own_diagrams(block.diagram)
+            yield from _unlinked_diagrams(block.diagram)
 
 
 def _reading_order(diagram: Diagram) -> list[str]:
     """The blocks sorted with sources first, by a depth-first search that breaks loops."""
     order: dict[str, None] = {}
-    begun: set[str] = set()
+    visited: set[str] = set()
     inputs = {name: [port.name for port in block.input_ports()] for name, block in diagram.blocks.items()}
     for first in sorted(diagram.blocks, key=lambda name: (not diagram.blocks[name].views(), name)):
         stack: list[tuple[str, Iterator[str]]] = [(first, iter(inputs[first]))]
-        if first in begun:
+        if first in visited:
             continue
-        begun.add(first)
+        visited.add(first)
         while stack:
             name, ports = stack[-1]
             for port in ports:
                 driver = diagram.drivers.get(PortRef(name, port))
-                if driver is not None and driver.block not in begun:
-                    begun.add(driver.block)
+                if driver is not None and driver.block not in visited:
+                    visited.add(driver.block)
                     stack.append((driver.block, iter(inputs[driver.block])))
                     break
             else:
@@ -215,7 +214,7 @@ def _reading_order(diagram: Diagram) -> list[str]:
     return list(order)
 
 
-def _late(diagram: Diagram, order: list[str]) -> list[Connection]:
+def _backward_connections(diagram: Diagram, order: list[str]) -> list[Connection]:
     """The connections to a block that precedes their source."""
     position = {name: number for number, name in enumerate(order)}
     return [
@@ -233,41 +232,45 @@ def _sources(diagram: Diagram, name: str, added: set[str], names: Mapping[str, s
         if source is None or source.block not in added:
             in_order = False
             continue
-        text = _end(diagram, source, names)
+        text = _output_expression(diagram, source, names)
         arguments.append(text if in_order else f"{port.name}={text}")
     return arguments
 
 
-def _end(diagram: Diagram, source: PortRef, names: Mapping[str, str]) -> str:
+def _output_expression(diagram: Diagram, source: PortRef, names: Mapping[str, str]) -> str:
     outputs: tuple[Port, ...] = diagram.blocks[source.block].output_ports()
     return names[source.block] if len(outputs) == 1 else f'{names[source.block]}["{source.port}"]'
 
 
 def _robots(diagrams: Iterable[Diagram]) -> dict[Robot, tuple[str, str]]:
     """A name for every robot of the blocks, and the expression that loads it."""
-    loadings: dict[Robot, tuple[str, str]] = {}
+    load_expressions: dict[Robot, tuple[str, str]] = {}
     for name, block in ((name, block) for diagram in diagrams for name, block in diagram.blocks.items()):
         for rule in block.own_parameters():
             robot = block.parameter_value(rule.name)
-            if isinstance(robot, Robot) and robot not in loadings:
-                loadings[robot] = _loading(robot, f"block '{name}'")
-    return loadings
+            if isinstance(robot, Robot) and robot not in load_expressions:
+                load_expressions[robot] = _load_expression(robot, f"block '{name}'")
+    return load_expressions
 
 
-def _loading(robot: Robot, where: str) -> tuple[str, str]:
+def _load_expression(robot: Robot, where: str) -> tuple[str, str]:
     """The name of a shipped robot or of a robot's file, and the expression that loads the robot."""
     entry = shortest_reference(robot, None, load_robot)
-    stated: Mapping[str, object] = {"robot": entry} if isinstance(entry, str) else entry
-    if "robot" not in stated:
+    reference_members: Mapping[str, object] = {"robot": entry} if isinstance(entry, str) else entry
+    if "robot" not in reference_members:
         raise FormatError(
-            f"the robot '{robot.name}' is neither a shipped one nor that of a file",
+            f"the robot '{robot.name}' is neither shipped nor loaded from a file",
             where=where,
             allowed=", ".join(list_robots()),
             fix="write the diagram as JSON, which can contain any robot",
         )
-    reference = str(stated["robot"])
-    model = f", friction_model={_value(stated['friction_model'])}" if "friction_model" in stated else ""
-    without = _WITHOUT_FRICTION[str(stated.get("friction", ""))]
+    reference = str(reference_members["robot"])
+    model = (
+        f", friction_model={_value(reference_members['friction_model'])}"
+        if "friction_model" in reference_members
+        else ""
+    )
+    without = _FRICTION_METHODS[str(reference_members.get("friction", ""))]
     return Path(reference).stem, f"ab.load_robot({_text(reference)}{model}).robot{without}"
 
 
@@ -307,10 +310,10 @@ def _value(value: object) -> str:
 
 
 def _table(table: TimeTable) -> str:
-    chosen = f", time={_text(table.time)}" if table.time else ""
+    selection = f", time={_text(table.time)}" if table.time else ""
     if table.columns:
-        chosen += f", columns=[{', '.join(map(_text, table.columns))}]"
-    return f"ab.load_table({_text(table.source)}{chosen})"
+        selection += f", columns=[{', '.join(map(_text, table.columns))}]"
+    return f"ab.load_table({_text(table.source)}{selection})"
 
 
 def _nested(table: TimeTable) -> tuple[object, ...]:
@@ -332,12 +335,14 @@ def _settings(diagram: Diagram) -> Iterator[str]:
 
 def _import(kinds: list[str]) -> list[str]:
     line = f"from armblocks.blocks import {', '.join(kinds)}"
-    return [line] if len(line) <= _WIDTH else [f"from armblocks.blocks import ({_wrapped(kinds)}", ")"]
+    return (
+        [line] if len(line) <= _MAX_LINE_LENGTH else [f"from armblocks.blocks import ({_wrapped(kinds)}", ")"]
+    )
 
 
 def _call(head: str, arguments: list[str]) -> list[str]:
     line = f"{head}({', '.join(arguments)})"
-    if len(line) <= _WIDTH:
+    if len(line) <= _MAX_LINE_LENGTH:
         return [line]
     return [f"{head}(", *(f"    {argument}," for argument in arguments), ")"]
 

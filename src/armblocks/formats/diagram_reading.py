@@ -21,10 +21,10 @@ from armblocks.diagram.parameter_sets import check_value_count, settable_paramet
 from armblocks.equations import SimulationOptions
 from armblocks.errors import ArmblocksError, UnknownNameError
 from armblocks.formats.json_document import Node
-from armblocks.formats.layout_json import Layout, connection_from
+from armblocks.formats.layout_json import Layout, bookmark_from_json, connection_from_json
 from armblocks.formats.located_errors import located
-from armblocks.formats.mask_json import mask_parameter_from
-from armblocks.formats.parameter_json import is_diagram, parameter_from, plain_value, with_infinities
+from armblocks.formats.mask_json import mask_parameter_from_json
+from armblocks.formats.parameter_json import is_diagram, parameter_from_json, plain_value, with_infinities
 from armblocks.formats.robot_references import RobotReader
 from armblocks.formats.subsystem_libraries import Libraries
 from armblocks.formats.unknown_members import Extras, split_extras
@@ -39,6 +39,7 @@ INNER_KEYS = (
     "signal_names",
     "parameter_sets",
     "layout",
+    "bookmarks",
     "settings",
 )
 """The keys of a diagram inside another one."""
@@ -82,7 +83,7 @@ class DiagramReader:
                 if "commented" in block_nodes[key].members():
                     builder.comment(key, _comment(block_nodes[key].members()["commented"]))
         for entry in members["connections"].elements() if "connections" in members else []:
-            source, target = connection_from(entry)
+            source, target = connection_from_json(entry)
             with located(entry):
                 builder.connect(source, target)
         for entry in members["logged"].elements() if "logged" in members else []:
@@ -97,6 +98,9 @@ class DiagramReader:
             builder.bend(wire, bends)
         for key, note in layout.notes.items():
             builder.note(key, note)
+        for key, entry in (members["bookmarks"].members() if "bookmarks" in members else {}).items():
+            with located(entry):
+                builder.bookmark(key, bookmark_from_json(entry))
         if "parameter_sets" in members:
             self._add_parameter_sets(builder, members["parameter_sets"])
         with located(node):
@@ -117,7 +121,7 @@ class DiagramReader:
         if not self.draft:
             with located(node):
                 rule, _ = settable_parameter(diagram, path)
-            return parameter_from(rule, node, self.robots)
+            return parameter_from_json(rule, node, self.robots)
         value = plain_value(node)
         try:  # without the location of the entry, whose computation takes long for many entries
             rule, _ = settable_parameter(diagram, path)
@@ -173,27 +177,27 @@ class DiagramReader:
                 if name in values:
                     raise member.error(f"'{name}' has a value and a formula", allowed="one of the two")
                 if key == "parameters":
-                    values[name] = parameter_from(rules[name], member, self.robots)
+                    values[name] = parameter_from_json(rules[name], member, self.robots)
                 else:
                     with located(member):
                         values[name] = formula(member.text())
         return values
 
     def _default(self, rule: Parameter, node: Node) -> object:
-        return parameter_from(rule, node, self.robots)
+        return parameter_from_json(rule, node, self.robots)
 
     def _declare(self, builder: DiagramBuilder, mask: Sequence[Node], values: Mapping[str, Node]) -> None:
         """The declared parameters of a diagram, and for the outermost diagram their values."""
         rules: list[Parameter] = []
         for node in mask:
             with located(node):
-                rules.append(mask_parameter_from(node, self._default))
+                rules.append(mask_parameter_from_json(node, self._default))
         for name, member in values.items():
             if name not in [rule.name for rule in rules]:
                 known = [rule.name for rule in rules]
                 raise UnknownNameError("mask parameter", name, known, where=member.where)
         for rule, node in zip(rules, mask):
-            value = parameter_from(rule, values[rule.name], self.robots) if rule.name in values else None
+            value = parameter_from_json(rule, values[rule.name], self.robots) if rule.name in values else None
             with located(node):
                 builder.declare(rule, value)
 

@@ -9,9 +9,9 @@ from typing import cast
 
 from armblocks.diagram import Block, Diagram, Parameter
 from armblocks.equations import SimulationOptions
-from armblocks.formats.layout_json import layout_to
-from armblocks.formats.mask_json import mask_parameter_to
-from armblocks.formats.parameter_json import is_diagram, parameter_to, plain_parameter
+from armblocks.formats.layout_json import bookmarks_to_json, layout_to_json
+from armblocks.formats.mask_json import mask_parameter_to_json
+from armblocks.formats.parameter_json import is_diagram, parameter_to_json, plain_parameter
 from armblocks.formats.robot_references import RobotWriter
 from armblocks.formats.subsystem_libraries import shortest_link
 from armblocks.formats.unknown_members import members_of
@@ -31,7 +31,7 @@ class DiagramWriter:
         extras = cast("Mapping[str, Mapping[str, object]]", diagram.extras)
         block_extras, layout_extras = extras.get("blocks", {}), extras.get("layout", {})
         settings = {name: getattr(diagram.settings, name) for name in _SETTINGS}
-        # Open choices, and the recording of jumps as usual, are not written.
+        # Settings without a value, and record_jumps with its default True, are not written.
         settings = {
             name: value for name, value in settings.items() if value is not None and value is not True
         }
@@ -40,7 +40,7 @@ class DiagramWriter:
             "name": diagram.name,
             **({"description": diagram.description} if diagram.description else {}),
             **(
-                {"mask": [mask_parameter_to(rule, self._value) for rule in diagram.mask]}
+                {"mask": [mask_parameter_to_json(rule, self._value) for rule in diagram.mask]}
                 if diagram.mask
                 else {}
             ),
@@ -56,35 +56,36 @@ class DiagramWriter:
                 else {}
             ),
             **({"parameter_sets": _parameter_sets(diagram)} if diagram.parameter_sets else {}),
-            "layout": layout_to(diagram, layout_extras),
+            **({"bookmarks": bookmarks_to_json(diagram)} if diagram.bookmarks else {}),
+            "layout": layout_to_json(diagram, layout_extras),
             "settings": {**extras.get("settings", {}), **settings},
         }
 
     def _block(self, block: Block) -> dict[str, object]:
-        """A block; an inner diagram is beside the parameters, which limits the nesting depth."""
+        """A block; an inner diagram is not among the parameters, which limits the nesting depth."""
         formulas = dict(block.formulas)
         values = {rule: block.parameter_value(rule.name) for rule in block.own_parameters()}
-        plain = {
+        parameter_values = {
             rule.name: self._value(rule, value)
             for rule, value in values.items()
             if not is_diagram(rule) and rule.name not in formulas
         }
-        inside: dict[str, object] = {}
+        inner: dict[str, object] = {}
         for rule, value in values.items():
             if is_diagram(rule):
                 diagram = cast("Diagram", value)
                 if diagram.link:
-                    inside["library"] = shortest_link(diagram.link, self.folder)
+                    inner["library"] = shortest_link(diagram.link, self.folder)
                 else:
-                    inside[rule.name] = self.inside(diagram)
-        stated = {"formulas": formulas} if formulas else {}
-        return {"type": block.type_name(), "parameters": plain, **stated, **inside}
+                    inner[rule.name] = self.inner_diagram(diagram)
+        formulas_member = {"formulas": formulas} if formulas else {}
+        return {"type": block.type_name(), "parameters": parameter_values, **formulas_member, **inner}
 
     def values(self, diagram: Diagram) -> dict[str, object]:
         """The values of the mask parameters of the outermost diagram."""
         return {rule.name: self._value(rule, diagram.mask_values[rule.name]) for rule in diagram.mask}
 
-    def inside(self, diagram: Diagram) -> dict[str, object]:
+    def inner_diagram(self, diagram: Diagram) -> dict[str, object]:
         """An inner diagram; empty members are omitted."""
         document = self.diagram(diagram)
         if diagram.settings == SimulationOptions() and "settings" not in diagram.extras:
@@ -94,7 +95,7 @@ class DiagramWriter:
         return document
 
     def _value(self, rule: Parameter, value: object) -> object:
-        return parameter_to(rule, value, self.robots)
+        return parameter_to_json(rule, value, self.robots)
 
 
 def _parameter_sets(diagram: Diagram) -> dict[str, object]:

@@ -26,13 +26,13 @@ KeyPath = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Document:
-    """The text of a file, for the lines of its messages."""
+    """The name and text of a file, from which messages get line numbers."""
 
     name: str
     text: str
 
     def where(self, path: KeyPath) -> str:
-        """``model.json:12, blocks.jtraj.parameters.q0[2]``"""
+        """The location of a value: ``model.json:12, blocks.jtraj.parameters.q0[2]``"""
         line = _line_of(self.text, path)
         location = f"{self.name}:{line}" if line else self.name
         return f"{location}, {path_text(path)}" if path else location
@@ -59,7 +59,7 @@ class Node:
         """The members of an object, by key."""
         value = self.value
         if not isinstance(value, dict):
-            raise self._wrong("an object {…}")
+            raise self._type_error("an object {…}")
         entries = cast("dict[str, object]", value)
         return {key: Node(self.document, (*self.path, key), value) for key, value in entries.items()}
 
@@ -67,26 +67,26 @@ class Node:
         """The elements of an array."""
         value = self.value
         if not isinstance(value, list):
-            raise self._wrong("an array […]")
+            raise self._type_error("an array […]")
         entries = cast("list[object]", value)
         return [Node(self.document, (*self.path, i), value) for i, value in enumerate(entries)]
 
     def text(self) -> str:
         """A string."""
         if not isinstance(self.value, str):
-            raise self._wrong("text")
+            raise self._type_error("text")
         return self.value
 
     def number(self) -> float:
         """A number, which is finite because the reader rejects other numbers."""
         if isinstance(self.value, bool) or not isinstance(self.value, int | float):
-            raise self._wrong("a number")
+            raise self._type_error("a number")
         return float(self.value)
 
     def boolean(self) -> bool:
-        """``true`` or ``false``"""
+        """The value ``true`` or ``false``."""
         if not isinstance(self.value, bool):
-            raise self._wrong("true or false")
+            raise self._type_error("true or false")
         return self.value
 
     def numbers(self, count: int) -> tuple[float, ...]:
@@ -97,7 +97,7 @@ class Node:
         return tuple(element.number() for element in elements)
 
     def choice(self, choices: Iterable[str]) -> str:
-        """A text out of a list of allowed texts."""
+        """A text, which must be one of ``choices``."""
         word, known = self.text(), list(choices)
         if word not in known:
             raise self.error(
@@ -105,22 +105,22 @@ class Node:
             )
         return word
 
-    def _wrong(self, allowed: str) -> FormatError:
+    def _type_error(self, allowed: str) -> FormatError:
         return self.error(f"the value is {describe(self.value)}", allowed=allowed)
 
 
-def read_document(data: bytes, name: str, most_bytes: int, deepest: int = MAX_DEPTH) -> Node:
+def read_document(data: bytes, name: str, max_bytes: int, max_depth: int = MAX_DEPTH) -> Node:
     """The root of a JSON document. ``name`` is the name of the file in messages.
 
-    ``most_bytes`` and ``deepest`` limit its size and the nesting of objects and arrays.
+    ``max_bytes`` and ``max_depth`` limit its size and the nesting of objects and arrays.
 
     Raises ``FormatError`` for a text that is not strict JSON or exceeds the limits.
     """
-    if len(data) > most_bytes:
+    if len(data) > max_bytes:
         raise FormatError(
             "the document is too large",
             where=name,
-            allowed=f"at most {most_bytes} bytes",
+            allowed=f"at most {max_bytes} bytes",
             fix="split it, or store long tables in separate files",
         )
     try:
@@ -131,13 +131,13 @@ def read_document(data: bytes, name: str, most_bytes: int, deepest: int = MAX_DE
             "the file is not UTF-8 text", where=f"{name}:{line}", fix="save it as UTF-8"
         ) from error
     document = Document(name, text)
-    _check_depth(document, deepest)
+    _check_depth(document, max_depth)
     try:
         value = json.loads(
             text,
             object_pairs_hook=_unique_members,
-            parse_constant=_refuse_constant,
-            parse_float=_finite,
+            parse_constant=_reject_constant,
+            parse_float=_finite_number,
             parse_int=_bounded_integer,
         )
     except json.JSONDecodeError as error:
@@ -146,10 +146,10 @@ def read_document(data: bytes, name: str, most_bytes: int, deepest: int = MAX_DE
             where=f"{name}:{error.lineno}",
             fix="correct that place: a comma, a bracket or a quote may be missing",
         ) from error
-    except _RefusedError as refusal:
-        line = _line_with(text, refusal.needle)
+    except _RejectedError as rejection:
+        line = _line_with(text, rejection.token_text)
         raise FormatError(
-            refusal.what, where=f"{name}:{line}", allowed=refusal.allowed, fix="correct that line"
+            rejection.what, where=f"{name}:{line}", allowed=rejection.allowed, fix="correct that line"
         ) from None
     root = Node(document, (), value)
     _check_text(root)
@@ -196,12 +196,12 @@ def split_members(node: Node, known: Iterable[str]) -> tuple[dict[str, Node], di
     for key, member in list(members.items()):
         if key in names:
             continue
-        near = difflib.get_close_matches(key.casefold(), names, n=1, cutoff=0.7)
-        if near and near[0] not in members:
+        matches = difflib.get_close_matches(key.casefold(), names, n=1, cutoff=0.7)
+        if matches and matches[0] not in members:
             raise member.error(
                 f"the key '{_short(key)}' is not known here",
                 allowed=", ".join(names),
-                fix=f"did you mean '{near[0]}'?",
+                fix=f"did you mean '{matches[0]}'?",
             )
         extra[key] = member.value
         del members[key]
@@ -225,12 +225,12 @@ def closed_members(node: Node, known: Iterable[str], required: Iterable[str] = (
     return members
 
 
-class _RefusedError(Exception):
+class _RejectedError(Exception):
     """An error that Python's JSON parser does not detect. It is found during parsing, when the line is
     unknown."""
 
-    def __init__(self, what: str, needle: str, allowed: str) -> None:
-        self.what, self.needle, self.allowed = what, needle, allowed
+    def __init__(self, what: str, token_text: str, allowed: str) -> None:
+        self.what, self.token_text, self.allowed = what, token_text, allowed
         super().__init__(what)
 
 
@@ -239,7 +239,7 @@ def _unique_members(pairs: list[tuple[str, object]]) -> dict[str, object]:
     if len(members) < len(pairs):
         keys = [key for key, _ in pairs]
         duplicate = next(key for i, key in enumerate(keys) if key in keys[:i])
-        raise _RefusedError(
+        raise _RejectedError(
             f"the key '{_short(duplicate)}' occurs twice in one object",
             json.dumps(duplicate),
             "every key once",
@@ -247,20 +247,20 @@ def _unique_members(pairs: list[tuple[str, object]]) -> dict[str, object]:
     return members
 
 
-def _refuse_constant(word: str) -> object:
-    raise _RefusedError(f"{word} is not a JSON number", word, "finite numbers")
+def _reject_constant(word: str) -> object:
+    raise _RejectedError(f"{word} is not a JSON number", word, "finite numbers")
 
 
-def _finite(text: str) -> float:
+def _finite_number(text: str) -> float:
     value = float(text)
     if math.isinf(value):
-        raise _RefusedError(f"the number {_short(text)} is too large", text, "magnitudes below 1.8e308")
+        raise _RejectedError(f"the number {_short(text)} is too large", text, "magnitudes below 1.8e308")
     return value
 
 
 def _bounded_integer(text: str) -> int:
     if len(text) > MAX_INTEGER_DIGITS + 1:
-        raise _RefusedError(
+        raise _RejectedError(
             f"the integer {_short(text)} is too long", text, f"at most {MAX_INTEGER_DIGITS} digits"
         )
     return int(text)
@@ -269,7 +269,7 @@ def _bounded_integer(text: str) -> int:
 _TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"?|[\[\]{}:,]|\n|[^\s\[\]{}:,"]+', re.DOTALL)
 
 
-def _check_depth(document: Document, deepest: int) -> None:
+def _check_depth(document: Document, max_depth: int) -> None:
     """Check the depth before parsing, because Python's parser is recursive."""
     depth, line = 0, 1
     for match in _TOKEN.finditer(document.text):
@@ -277,11 +277,11 @@ def _check_depth(document: Document, deepest: int) -> None:
         line += token.count("\n")
         if token in "[{":
             depth += 1
-            if depth > deepest:
+            if depth > max_depth:
                 raise FormatError(
                     "objects and arrays are nested too deeply",
                     where=f"{document.name}:{line}",
-                    allowed=f"{deepest} levels",
+                    allowed=f"{max_depth} levels",
                     fix="reduce the nesting",
                 )
         elif token in "]}":
@@ -307,14 +307,14 @@ def _check_text(root: Node) -> None:
                 )
 
 
-def _line_with(text: str, needle: str) -> int:
+def _line_with(text: str, token_text: str) -> int:
     """The line of the last occurrence of a text; for a duplicate key this is usually the second key."""
-    return text.count("\n", 0, max(text.rfind(needle), 0)) + 1
+    return text.count("\n", 0, max(text.rfind(token_text), 0)) + 1
 
 
 @dataclass
 class _Level:
-    """An open object or array during the search; ``step`` is the key or index of its present value."""
+    """An open object or array during the search; ``step`` is the key or index of its current value."""
 
     bracket: str
     step: str | int | None
@@ -350,5 +350,5 @@ def _short(text: str) -> str:
 
 
 def _nearest(word: str, known: list[str]) -> str:
-    near = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
-    return f"did you mean '{near[0]}'?" if near else "remove it"
+    matches = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
+    return f"did you mean '{matches[0]}'?" if matches else "remove it"

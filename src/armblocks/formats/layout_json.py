@@ -1,7 +1,7 @@
-"""The layout of a diagram as JSON: positions of blocks, routes of connections, and notes.
+"""The layout of a diagram as JSON: positions of blocks, routes of connections, notes, and bookmarks.
 
 The key of an entry is the name of the block, the text of the connection, or for notes a name that begins with
-``/``. Entries of other programs are preserved among the extras.
+``/``. Entries of other programs are preserved among the extras. Bookmarks are a separate object.
 """
 
 from __future__ import annotations
@@ -14,25 +14,38 @@ from armblocks.diagram import (
     BLOCK_COLOURS,
     NAME_SIDES,
     ROTATIONS,
+    Bookmark,
     Connection,
     Diagram,
     Note,
     Placement,
     PortRef,
 )
-from armblocks.formats.json_document import Node
+from armblocks.formats.json_document import Node, closed_members
 from armblocks.formats.unknown_members import Extras, members_of, split_extras
 
+_BOOKMARK = tuple(field.name for field in dataclasses.fields(Bookmark))
 _PLACEMENT = {field.name: field.default for field in dataclasses.fields(Placement)}
 _CONNECTION = re.compile(r"([^/]+)/([^/]+?) -> ([^/]+)/([^/]+)")
 
 
-def connection_from(node: Node) -> tuple[PortRef, PortRef]:
+def connection_from_json(node: Node) -> tuple[PortRef, PortRef]:
     """The two ends of a connection from its text."""
     match = _CONNECTION.fullmatch(node.text())
     if match is None:
         raise node.error(f"'{node.text()[:80]}' is not a connection", allowed='"block/output -> block/input"')
     return PortRef(match[1], match[2]), PortRef(match[3], match[4])
+
+
+def bookmark_from_json(node: Node) -> Bookmark:
+    """The part of the sheet of a bookmark; raises ``FormatError`` and ``DiagramError``."""
+    members = closed_members(node, _BOOKMARK, _BOOKMARK)
+    return Bookmark(**{name: member.number() for name, member in members.items()})
+
+
+def bookmarks_to_json(diagram: Diagram) -> dict[str, object]:
+    """The bookmarks of a diagram as plain values."""
+    return {name: dataclasses.asdict(part) for name, part in diagram.bookmarks.items()}
 
 
 class Layout:
@@ -46,14 +59,14 @@ class Layout:
     def read(self, key: str, node: Node, blocks: set[str], extras: Extras) -> None:
         """Add one entry. An entry that is not a block, wire or note belongs to another program and is
         preserved."""
-        stated = _members_if_any(node)
+        entry_members = _members_or_empty(node)
         if key in blocks:
             self.placements[key] = _placement(key, node, extras)
-        elif "bends" in stated and (match := _CONNECTION.fullmatch(key)):
+        elif "bends" in entry_members and (match := _CONNECTION.fullmatch(key)):
             members = split_extras(node, ("bends",), extras, "layout", key)
             wire = Connection(PortRef(match[1], match[2]), PortRef(match[3], match[4]))
             self.bends[wire] = [entry.number() for entry in members["bends"].elements()]
-        elif key.startswith("/") and {"x", "y", "text"} <= stated.keys():
+        elif key.startswith("/") and {"x", "y", "text"} <= entry_members.keys():
             members = split_extras(node, ("x", "y", "text"), extras, "layout", key)
             x, y = members["x"].number(), members["y"].number()
             self.notes[key] = Note(x=x, y=y, text=members["text"].text())
@@ -61,16 +74,16 @@ class Layout:
             extras.setdefault("layout", {})[key] = node.value
 
 
-def layout_to(diagram: Diagram, extras: Mapping[str, object]) -> dict[str, object]:
+def layout_to_json(diagram: Diagram, extras: Mapping[str, object]) -> dict[str, object]:
     """The layout of a diagram as plain values; ``extras`` are the unknown members of its entries."""
     layout = dict(extras)
     for key, placement in diagram.layout.items():
-        stated = {
+        entry_members = {
             name: value
             for name, default in _PLACEMENT.items()
             if (value := getattr(placement, name)) != default
         }
-        layout[key] = {**members_of(extras.get(key)), **stated}
+        layout[key] = {**members_of(extras.get(key)), **entry_members}
     for wire, bends in diagram.bends.items():
         layout[str(wire)] = {**members_of(extras.get(str(wire))), "bends": list(bends)}
     for key, note in diagram.notes.items():
@@ -107,6 +120,6 @@ def _choice(node: Node | None, subject: str, default: str, choices: tuple[str, .
     return node.text()
 
 
-def _members_if_any(node: Node) -> Mapping[str, Node]:
+def _members_or_empty(node: Node) -> Mapping[str, Node]:
     value: object = node.value
     return node.members() if isinstance(value, dict) else {}

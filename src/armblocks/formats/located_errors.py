@@ -16,21 +16,27 @@ def located(node: Node) -> Generator[None]:
         yield
     except AlgebraicLoopError as error:
         raise AlgebraicLoopError(
-            error.loop, where=_joined(node, error), why=error.why, allowed=error.allowed, fix=error.fix
+            error.loop,
+            where=_combined_location(node, error),
+            why=error.why,
+            allowed=error.allowed,
+            fix=error.fix,
         ) from error
     except UnknownNameError as error:
-        raise UnknownNameError(error.kind, error.name, error.known, where=_joined(node, error)) from error
+        raise UnknownNameError(
+            error.kind, error.name, error.known, where=_combined_location(node, error)
+        ) from error
     except DiagramError as error:
         raise DiagramError(
-            error.what, where=_joined(node, error), allowed=error.allowed, fix=error.fix
+            error.what, where=_combined_location(node, error), allowed=error.allowed, fix=error.fix
         ) from error
     except ArmblocksError as error:
         raise FormatError(
-            error.what, where=_joined(node, error), allowed=error.allowed, fix=error.fix
+            error.what, where=_combined_location(node, error), allowed=error.allowed, fix=error.fix
         ) from error
 
 
-def _joined(node: Node, error: ArmblocksError) -> str:
+def _combined_location(node: Node, error: ArmblocksError) -> str:
     if error.where.startswith(node.where):  # an inner node has added its position
         return error.where
     return f"{node.where}: {error.where}" if error.where else node.where

@@ -15,20 +15,20 @@ _TEXTS = ("doc", "unit")
 _BOUNDS = ("minimum", "above", "maximum")
 _OPTIONS = (*_TEXTS, *_BOUNDS, "choices", "dimensions")
 _KEYS = ("name", "kind", "default", *_OPTIONS)
-_PLAIN = Parameter(name="", kind=ParameterKind.NUMBER, doc="", default=0.0)
+_DEFAULTS = Parameter(name="", kind=ParameterKind.NUMBER, doc="", default=0.0)
 """A parameter with only the required fields; the others have their defaults."""
 
 WriteValue = Callable[[Parameter, object], object]
 ReadValue = Callable[[Parameter, Node], object]
 
 
-def mask_parameter_to(rule: Parameter, write: WriteValue) -> dict[str, object]:
+def mask_parameter_to_json(rule: Parameter, write: WriteValue) -> dict[str, object]:
     """A parameter as plain values, without fields that have their defaults."""
-    options = {key: value for key in _OPTIONS if (value := getattr(rule, key)) != getattr(_PLAIN, key)}
+    options = {key: value for key in _OPTIONS if (value := getattr(rule, key)) != getattr(_DEFAULTS, key)}
     return {"name": rule.name, "kind": rule.kind.value, "default": write(rule, rule.default), **options}
 
 
-def mask_parameter_from(node: Node, read: ReadValue) -> Parameter:
+def mask_parameter_from_json(node: Node, read: ReadValue) -> Parameter:
     """The parameter declared by an object. Raises ``FormatError`` and ``InputError``."""
     members = closed_members(node, _KEYS, required=("name", "kind", "default"))
     kind = ParameterKind(members["kind"].choice([kind.value for kind in ParameterKind]))

@@ -37,26 +37,26 @@ def read_script(
     powers of the gear ratio; :class:`armblocks.robot.FrictionModel` lists them. The sign of gravity is
     reversed, because the toolbox's vector points up. Links are named ``link1``, ``link2`` …
 
-    Raises ``FormatError`` with file, line and text at the first invalid or unsupported line. Warns if lines
-    that a printed page had broken were joined.
+    Raises ``FormatError`` with file, line and text at the first invalid or unsupported line. Issues a
+    warning for lines that a printed page splits, which are joined.
     """
     # Imported here: these modules would double the time to load a shipped robot, which needs no script.
     from armblocks.formats.matlab.interpreter import Interpreter
     from armblocks.formats.matlab.page_layout import without_page_breaks
     from armblocks.formats.matlab.records import RobotRecord
-    from armblocks.formats.matlab.robot_records import finished_robot
+    from armblocks.formats.matlab.robot_records import robot_from_record
     from armblocks.formats.matlab.script_text import decode
     from armblocks.matlab.statements import parse_script
 
-    source, uncommented = without_page_breaks(decode(data, name))
+    source, restored_lines = without_page_breaks(decode(data, name))
     statements = parse_script(source)
     interpreter = Interpreter(source)
     interpreter.run(statements)
-    if broken := sorted({*uncommented, *interpreter.joined_lines}):
+    if joined_lines := sorted({*restored_lines, *interpreter.joined_lines}):
         warnings.warn(
-            f"{name}: lines {', '.join(map(str, broken))} are broken as on a printed page and were joined "
-            "with the next line. MATLAB does not join them. Fix: check the robot's numbers, and write every "
-            "statement on one line.",
+            f"{name}: lines {', '.join(map(str, joined_lines))} are split as on a printed page and were "
+            "joined with the next line. MATLAB does not join them. Fix: check the robot's numbers, and write "
+            "every statement on one line.",
             ArmblocksWarning,
             stacklevel=2,
         )
@@ -64,7 +64,7 @@ def read_script(
     variables: dict[str, NDArray[np.float64] | str] = {}
     for variable, value in interpreter.variables.items():
         if isinstance(value, RobotRecord):
-            robot = finished_robot(value, friction_model)
+            robot = robot_from_record(value, friction_model)
             if robot not in robots.values():
                 robots[variable] = robot
         elif isinstance(value, np.ndarray | str):

@@ -18,8 +18,8 @@ _INFINITIES = {"inf": math.inf, "-inf": -math.inf}
 _NUMERIC = (ParameterKind.NUMBER, ParameterKind.ARRAY)
 
 
-def parameter_from(rule: Parameter, node: Node, robots: RobotReader) -> object:
-    """The checked value of one parameter; errors have its line."""
+def parameter_from_json(rule: Parameter, node: Node, robots: RobotReader) -> object:
+    """The checked value of one parameter; errors contain its line."""
     if rule.kind is ParameterKind.ROBOT:
         return robots.robot(node)
     if rule.kind is ParameterKind.FUNCTION:
@@ -30,7 +30,7 @@ def parameter_from(rule: Parameter, node: Node, robots: RobotReader) -> object:
         return rule.check(with_infinities(rule, node.value), "")
 
 
-def parameter_to(rule: Parameter, value: object, robots: RobotWriter) -> object:
+def parameter_to_json(rule: Parameter, value: object, robots: RobotWriter) -> object:
     """The value of one parameter as a plain value. Raises ``FormatError`` if a file cannot represent it."""
     if isinstance(value, Robot):
         return robots.reference(value)
@@ -38,11 +38,11 @@ def parameter_to(rule: Parameter, value: object, robots: RobotWriter) -> object:
         return "" if value == rule.check(rule.default, "") else robots.function_reference(value)
     if isinstance(value, TimeTable):
         return robots.table_reference(value)
-    return _with_texts_for_infinities(value) if rule.kind in _NUMERIC else value
+    return _infinities_as_text(value) if rule.kind in _NUMERIC else value
 
 
 def plain_value(node: Node) -> object:
-    """A number, truth value, text, or nested arrays of them, whose rule is not known."""
+    """A number, boolean, text or nested array of them, of a parameter without a rule."""
     if isinstance(node.value, list):
         return tuple(plain_value(element) for element in node.elements())
     if not isinstance(node.value, bool | int | float | str):
@@ -51,13 +51,13 @@ def plain_value(node: Node) -> object:
 
 
 def with_infinities(rule: Parameter, value: object) -> object:
-    """The value with infinite numbers for their texts, if the parameter is a number or an array."""
+    """The value with infinities in place of ``"inf"`` and ``"-inf"``, for numbers and arrays."""
     return _with_infinities(value) if rule.kind in _NUMERIC else value
 
 
 def plain_parameter(value: object) -> object:
     """The JSON form of a number, an array or a text."""
-    return _with_texts_for_infinities(value)
+    return _infinities_as_text(value)
 
 
 def is_diagram(rule: Parameter) -> bool:
@@ -71,9 +71,9 @@ def _with_infinities(value: object) -> object:
     return _INFINITIES.get(value, value) if isinstance(value, str) else value
 
 
-def _with_texts_for_infinities(value: object) -> object:
+def _infinities_as_text(value: object) -> object:
     if isinstance(value, tuple):
-        return [_with_texts_for_infinities(entry) for entry in cast("tuple[object, ...]", value)]
+        return [_infinities_as_text(entry) for entry in cast("tuple[object, ...]", value)]
     if isinstance(value, float) and math.isinf(value):
         return "inf" if value > 0 else "-inf"
     return value

@@ -10,27 +10,62 @@ from pathlib import Path
 
 from armblocks.errors import FormatError, UnknownNameError, check_type
 from armblocks.files import read_bounded
+from armblocks.formats.file_findings import FileContext, warn_of_findings
 from armblocks.formats.robot_format import RobotFormat
 from armblocks.formats.robot_formats import ROBOT_FORMATS, ROBOT_SUFFIXES
+from armblocks.formats.robot_json import write_robot
 from armblocks.formats.shipped import ROBOT_FILE, list_robots, shipped_folder
-from armblocks.robot import FrictionModel, Robot, warn_of_implausible_values, warn_of_inertias
+from armblocks.robot import FrictionModel, Robot, warn_of_implausible_values, warn_of_inertias, with_tip
 
 
 def load_robot(
-    name_or_path: str | PathLike[str], *, name: str | None = None, friction_model: FrictionModel | None = None
+    name_or_path: str | PathLike[str],
+    *,
+    name: str | None = None,
+    friction_model: FrictionModel | None = None,
+    tip: str | None = None,
+    packages: Mapping[str, str | PathLike[str]] | None = None,
+    arguments: Mapping[str, object] | None = None,
 ) -> Robot:
     """A shipped robot by its name, ``"kr180"``, or a robot file by its path.
 
     A text with a path separator or with the suffix of a robot format is a path, any other text is a name.
     ``name`` selects one of several robots of a script, by the script's variable or by the robot's name.
-    ``friction_model`` replaces that of the file; scripts have none and get that of releases 9.5 to 10. The
-    robot's ``source`` is the shipped name or the path.
+    ``friction_model`` replaces that of the file; scripts have none and get that of releases 9.5 to 10.
+    ``tip`` names the link that carries the tool, see :func:`armblocks.robot.with_tip`; by default that of the
+    file, in a URDF file the end of the chain with the most joints. ``packages`` maps names of ROS packages
+    to their folders; others are searched for in the folders above the file. ``arguments`` are the values of
+    the arguments of a xacro file. The robot's ``source`` is the shipped name or the path.
 
-    Raises ``UnknownNameError`` for a name that is not shipped and for a ``name`` that is not in the file,
-    ``FormatError`` for a file that is missing, has no known format or cannot be read. Issues warnings for
-    physically impossible inertias (``InertiaWarning``) and for numbers with a probably wrong unit or sign in
-    a file of the user. For shipped robots, ``armblocks show`` prints them.
+    Raises ``UnknownNameError`` for a name that is not shipped and for a ``name`` or ``tip`` that is not in
+    the file, ``FormatError`` for a file that is missing, has no known format or cannot be read. Issues
+    warnings for physically impossible inertias (``InertiaWarning``), for numbers with a probably wrong unit
+    or sign and for parts of the file that are not read. For shipped robots, ``armblocks show`` prints them.
     """
+    context = file_context(packages, arguments)
+    robot = load_robot_in(name_or_path, context, name=name)
+    if _is_file(name_or_path):
+        warn_of_findings(context.findings)
+        warn_of_inertias(robot)
+        warn_of_implausible_values(robot)
+    robot = robot if tip is None else with_tip(robot, tip)
+    return robot if friction_model is None else robot.with_friction_model(friction_model)
+
+
+def file_context(
+    packages: Mapping[str, str | PathLike[str]] | None, arguments: Mapping[str, object] | None
+) -> FileContext:
+    """The context for reading a file anywhere, with the arguments of :func:`load_robot`."""
+    return FileContext(
+        packages={key: Path(folder) for key, folder in (packages or {}).items()},
+        arguments={key: str(value) for key, value in (arguments or {}).items()},
+    )
+
+
+def load_robot_in(
+    name_or_path: str | PathLike[str], context: FileContext, *, name: str | None = None
+) -> Robot:
+    """The robot of :func:`load_robot`; findings are added to the context, and no warnings are issued."""
     check_type(
         name_or_path,
         (str, PathLike),
@@ -38,27 +73,26 @@ def load_robot(
         where="load_robot",
     )
     text = fspath(name_or_path)
-    if not isinstance(name_or_path, str) or is_path(text):
-        robot = _pick(_read_file(Path(text)), text, name)
-        robot = replace(robot, source=text)
-        warn_of_inertias(robot)
-        warn_of_implausible_values(robot)
-    else:
-        robot = shipped_robot(text)
-        if name is not None:
-            robot = _pick({text: robot}, text, name)
-    return robot if friction_model is None else robot.with_friction_model(friction_model)
+    if _is_file(name_or_path):
+        robot = _selected_robot(_read_file(Path(text), context), text, name)
+        return replace(robot, source=text)
+    robot = shipped_robot(text)
+    return robot if name is None else _selected_robot({text: robot}, text, name)
 
 
 @cache
 def shipped_robot(name: str) -> Robot:
-    """A shipped robot by its name; raises ``UnknownNameError`` with the nearest."""
+    """A shipped robot by its name; raises ``UnknownNameError`` with the nearest name."""
     known = list_robots()
     if name not in known:
         raise UnknownNameError("shipped robot", name, known)
     path = shipped_folder("robots") / name / ROBOT_FILE
-    (robot,) = _read_file(path).values()
+    (robot,) = _read_file(path, FileContext()).values()
     return replace(robot, source=name)
+
+
+def _is_file(name_or_path: str | PathLike[str]) -> bool:
+    return not isinstance(name_or_path, str) or is_path(name_or_path)
 
 
 def is_path(name_or_path: str) -> bool:
@@ -66,7 +100,7 @@ def is_path(name_or_path: str) -> bool:
     return "/" in name_or_path or "\\" in name_or_path or name_or_path.lower().endswith(ROBOT_SUFFIXES)
 
 
-def _read_file(path: Path) -> Mapping[str, Robot]:
+def _read_file(path: Path, context: FileContext) -> Mapping[str, Robot]:
     if path.is_dir():
         raise FormatError(
             "this is a folder",
@@ -75,23 +109,40 @@ def _read_file(path: Path) -> Mapping[str, Robot]:
             fix=f"give the path of a file in it, such as {path.name}/{ROBOT_FILE}",
         )
     format = _format(str(path))
-    return format.read(read_bounded(path, format.most_bytes), str(path))
+    data = read_bounded(path, format.max_bytes)
+    return format.robots(data, str(path), replace(context, folder=path.absolute().parent))
 
 
-def read_robots(data: bytes, name: str) -> Mapping[str, Robot]:
+def read_robots(data: bytes, name: str, context: FileContext | None = None) -> Mapping[str, Robot]:
     """The robots of a file's bytes, by their names in the file.
 
-    ``name`` is the name of the file in messages; its suffix determines the format. Raises ``FormatError``.
+    ``name`` is the name of the file in messages; its suffix determines the format. ``context``: the files
+    that it may refer to; by default none. Raises ``FormatError``, and issues warnings for what is not read.
     """
     format = _format(name)
-    if len(data) > format.most_bytes:
+    if len(data) > format.max_bytes:
         raise FormatError(
-            f"it has {len(data)} bytes",
+            f"the file has {len(data)} bytes",
             where=name,
-            allowed=f"at most {format.most_bytes}",
+            allowed=f"at most {format.max_bytes}",
             fix="split the file, or write the robot as JSON",
         )
-    return format.read(data, name)
+    context = context or FileContext()
+    robots = format.robots(data, name, context)
+    warn_of_findings(context.findings)
+    return robots
+
+
+def robot_bytes(robot: Robot, name: str) -> bytes:
+    """The content of a file with this name: URDF for ``.urdf``, else the canonical JSON document.
+
+    Raises ``FormatError`` for robots that the format cannot describe.
+    """
+    suffix = Path(name).suffix.lower()
+    for format in ROBOT_FORMATS:
+        if suffix in format.suffixes and format.write is not None:
+            return format.write(robot)
+    return write_robot(robot)
 
 
 def _format(name: str) -> RobotFormat:
@@ -107,7 +158,7 @@ def _format(name: str) -> RobotFormat:
     )
 
 
-def _pick(robots: Mapping[str, Robot], where: str, name: str | None) -> Robot:
+def _selected_robot(robots: Mapping[str, Robot], where: str, name: str | None) -> Robot:
     """The selected robot of a file."""
     if not robots:
         raise FormatError(
@@ -128,6 +179,6 @@ def _pick(robots: Mapping[str, Robot], where: str, name: str | None) -> Robot:
             f"the file defines {len(robots)} robots",
             where=where,
             allowed=", ".join(robots),
-            fix="say which: name=…",
+            fix="select one with name=…",
         )
     return next(iter(robots.values()))

@@ -7,19 +7,37 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from armblocks.formats.file_findings import FileContext
     from armblocks.robot import Robot
+
+Read = Callable[[bytes, str], "Mapping[str, Robot]"]
+Write = Callable[["Robot"], bytes]
+ReadInContext = Callable[[bytes, str, "FileContext"], "Mapping[str, Robot]"]
+
+
+def _no_reader(data: bytes, name: str) -> Mapping[str, Robot]:
+    raise NotImplementedError
 
 
 @dataclass(frozen=True, kw_only=True)
 class RobotFormat:
     """One file format of robots.
 
-    ``suffixes``: in lower case with the dot. ``most_bytes``: the maximum size of a file. ``read``: a function
+    ``suffixes``: in lower case with the dot. ``max_bytes``: the maximum size of a file. ``read``: a function
     of a file's bytes and its name for messages, which returns the robots by their names in the file and
-    raises ``FormatError``.
+    raises ``FormatError``. A format whose files refer to other files, or that reports findings, has
+    ``read_in_context`` instead, with a :class:`FileContext` as third argument.
     """
 
     name: str
     suffixes: tuple[str, ...]
-    most_bytes: int
-    read: Callable[[bytes, str], Mapping[str, Robot]]
+    max_bytes: int
+    read: Read = _no_reader
+    read_in_context: ReadInContext | None = None
+    write: Write | None = None
+
+    def robots(self, data: bytes, name: str, context: FileContext) -> Mapping[str, Robot]:
+        """The robots of a file's bytes, by their names in the file; findings are added to the context."""
+        if self.read_in_context is not None:
+            return self.read_in_context(data, name, context)
+        return self.read(data, name)

@@ -1,9 +1,9 @@
 """Robots as canonical JSON, ``robot.json``: every field of a ``Robot``, in SI units.
 
-Angles may be written ``"90 deg"`` and angular speeds ``"105 deg/s"``; they are written in degrees if these
-have few digits and read back exactly. A link with a ``dh`` row takes its joint and transforms from it.
-Unknown keys are errors that suggest the nearest known key, because ignoring a misspelt key would give a wrong
-robot. ``notes`` is a comment and not preserved.
+Angles may be texts such as ``"90 deg"``, and angular speeds such as ``"105 deg/s"``. The writer uses degrees
+where they have few digits and read back exactly. A link with a ``dh`` row takes its joint and transforms from
+it. Unknown keys are errors that suggest the nearest known key, because ignoring a misspelt key would give a
+wrong robot. ``notes`` is a comment and not preserved.
 
 The JSON Schema is ``formats/schema/robot.schema.json``.
 """
@@ -17,7 +17,7 @@ from typing import cast
 from armblocks.errors import ArmblocksError, FormatError, RobotError
 from armblocks.formats.canonical_json import canonical_bytes
 from armblocks.formats.json_document import Node, closed_members, read_document
-from armblocks.formats.shapes_json import shape_from, shape_to
+from armblocks.formats.shapes_json import shape_from_json, shape_to_json
 from armblocks.robot import (
     JOINT_TYPES,
     DhConvention,
@@ -58,10 +58,10 @@ _JOINTS = {kind.__name__.lower(): kind for kind in JOINT_TYPES}
 
 def read_robot(data: bytes, name: str) -> Robot:
     """The robot of a JSON document. Raises ``FormatError`` with file, line and path."""
-    return robot_from(read_document(data, name, MAX_BYTES))
+    return robot_from_json(read_document(data, name, MAX_BYTES))
 
 
-def robot_from(node: Node) -> Robot:
+def robot_from_json(node: Node) -> Robot:
     """The robot that a JSON object describes."""
     members = closed_members(node, _ROBOT_KEYS, required=("format", "name", "links"))
     if members["format"].value != FORMAT_VERSION or isinstance(members["format"].value, bool):
@@ -77,16 +77,16 @@ def robot_from(node: Node) -> Robot:
     model = FrictionModel.SQUARED_GEAR
     if "friction_model" in members:
         model = FrictionModel(members["friction_model"].choice([model.value for model in FrictionModel]))
-    links = tuple(_link(member) for member in members["links"].elements())
+    links = tuple(_link_from_json(member) for member in members["links"].elements())
     try:
         return Robot(
             name=texts["name"],
             manufacturer=texts["manufacturer"],
             comment=texts["comment"],
             links=links,
-            base=_transform(members["base"]) if "base" in members else Transform(),
-            tool=_transform(members["tool"]) if "tool" in members else Transform(),
-            gravity=_vector(members["gravity"]) if "gravity" in members else STANDARD_GRAVITY,
+            base=_transform_from_json(members["base"]) if "base" in members else Transform(),
+            tool=_transform_from_json(members["tool"]) if "tool" in members else Transform(),
+            gravity=_vector_from_json(members["gravity"]) if "gravity" in members else STANDARD_GRAVITY,
             friction_model=model,
         )
     except RobotError as error:
@@ -97,31 +97,31 @@ def robot_from(node: Node) -> Robot:
 
 def write_robot(robot: Robot) -> bytes:
     """The canonical document of a robot. Reading it gives an equal robot."""
-    return canonical_bytes(robot_to(robot), one_line=lambda path: path[-1:] == ("position",))
+    return canonical_bytes(robot_to_json(robot), one_line=lambda path: path[-1:] == ("position",))
 
 
-def robot_to(robot: Robot) -> dict[str, object]:
+def robot_to_json(robot: Robot) -> dict[str, object]:
     """The JSON object that describes a robot, without empty members and identity transforms."""
     document: dict[str, object] = {
         "format": FORMAT_VERSION,
         "name": robot.name,
         "gravity": robot.gravity,
         "friction_model": robot.friction_model.value,
-        "links": [_link_to(link) for link in robot.links],
+        "links": [_link_to_json(link) for link in robot.links],
     }
     for key in ("manufacturer", "comment"):
         if getattr(robot, key):
             document[key] = getattr(robot, key)
     for key in ("base", "tool"):
         if not getattr(robot, key).is_identity:
-            document[key] = _transform_to(getattr(robot, key))
+            document[key] = _transform_to_json(getattr(robot, key))
     return {key: _without_signed_zeros(value) for key, value in document.items()}
 
 
 # -- reading -----------------------------------------------------------------------------------------------
 
 
-def _link(node: Node) -> Link:
+def _link_from_json(node: Node) -> Link:
     members = closed_members(node, _LINK_KEYS, required=("name",))
     if "dh" in members and (both := {"joint", "before", "after"} & set(members)):
         raise node.error(
@@ -132,17 +132,17 @@ def _link(node: Node) -> Link:
     name = members["name"].text()
     parent = members["parent"].text() if "parent" in members and members["parent"].value is not None else None
     geometry = (
-        tuple(shape_from(shape) for shape in members["geometry"].elements())
+        tuple(shape_from_json(shape) for shape in members["geometry"].elements())
         if "geometry" in members
         else None
     )
     mass = members["mass"].number() if "mass" in members else 0.0
-    centre = _vector(members["centre_of_mass"]) if "centre_of_mass" in members else (0.0, 0.0, 0.0)
-    inertia = _inertia(members["inertia"]) if "inertia" in members else (0.0,) * 6
-    motor = _motor(members["motor"]) if "motor" in members else None
+    centre = _vector_from_json(members["centre_of_mass"]) if "centre_of_mass" in members else (0.0, 0.0, 0.0)
+    inertia = _inertia_from_json(members["inertia"]) if "inertia" in members else (0.0,) * 6
+    motor = _motor_from_json(members["motor"]) if "motor" in members else None
     if "dh" in members:
-        dh = _dh(members["dh"])
-        limits = _limits(members["limits"], angular=not dh.sigma) if "limits" in members else None
+        dh = _dh_from_json(members["dh"])
+        limits = _limits_from_json(members["limits"], angular=not dh.sigma) if "limits" in members else None
         return link_from_dh(
             name,
             dh,
@@ -157,9 +157,9 @@ def _link(node: Node) -> Link:
     return Link(
         name=name,
         parent=parent,
-        joint=_joint(members.get("joint"), members.get("limits")),
-        before=_transform(members["before"]) if "before" in members else Transform(),
-        after=_transform(members["after"]) if "after" in members else Transform(),
+        joint=_joint_from_json(members.get("joint"), members.get("limits")),
+        before=_transform_from_json(members["before"]) if "before" in members else Transform(),
+        after=_transform_from_json(members["after"]) if "after" in members else Transform(),
         mass=mass,
         centre_of_mass=centre,
         inertia=_symmetric(inertia),
@@ -173,25 +173,25 @@ def _symmetric(six: tuple[float, ...]) -> Matrix3:
     return (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
 
 
-def _dh(node: Node) -> DhRow:
+def _dh_from_json(node: Node) -> DhRow:
     members = closed_members(
         node, ("convention", "joint", "alpha", "a", "d", "theta", "offset"), ("convention",)
     )
-    sliding = "joint" in members and members["joint"].choice(("revolute", "prismatic")) == "prismatic"
+    is_prismatic = "joint" in members and members["joint"].choice(("revolute", "prismatic")) == "prismatic"
     word = members["convention"].choice([convention.value for convention in DhConvention])
     offset = members.get("offset")
     return DhRow(
         convention=DhConvention(word),
-        sigma=int(sliding),
-        alpha=_angle(members["alpha"]) if "alpha" in members else 0.0,
-        theta=_angle(members["theta"]) if "theta" in members else 0.0,
+        sigma=int(is_prismatic),
+        alpha=_angle_from_json(members["alpha"]) if "alpha" in members else 0.0,
+        theta=_angle_from_json(members["theta"]) if "theta" in members else 0.0,
         a=members["a"].number() if "a" in members else 0.0,
         d=members["d"].number() if "d" in members else 0.0,
-        offset=0.0 if offset is None else offset.number() if sliding else _angle(offset),
+        offset=0.0 if offset is None else offset.number() if is_prismatic else _angle_from_json(offset),
     )
 
 
-def _joint(node: Node | None, limits: Node | None) -> Joint:
+def _joint_from_json(node: Node | None, limits: Node | None) -> Joint:
     if node is None:
         kind, members = _JOINTS["revolute"], dict[str, Node]()
     else:
@@ -200,13 +200,13 @@ def _joint(node: Node | None, limits: Node | None) -> Joint:
     angular = kind.unit != Prismatic.unit
     offset = members.get("offset")
     return kind(
-        axis=_vector(members["axis"]) if "axis" in members else (0.0, 0.0, 1.0),
-        offset=0.0 if offset is None else _angle(offset) if angular else offset.number(),
-        limits=_limits(limits, angular=angular) if limits is not None else JointLimits(),
+        axis=_vector_from_json(members["axis"]) if "axis" in members else (0.0, 0.0, 1.0),
+        offset=0.0 if offset is None else _angle_from_json(offset) if angular else offset.number(),
+        limits=_limits_from_json(limits, angular=angular) if limits is not None else JointLimits(),
     )
 
 
-def _limits(node: Node, *, angular: bool) -> JointLimits:
+def _limits_from_json(node: Node, *, angular: bool) -> JointLimits:
     members = closed_members(node, ("position", "speed", "torque"))
     position: tuple[float, float] | None = None
     if "position" in members:
@@ -215,17 +215,21 @@ def _limits(node: Node, *, angular: bool) -> JointLimits:
             raise members["position"].error(
                 f"{len(ends)} limits are given", allowed="the lowest and the highest"
             )
-        low, high = (_angle(end) if angular else end.number() for end in ends)
+        low, high = (_angle_from_json(end) if angular else end.number() for end in ends)
         position = (low, high)
     speed = members.get("speed")
     return JointLimits(
         position=position,
-        speed=None if speed is None else _angle(speed, per_second=True) if angular else speed.number(),
+        speed=None
+        if speed is None
+        else _angle_from_json(speed, per_second=True)
+        if angular
+        else speed.number(),
         torque=members["torque"].number() if "torque" in members else None,
     )
 
 
-def _motor(node: Node) -> Motor:
+def _motor_from_json(node: Node) -> Motor:
     members = closed_members(node, ("inertia", "gear_ratio", "viscous_friction", "coulomb_friction"))
     numbers = {
         key: members[key].number() for key in ("inertia", "gear_ratio", "viscous_friction") if key in members
@@ -234,17 +238,17 @@ def _motor(node: Node) -> Motor:
     return Motor(coulomb_friction=(plus, minus), **numbers)
 
 
-def _inertia(node: Node) -> tuple[float, ...]:
+def _inertia_from_json(node: Node) -> tuple[float, ...]:
     members = closed_members(node, _INERTIA_KEYS)
     return tuple(members[key].number() if key in members else 0.0 for key in _INERTIA_KEYS)
 
 
-def _vector(node: Node) -> Vector3:
+def _vector_from_json(node: Node) -> Vector3:
     x, y, z = node.numbers(3)
     return x, y, z
 
 
-def _transform(node: Node) -> Transform:
+def _transform_from_json(node: Node) -> Transform:
     members = closed_members(node, ("rotation", "translation"))
     identity = Transform()
     rotation: Matrix3 = identity.rotation
@@ -252,16 +256,18 @@ def _transform(node: Node) -> Transform:
         rows = members["rotation"].elements()
         if len(rows) != 3:
             raise members["rotation"].error(f"{len(rows)} rows are given", allowed="3 rows of 3 numbers")
-        rotation = (_vector(rows[0]), _vector(rows[1]), _vector(rows[2]))
-    translation = _vector(members["translation"]) if "translation" in members else identity.translation
+        rotation = (_vector_from_json(rows[0]), _vector_from_json(rows[1]), _vector_from_json(rows[2]))
+    translation = (
+        _vector_from_json(members["translation"]) if "translation" in members else identity.translation
+    )
     try:
         return Transform(rotation=rotation, translation=translation)
     except ArmblocksError as error:
         raise node.error(error.what, allowed=error.allowed, fix=error.fix) from error
 
 
-def _angle(node: Node, *, per_second: bool = False) -> float:
-    """An angle in rad, or text in degrees; an angular speed likewise."""
+def _angle_from_json(node: Node, *, per_second: bool = False) -> float:
+    """An angle in rad or an angular speed in rad/s, from a number or from text in degrees."""
     if not isinstance(node.value, str):
         return node.number()
     match = _DEGREES.fullmatch(node.value)
@@ -276,22 +282,22 @@ def _angle(node: Node, *, per_second: bool = False) -> float:
 # -- writing -----------------------------------------------------------------------------------------------
 
 
-def _link_to(link: Link) -> dict[str, object]:
+def _link_to_json(link: Link) -> dict[str, object]:
     angular = link.joint.unit != Prismatic.unit
     entry: dict[str, object] = {"name": link.name, "parent": link.parent, "mass": link.mass}
     if link.dh is not None:
-        entry["dh"] = _dh_to(link.dh)
+        entry["dh"] = _dh_to_json(link.dh)
     else:
         entry["joint"] = {
             "type": type(link.joint).__name__.lower(),
             "axis": link.joint.axis,
-            "offset": _angle_to(link.joint.offset) if angular else link.joint.offset,
+            "offset": _angle_to_json(link.joint.offset) if angular else link.joint.offset,
         }
         for key in ("before", "after"):
             if not getattr(link, key).is_identity:
-                entry[key] = _transform_to(getattr(link, key))
+                entry[key] = _transform_to_json(getattr(link, key))
     if link.joint.limits != JointLimits():
-        entry["limits"] = _limits_to(link.joint.limits, angular=angular)
+        entry["limits"] = _limits_to_json(link.joint.limits, angular=angular)
     if any(link.centre_of_mass):
         entry["centre_of_mass"] = link.centre_of_mass
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = link.inertia
@@ -307,7 +313,7 @@ def _link_to(link: Link) -> dict[str, object]:
             "coulomb_friction": link.motor.coulomb_friction,
         }
     if link.geometry is not None:
-        entry["geometry"] = [shape_to(shape) for shape in link.geometry]
+        entry["geometry"] = [shape_to_json(shape) for shape in link.geometry]
     return entry
 
 
@@ -328,34 +334,34 @@ def _without_signed_zeros(value: object) -> object:
             return value
 
 
-def _dh_to(dh: DhRow) -> dict[str, object]:
+def _dh_to_json(dh: DhRow) -> dict[str, object]:
     return {
         "convention": dh.convention.value,
         "joint": "prismatic" if dh.sigma else "revolute",
-        "alpha": _angle_to(dh.alpha),
+        "alpha": _angle_to_json(dh.alpha),
         "a": dh.a,
         "d": dh.d,
-        "theta": _angle_to(dh.theta),
-        "offset": dh.offset if dh.sigma else _angle_to(dh.offset),
+        "theta": _angle_to_json(dh.theta),
+        "offset": dh.offset if dh.sigma else _angle_to_json(dh.offset),
     }
 
 
-def _limits_to(limits: JointLimits, *, angular: bool) -> dict[str, object]:
+def _limits_to_json(limits: JointLimits, *, angular: bool) -> dict[str, object]:
     entry: dict[str, object] = {}
     if limits.position is not None:
-        entry["position"] = [_angle_to(end) if angular else end for end in limits.position]
+        entry["position"] = [_angle_to_json(end) if angular else end for end in limits.position]
     if limits.speed is not None:
-        entry["speed"] = _angle_to(limits.speed, "deg/s") if angular else limits.speed
+        entry["speed"] = _angle_to_json(limits.speed, "deg/s") if angular else limits.speed
     if limits.torque is not None:
         entry["torque"] = limits.torque
     return entry
 
 
-def _transform_to(transform: Transform) -> dict[str, object]:
+def _transform_to_json(transform: Transform) -> dict[str, object]:
     return {"rotation": transform.rotation, "translation": transform.translation}
 
 
-def _angle_to(angle: float, unit: str = "deg") -> float | str:
+def _angle_to_json(angle: float, unit: str = "deg") -> float | str:
     """An angle as text in degrees if these have few digits and read back exactly, else in rad."""
     degrees = round(math.degrees(angle), 6)
     text = f"{degrees:.6f}".rstrip("0").rstrip(".")

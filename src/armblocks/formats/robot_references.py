@@ -9,9 +9,12 @@ several blocks is written once::
       "Pendulum": {"format": 1, "name": "Pendulum", "links": […]}
     }
 
-An entry is a whole robot document, or a variant. In a variant, ``robot`` is a shipped name or a path,
-``friction`` is ``"none"``, ``"viscous"`` (without Coulomb friction) or ``"coulomb"`` (without viscous
-friction), and ``friction_model`` is the name of the formula.
+An entry is a whole robot document, or a variant of another robot with the keys
+
+- ``robot``: a shipped name or a path,
+- ``friction``: ``"none"``, ``"viscous"`` (without Coulomb friction) or ``"coulomb"`` (without viscous
+  friction),
+- ``friction_model``: the name of the friction formula.
 
 A table of values over time is the reference to its file (:mod:`armblocks.formats.data_files`), or its rows. A
 Python function is ``file.py:name``; it is loaded only if the user trusts the diagram.
@@ -28,10 +31,10 @@ import numpy as np
 
 from armblocks.diagram import TimeTable, UserFunction
 from armblocks.errors import ArmblocksError, FormatError, UnknownNameError
-from armblocks.formats.data_files import DataFiles, FilesAnywhere, TableReference
+from armblocks.formats.data_files import DataFiles, TableReference, UnrestrictedFiles
 from armblocks.formats.json_document import Node, closed_members
 from armblocks.formats.robot_files import is_path, shipped_robot
-from armblocks.formats.robot_json import robot_from, robot_to
+from armblocks.formats.robot_json import robot_from_json, robot_to_json
 from armblocks.formats.shipped import list_robots
 from armblocks.formats.table_files import load_table
 from armblocks.robot import FrictionModel, Robot
@@ -42,7 +45,7 @@ ResolveRobot = Callable[[str], Robot]
 MAX_INLINE_NUMBERS = 10_000
 """Maximum size of a table whose numbers are written into the diagram file."""
 
-OWN = "#"
+TABLE_PREFIX = "#"
 """Prefix of the ``source`` of a robot from the diagram's table; its key in the table follows."""
 
 _FRICTION: dict[str, Callable[[Robot], Robot]] = {
@@ -62,20 +65,20 @@ class RobotReader:
         resolve_robot: ResolveRobot,
         data: DataFiles | None = None,
     ) -> None:
-        self._data = data or FilesAnywhere()
+        self._data = data or UnrestrictedFiles()
         self._folder = folder
         self._resolve_robot = resolve_robot
-        self._own: dict[str, Robot] = {}
+        self._table_robots: dict[str, Robot] = {}
         for key, node in ({} if table is None else table.members()).items():
-            self._own[key] = replace(self._entry(node), source=OWN + key)
+            self._table_robots[key] = replace(self._entry(node), source=TABLE_PREFIX + key)
 
     def robot(self, node: Node) -> Robot:
         """The robot of a block's parameter."""
         name = node.text()
-        return self._own[name] if name in self._own else self._resolved(node)
+        return self._table_robots[name] if name in self._table_robots else self._resolved(node)
 
     def table(self, node: Node) -> TimeTable:
-        """The table of a file beside the document."""
+        """The table of a file, whose path is relative to the folder of the document."""
         try:
             return self._data.table(_table_reference(node), self._folder)
         except ArmblocksError as error:
@@ -83,7 +86,7 @@ class RobotReader:
             raise node.error(problem, allowed=error.allowed, fix=error.fix) from error
 
     def function(self, node: Node) -> UserFunction:
-        """The Python function of a file beside the document, if code is trusted."""
+        """The Python function of a file in the folder of the document, if code is trusted."""
         try:
             return self._data.function(node.text(), self._folder)
         except ArmblocksError as error:
@@ -91,7 +94,7 @@ class RobotReader:
 
     def _entry(self, node: Node) -> Robot:
         if "robot" not in node.members():
-            return robot_from(node)
+            return robot_from_json(node)
         members = closed_members(node, ("robot", "friction", "friction_model"))
         robot = self._resolved(members["robot"])
         if "friction_model" in members:
@@ -108,7 +111,7 @@ class RobotReader:
                 return self._resolve_robot(str(self._folder / reference))
             return self._resolve_robot(reference)
         except UnknownNameError as error:
-            known = [*error.known, *self._own]
+            known = [*error.known, *self._table_robots]
             raise UnknownNameError(error.kind, error.name, known, where=node.where) from error
         except ArmblocksError as error:
             problem = f"{error.where}: {error.what}" if error.where else error.what
@@ -157,8 +160,8 @@ class RobotWriter:
             path = self._path(table.source)
             if not table.time and not table.columns:
                 return path
-            chosen = {"time": table.time, "columns": list(table.columns)}
-            return {"file": path, **{key: value for key, value in chosen.items() if value}}
+            column_selection = {"time": table.time, "columns": list(table.columns)}
+            return {"file": path, **{key: value for key, value in column_selection.items() if value}}
         rows = np.asarray(table)
         if rows.size > MAX_INLINE_NUMBERS:
             raise FormatError(
@@ -178,7 +181,9 @@ class RobotWriter:
 
     def _new_key(self, robot: Robot) -> str:
         """A unique key: the previous key of the robot or its name, changed if another robot has it."""
-        name = robot.source.removeprefix(OWN) if robot.source.startswith(OWN) else robot.name
+        name = (
+            robot.source.removeprefix(TABLE_PREFIX) if robot.source.startswith(TABLE_PREFIX) else robot.name
+        )
         used_keys = {*self.table, *list_robots()}
         stem = "robot" if is_path(name) or not name else name
         keys = (stem if number == 1 else f"{stem} {number}" for number in range(1, len(used_keys) + 2))
@@ -220,10 +225,10 @@ def shortest_reference(
             model["friction_model"] = robot.friction_model.value
         if modelled == robot:
             return {"robot": reference, **model} if model else reference
-        for word, without in _FRICTION.items():
-            if without(modelled) == robot:
+        for word, remove_friction in _FRICTION.items():
+            if remove_friction(modelled) == robot:
                 return {"robot": reference, "friction": word, **model}
-    return robot_to(robot)
+    return robot_to_json(robot)
 
 
 def _candidates(
@@ -247,7 +252,7 @@ def relative_to_folder(source: str, folder: Path | None) -> str:
     if folder is None:
         return Path(source).as_posix()
     try:
-        inside = Path(source).resolve().relative_to(folder.resolve()).as_posix()
+        relative_path = Path(source).resolve().relative_to(folder.resolve()).as_posix()
     except ValueError:
         return Path(source).resolve().as_posix()
-    return inside
+    return relative_path

@@ -1,4 +1,4 @@
-"""The solid shapes of links for drawings, as JSON objects."""
+"""Reading and writing of the solid shapes of links as JSON objects."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ _KINDS: dict[str, type[Shape]] = {
 }
 
 
-def shape_from(node: Node) -> Shape:
+def shape_from_json(node: Node) -> Shape:
     """The shape of a JSON object. Raises ``FormatError`` with file, line and path."""
     every_key = ["shape", *_READERS]
     word = closed_members(node, every_key, required=("shape",))["shape"].choice(_KINDS)
@@ -62,7 +62,7 @@ def shape_from(node: Node) -> Shape:
     return kind(**{name: _READERS[name](member) for name, member in members.items()})
 
 
-def shape_to(shape: Shape) -> dict[str, object]:
+def shape_to_json(shape: Shape) -> dict[str, object]:
     """The JSON object that describes a shape."""
     entry: dict[str, object] = {"shape": type(shape).__name__.lower()}
     for field in dataclasses.fields(shape):

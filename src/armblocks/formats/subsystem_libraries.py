@@ -84,7 +84,7 @@ def shortest_link(link: str, folder: Path | None) -> str:
     return f"{relative_to_folder(file, folder) if is_path(file) else file}#{entry}"
 
 
-def _named(path: Path) -> str:
+def _link_file(path: Path) -> str:
     """The name of a shipped library, which is the same in every installation, or the path of another
     library."""
     return path.stem if path.parent == shipped_folder("libraries").resolve() else str(path)
@@ -135,11 +135,11 @@ class Libraries:
         key = (path, name)
         if key in self._diagrams:
             return self._diagrams[key]
-        shown = [f"{file.name}#{entry}" for file, entry in (*self._chain, key)]
+        chain_text = [f"{file.name}#{entry}" for file, entry in (*self._chain, key)]
         if key in self._chain:
             first = self._chain.index(key)
             raise FormatError(
-                f"library blocks contain each other in a cycle: {' -> '.join(shown[first:])}",
+                f"library blocks contain each other in a cycle: {' -> '.join(chain_text[first:])}",
                 where=str(path),
                 allowed="library blocks that do not contain themselves",
                 fix="remove one of these blocks from the other",
@@ -147,7 +147,7 @@ class Libraries:
         if len(self._chain) >= MAX_LIBRARY_DEPTH:
             raise FormatError(
                 f"library blocks are nested more than {MAX_LIBRARY_DEPTH} levels deep: "
-                f"{' -> '.join(shown[:3])} -> …",
+                f"{' -> '.join(chain_text[:3])} -> …",
                 where=str(path),
                 allowed=f"at most {MAX_LIBRARY_DEPTH}",
                 fix="reduce the nesting",
@@ -162,7 +162,7 @@ class Libraries:
             diagram = self._read_entry(root, known[name], name, path.parent, inner)
         finally:
             self._chain.pop()
-        diagram = replace(diagram, link=f"{_named(path)}#{name}")
+        diagram = replace(diagram, link=f"{_link_file(path)}#{name}")
         self._diagrams[key] = diagram
         return diagram
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from armblocks.errors import FormatError, InputError
 from armblocks.extras import from_extra
 from armblocks.formats.table_columns import (
-    LARGEST_EXACT,
+    MAX_EXACT_INTEGER,
     MAX_NUMBERS,
     Column,
     ColumnFile,
@@ -59,8 +59,8 @@ def _members(contents: Mapping[str, Any]) -> dict[str, Any]:
     for name, value in contents.items():
         array = np.asarray(value)
         if array.dtype.names and array.size == 1:
-            inside = _members({field: array[field].item() for field in array.dtype.names})
-            members |= {f"{name}/{field}": member for field, member in inside.items()}
+            nested = _members({field: array[field].item() for field in array.dtype.names})
+            members |= {f"{name}/{field}": member for field, member in nested.items()}
         else:
             members[name] = value
     return members
@@ -76,7 +76,9 @@ def read_parquet(data: bytes) -> ColumnFile:
     columns = [_parquet_column(str(name), table.column(k)) for k, name in enumerate(table.column_names)]
     names = unique_names(["index" if c.name.startswith(_INDEX) else c.name for c in columns])
     named = [
-        Column(name=name, kind=c.kind, values=c.values, fault=c.fault, plain=not c.name.startswith(_INDEX))
+        Column(
+            name=name, kind=c.kind, values=c.values, fault=c.fault, is_default=not c.name.startswith(_INDEX)
+        )
         for name, c in zip(names, columns)
     ]
     return ColumnFile(columns=with_units(named), notes=tuple(repeated_notes([c.name for c in columns])))
@@ -117,15 +119,15 @@ def _check_size(numbers: int) -> None:
 
 
 def _columns(arrays: Mapping[str, Any]) -> ColumnFile:
-    """Arrays as columns.
+    """The columns of several arrays.
 
-    The first axis is time. An array whose last axis, and not its first, has the length of the times is read
-    along that axis, as Simulink stores signals beside a row of times.
+    The first axis is time. If only the last axis of an array has the length of the times, the array is read
+    along that axis: Simulink stores signals in this form if the times are a row.
     """
-    plain = {name: np.asarray(values) for name, values in arrays.items()}
+    arrays_by_name = {name: np.asarray(values) for name, values in arrays.items()}
     flat = {
         name: array.ravel() if array.ndim >= 2 and max(array.shape) == array.size else array
-        for name, array in plain.items()
+        for name, array in arrays_by_name.items()
     }
     vectors = [_column(name, array) for name, array in flat.items() if array.ndim == 1]
     notes: list[str] = []
@@ -137,10 +139,10 @@ def _columns(arrays: Mapping[str, Any]) -> ColumnFile:
             selected.append(_column(name, np.atleast_1d(array)))
             continue
         if array.dtype.kind not in "biuf" or not array.size:
-            selected.append(Column(name=name, kind="text", fault=_unusable(array)))
+            selected.append(Column(name=name, kind="text", fault=_fault(array)))
             continue
         if not count:
-            array = _upright(name, array, notes)
+            array = _times_by_rows(name, array, notes)
         elif array.shape[0] != count == array.shape[-1]:
             array = np.moveaxis(array, -1, 0)
             notes.append(f"The rows of '{name}' are its signals.")
@@ -149,12 +151,14 @@ def _columns(arrays: Mapping[str, Any]) -> ColumnFile:
     return ColumnFile(columns=with_units(selected), notes=tuple(notes))
 
 
-def _upright(name: str, array: Array, notes: list[str]) -> Array:
+def _times_by_rows(name: str, array: Array, notes: list[str]) -> Array:
     """A matrix that contains the times: by columns, or by rows where only the first row can be times."""
     if array.ndim != 2 or array.shape[0] >= array.shape[1]:
         return array
-    down, across = (bool(np.all(np.diff(line.astype(np.float64)) > 0.0)) for line in (array[:, 0], array[0]))
-    if down and across:
+    is_time_column, is_time_row = (
+        bool(np.all(np.diff(line.astype(np.float64)) > 0.0)) for line in (array[:, 0], array[0])
+    )
+    if is_time_column and is_time_row:
         raise InputError(
             f"the matrix '{name}' has {array.shape[0]} rows and {array.shape[1]} columns, and both its first "
             "row and its first column can be times",
@@ -162,13 +166,13 @@ def _upright(name: str, array: Array, notes: list[str]) -> Array:
             where="a file of arrays",
             fix="transpose the matrix, or store the times as a vector 'time'",
         )
-    if across:
+    if is_time_row:
         notes.append(f"The rows of '{name}' are its signals, the first one the times.")
         return array.T
     return array
 
 
-def _unusable(array: Array) -> str:
+def _fault(array: Array) -> str:
     if not array.size:
         return "it is empty"
     words = {"c": "its values are complex", "U": "it contains text", "S": "it contains text"}
@@ -179,14 +183,14 @@ def _column(name: str, array: Array) -> Column:
     """A vector as a column."""
     kind = array.dtype.kind
     if not array.size or kind not in "biufmM":
-        return Column(name=name, kind="text", fault=_unusable(array))
+        return Column(name=name, kind="text", fault=_fault(array))
     if kind == "M":
         if bool(np.isnat(array).any()):
             return Column(name=name, kind="date", fault="a row has no date")
         return Column(name=name, kind="date", values=_seconds(array - array[0]))
     if kind == "m":
         return Column(name=name, values=_seconds(array))
-    if kind in "iu" and max(abs(int(array.max())), abs(int(array.min()))) > LARGEST_EXACT:
+    if kind in "iu" and max(abs(int(array.max())), abs(int(array.min()))) > MAX_EXACT_INTEGER:
         fault = "its integers exceed 2^53, so they are not exact as numbers; subtract an offset"
         return Column(name=name, fault=fault)
     values = np.ascontiguousarray(array, dtype=np.float64)

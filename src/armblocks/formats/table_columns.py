@@ -1,4 +1,4 @@
-"""The columns of a file of measurements, and the table that a choice of them gives."""
+"""The columns of a file of measurements, and the table of the chosen columns."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from armblocks.errors import FormatError, InputError, UnknownNameError
 
 MAX_NUMBERS = 1 << 26
 """Maximum number of entries of a file."""
-LARGEST_EXACT = 2.0**53
+MAX_EXACT_INTEGER = 2.0**53
 """Integers up to this absolute value are exact as floating-point numbers."""
 
 _SECONDS = {
@@ -82,8 +82,8 @@ _TIME_NAMES = ("time", "t")
 class Column:
     """One column of a file.
 
-    ``values`` are its numbers, with NaN for missing ones, or ``None`` where it has none, for the reason in
-    ``fault``. ``kind`` says what the file contains.
+    ``values`` are its numbers, with NaN for missing ones. For a column without numbers they are ``None``, and
+    ``fault`` is the reason. ``kind`` is the type of the values in the file.
     """
 
     name: str
@@ -92,7 +92,7 @@ class Column:
     values: NDArray[np.float64] | None = None
     fault: str = ""
     unit: str = ""
-    plain: bool = True
+    is_default: bool = True
     """Whether the column belongs to the table where no columns are chosen."""
 
     @property
@@ -164,16 +164,16 @@ def time_column(file: ColumnFile) -> str:
             return time_name
     for time_name in _TIME_NAMES:
         for name in names:
-            if _bare(name).casefold() == time_name:
+            if _name_without_unit(name).casefold() == time_name:
                 return name
     inside = [name for name in names if name.casefold().endswith("/time")]
     if len(inside) == 1:
         return inside[0]
-    usable = (column.name for column in file.columns if column.values is not None and column.plain)
+    usable = (column.name for column in file.columns if column.values is not None and column.is_default)
     return next(usable, "")
 
 
-def _bare(name: str) -> str:
+def _name_without_unit(name: str) -> str:
     """A name without its unit."""
     if not header_unit(name):
         return name.strip()
@@ -204,28 +204,28 @@ def table_of(
         )
     times = seconds_of(file.column(key, source), source)
     if columns:
-        chosen = [_numbers(file.column(name, source), source) for name in columns]
-        _check_lengths(key, times, chosen, source)
+        selected = [_numbers(file.column(name, source), source) for name in columns]
+        _check_lengths(key, times, selected, source)
     else:
-        others = [column for column in file.columns if column.name != key and column.kind != "date"]
+        candidates = [column for column in file.columns if column.name != key and column.kind != "date"]
         if strict:
-            others = [_numbers(column, source) for column in others if column.plain]
-        chosen = [column for column in others if column.plain and column.rows == len(times)]
-    if not chosen:
+            candidates = [_numbers(column, source) for column in candidates if column.is_default]
+        selected = [column for column in candidates if column.is_default and column.rows == len(times)]
+    if not selected:
         raise InputError(
             f"the file has only the times '{key}': no other column has {len(times)} numbers",
             where=source,
             allowed="one column of times, and one or more columns of values of the same length",
             fix="choose columns of numbers, with as many rows as the times",
         )
-    for column in chosen:
+    for column in selected:
         _check_gaps(column, source)
-    rows = np.column_stack([times, *(column.values for column in chosen if column.values is not None)])
+    rows = np.column_stack([times, *(column.values for column in selected if column.values is not None)])
     return TimeTable(
         rows,
-        tuple(column.name for column in chosen),
+        tuple(column.name for column in selected),
         source,
-        units=tuple(column.unit for column in chosen),
+        units=tuple(column.unit for column in selected),
         time=time,
         columns=tuple(columns),
     )
@@ -239,10 +239,8 @@ def seconds_of(column: Column, source: str) -> NDArray[np.float64]:
     times = np.asarray(values * factor / divisor)
     _check_gaps(column, source)
     steps = np.diff(times)
-    third = np.append(
-        False, (steps[1:] == 0.0) & (steps[:-1] == 0.0)
-    )  # a time that occurs for the third time
-    invalid = np.flatnonzero((steps < 0.0) | third)
+    is_third_occurrence = np.append(False, (steps[1:] == 0.0) & (steps[:-1] == 0.0))
+    invalid = np.flatnonzero((steps < 0.0) | is_third_occurrence)
     if invalid.size:
         row = int(invalid[0]) + 1
         time, before = float(values[row]), float(values[row - 1])
@@ -258,7 +256,7 @@ def seconds_of(column: Column, source: str) -> NDArray[np.float64]:
 
 
 def time_notes(file: ColumnFile, name: str) -> Iterator[str]:
-    """How the times are interpreted, if not as seconds."""
+    """Notes on times that are not plain seconds."""
     for column in file.columns:
         if column.name != name:
             continue
@@ -274,7 +272,7 @@ def time_notes(file: ColumnFile, name: str) -> Iterator[str]:
 
 
 def unit_notes(columns: Iterable[Column]) -> Iterator[str]:
-    """Columns whose values are in degrees."""
+    """A note on columns whose values are in degrees."""
     names = [column.name for column in columns if column.unit in _DEGREES]
     if names:
         yield f"In degrees: {', '.join(names[:8])}. Robot blocks take rad; values are not converted."
@@ -307,8 +305,8 @@ def _check_gaps(column: Column, source: str) -> None:
         )
 
 
-def _check_lengths(key: str, times: NDArray[Any], chosen: Iterable[Column], source: str) -> None:
-    for column in chosen:
+def _check_lengths(key: str, times: NDArray[Any], selected: Iterable[Column], source: str) -> None:
+    for column in selected:
         if column.rows != len(times):
             raise InputError(
                 f"the column '{column.name}' has {column.rows} rows, and the times '{key}' have {len(times)}",
@@ -319,7 +317,7 @@ def _check_lengths(key: str, times: NDArray[Any], chosen: Iterable[Column], sour
 
 
 def with_units(columns: Iterable[Column]) -> tuple[Column, ...]:
-    """The columns with the units in their names, where the file states no others."""
+    """The columns with the units in their names, where the file gives no other units."""
     return tuple(
         column if column.unit else replace(column, unit=header_unit(column.name)) for column in columns
     )

@@ -29,12 +29,12 @@ from armblocks.formats.table_columns import (
 
 MAX_MIXED_BYTES = 64 * 2**20
 """Maximum size of a file that does not consist of numbers only."""
-_SAMPLE = 40
+_SAMPLE_ROWS = 40
 """Number of rows from which the delimiter is found."""
-_POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?", re.IGNORECASE)
-_COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?")
+_POINT_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?", re.IGNORECASE)
+_COMMA_NUMBER = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?")
 _GAPS = frozenset(("", "nan", "na", "n/a", "null", "none", "-"))
-_TRUTH = {"true": 1.0, "false": 0.0}
+_BOOLEANS = {"true": 1.0, "false": 0.0}
 _DATE = re.compile(
     r"(\d{4})-(\d\d)-(\d\d)(?:[T ](\d\d):(\d\d)(?::(\d\d)(?:[.,](\d{1,9}))?)?\s*(Z|[+-]\d\d:?\d\d)?)?"
 )
@@ -54,11 +54,11 @@ def read_csv(data: bytes) -> ColumnFile:
     if not head:
         raise FormatError("the file is empty", where="a CSV file", fix="choose a file with rows")
     delimiter = _delimiter(head)
-    rows = list(itertools.islice(_rows(text, delimiter), _SAMPLE))
+    rows = list(itertools.islice(_rows(text, delimiter), _SAMPLE_ROWS))
     names, units, first = _header(rows, text, delimiter)
     if delimiter != ",":
         notes.append(f"Columns are separated by {_SEPARATORS[delimiter]}.")
-    columns = _fast(text, delimiter, first, names, notes)
+    columns = _numeric_columns(text, delimiter, first, names, notes)
     if columns is None:
         if len(data) > MAX_MIXED_BYTES:
             raise FormatError(
@@ -67,7 +67,7 @@ def read_csv(data: bytes) -> ColumnFile:
                 where="a CSV file",
                 fix="remove columns and rows that are not numbers",
             )
-        columns = _by_fields(text, delimiter, first, names, notes)
+        columns = _text_columns(text, delimiter, first, names, notes)
     if names is None:
         notes.append("The file has no header: columns are named c0, c1, …")
     if units:
@@ -79,21 +79,21 @@ _SEPARATORS = {";": "semicolons", "\t": "tabs", " ": "spaces", ",": "commas"}
 
 
 def _decoded(data: bytes) -> tuple[str, list[str]]:
-    """The text of a file: UTF-8, UTF-16 with its mark, else the code page of Western Europe."""
+    """The text of a file: UTF-8, UTF-16 with a byte order mark, else Windows-1252."""
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         try:
             return data.decode("utf-16"), []
         except UnicodeDecodeError:
-            raise _no_text() from None
+            raise _not_text_error() from None
     if b"\0" in data[: 1 << 20]:
-        raise _no_text()
+        raise _not_text_error()
     try:
         return data.decode("utf-8-sig"), []
     except UnicodeDecodeError:
         return data.decode("cp1252", "replace"), ["The file is not UTF-8: it is read as Windows-1252."]
 
 
-def _no_text() -> FormatError:
+def _not_text_error() -> FormatError:
     return FormatError("this is not a text file", where="a CSV file", fix="export the table as CSV")
 
 
@@ -104,7 +104,7 @@ def _is_comment(line: str) -> bool:
 def _head(text: str) -> list[str]:
     """The first lines that are neither empty nor comments."""
     lines = (line for line in _lines(text) if line.strip() and not _is_comment(line))
-    return list(itertools.islice(lines, _SAMPLE))
+    return list(itertools.islice(lines, _SAMPLE_ROWS))
 
 
 def _lines(text: str) -> Iterator[str]:
@@ -133,7 +133,9 @@ def _delimiter(head: Sequence[str]) -> str:
 
 def _is_plain(field: str) -> bool:
     """Whether a field is a number, with digits on both sides of a decimal comma."""
-    return bool(_POINT.fullmatch(field) or (_COMMA.fullmatch(field) and re.search(r"\d,\d", field)))
+    return bool(
+        _POINT_NUMBER.fullmatch(field) or (_COMMA_NUMBER.fullmatch(field) and re.search(r"\d,\d", field))
+    )
 
 
 def _rows(text: str, delimiter: str) -> Iterator[_Row]:
@@ -163,12 +165,12 @@ def _header(
     """The names, the units below them, and the number of the first row of values.
 
     The first row is a header if its fields are names. A row with numbers and text is a row of values, unless
-    its first field is a name: otherwise a row would be lost without notice.
+    its first field is a name: otherwise a row of values would be dropped without notice.
     """
     first = rows[0].fields
-    others = any(_is_value(field) for field in first[1:])
-    is_header = not others if not first[0] else not _is_value(first[0])
-    if is_header and others and len(rows) > 1:
+    has_other_values = any(_is_value(field) for field in first[1:])
+    is_header = not has_other_values if not first[0] else not _is_value(first[0])
+    if is_header and has_other_values and len(rows) > 1:
         is_header = _is_value(rows[1].fields[0])  # otherwise the first column contains text
     if not is_header:
         return _commented_names(text, delimiter, len(first)), None, 0
@@ -194,13 +196,13 @@ def _commented_names(text: str, delimiter: str, count: int) -> list[str] | None:
 
 
 def _is_value(field: str) -> bool:
-    """Whether a field is a number, a gap with a name, a truth value or a date."""
+    """Whether a field is a number, a word for a missing value, a boolean or a date."""
     bare = field.strip()
-    named = bare.casefold() in _GAPS | _TRUTH.keys() and bool(bare)
-    return named or any(pattern.fullmatch(bare) for pattern in (_POINT, _COMMA, _DATE))
+    is_word = bare.casefold() in _GAPS | _BOOLEANS.keys() and bool(bare)
+    return is_word or any(pattern.fullmatch(bare) for pattern in (_POINT_NUMBER, _COMMA_NUMBER, _DATE))
 
 
-def _fast(
+def _numeric_columns(
     text: str, delimiter: str, first: int, names: list[str] | None, notes: list[str]
 ) -> list[Column] | None:
     """The columns of a file of numbers, or ``None``."""
@@ -228,7 +230,7 @@ def _fast(
     if not numbers.size or (names is not None and numbers.shape[1] != len(names)):
         return None
     if numbers.size > MAX_NUMBERS:
-        raise _too_many(numbers.size)
+        raise _size_error(numbers.size)
     if decimal:
         notes.append(decimal)
     named = unique_names(names if names is not None else [""] * numbers.shape[1])
@@ -247,7 +249,7 @@ def _body_lines(text: str) -> Iterator[tuple[int, int]]:
         start = end + 1
 
 
-def _too_many(count: int) -> FormatError:
+def _size_error(count: int) -> FormatError:
     return FormatError(
         f"the file has {count} numbers",
         allowed=f"at most {MAX_NUMBERS}",
@@ -256,7 +258,7 @@ def _too_many(count: int) -> FormatError:
     )
 
 
-def _by_fields(
+def _text_columns(
     text: str, delimiter: str, first: int, names: list[str] | None, notes: list[str]
 ) -> list[Column]:
     """The columns of any table of text."""
@@ -279,13 +281,13 @@ def _by_fields(
     columns: list[Column] = []
     for name, fields in zip(unique_names(list(names or [""] * len(texts))[: len(texts)]), texts):
         columns.append(_column(name, fields, lines, points=points))
-    if not points and any(_COMMA.fullmatch(field) for fields in texts for field in fields):
+    if not points and any(_COMMA_NUMBER.fullmatch(field) for fields in texts for field in fields):
         notes.append("The numbers have decimal commas.")
     return columns
 
 
 def _has_point(field: str) -> bool:
-    return "." in field and _POINT.fullmatch(field) is not None
+    return "." in field and _POINT_NUMBER.fullmatch(field) is not None
 
 
 def _column(name: str, fields: list[str], lines: list[int], *, points: bool) -> Column:
@@ -293,14 +295,14 @@ def _column(name: str, fields: list[str], lines: list[int], *, points: bool) -> 
     filled = [(field, line) for field, line in zip(fields, lines) if field.casefold() not in _GAPS]
     if not filled:
         return Column(name=name, kind="text", fault="all rows are empty")
-    if all(field.casefold() in _TRUTH for field, _ in filled):
-        return Column(name=name, kind="boolean", values=_numbers(fields, _TRUTH))
+    if all(field.casefold() in _BOOLEANS for field, _ in filled):
+        return Column(name=name, kind="boolean", values=_numbers(fields, _BOOLEANS))
     if all(_DATE.fullmatch(field) for field, _ in filled):
         return _dates(name, fields)
     for field, line in filled:
-        if _POINT.fullmatch(field):
+        if _POINT_NUMBER.fullmatch(field):
             continue
-        if not _COMMA.fullmatch(field):
+        if not _COMMA_NUMBER.fullmatch(field):
             return Column(name=name, kind="text", fault=f"line {line} contains '{field[:40]}'")
         if points:
             fault = f"line {line} contains '{field[:40]}', and other numbers have decimal points"
@@ -315,20 +317,20 @@ def _numbers(fields: Sequence[str], table: dict[str, float]) -> NDArray[np.float
 
 def _dates(name: str, fields: Sequence[str]) -> Column:
     """Dates as seconds since the first row."""
-    moments: list[int] = []
-    zoned: set[bool] = set()
+    nanoseconds: list[int] = []
+    has_time_zone: set[bool] = set()
     for field in fields:
         match = _DATE.fullmatch(field)
         if match is None:
             return Column(name=name, kind="date", fault="a row has no date")
         try:
-            moments.append(_nanoseconds(match))
+            nanoseconds.append(_nanoseconds(match))
         except ValueError:
             return Column(name=name, kind="date", fault=f"'{field[:40]}' is not a date")
-        zoned.add(match[8] is not None)
-    if len(zoned) > 1:
+        has_time_zone.add(match[8] is not None)
+    if len(has_time_zone) > 1:
         return Column(name=name, kind="date", fault="some dates have a time zone and others have none")
-    return Column(name=name, kind="date", values=np.array([(m - moments[0]) / 1e9 for m in moments]))
+    return Column(name=name, kind="date", values=np.array([(m - nanoseconds[0]) / 1e9 for m in nanoseconds]))
 
 
 def _nanoseconds(match: re.Match[str]) -> int:

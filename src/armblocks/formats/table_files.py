@@ -21,8 +21,8 @@ def load_table(path: str | PathLike[str], *, time: str = "", columns: Sequence[s
     """The table of a file, by its suffix: ``.csv``, ``.npz``, ``.mat``, ``.parquet``.
 
     ``time`` is the name of the column or variable with the times. Without it, the times are in ``time``, else
-    ``t``, else such a name in any case or with a unit (``Time [ms]``), else the first column. They are in s,
-    unless the header states another unit of time; dates are converted to seconds since the first row.
+    ``t``, else one of these names in any case or with a unit (``Time [ms]``), else the first column. Times
+    are in s, unless the header has another unit of time. Dates are converted to seconds since the first row.
 
     ``columns`` are the names of the values. Without it, these are all other columns of the same length;
     matrices are read by columns. Files of ``result.save`` have this form.
@@ -36,7 +36,7 @@ def load_table(path: str | PathLike[str], *, time: str = "", columns: Sequence[s
 
 
 def is_strict(file: Path) -> bool:
-    """Whether text in a column is an error where no columns are chosen: a typing error loses no column."""
+    """Whether text in a column is an error where no columns are chosen: a typing error drops no column."""
     return file.suffix.lower() == ".csv"
 
 

@@ -10,7 +10,7 @@ from armblocks.errors import InputError
 Row = tuple[float, ...]
 
 CONSISTENCY = 1e-12
-"""Largest accepted residual of a row sum. Rounded published decimals stay below it, misprints exceed it."""
+"""Maximum residual of a row sum. Rounding of published decimals stays below it; misprints exceed it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,10 +76,10 @@ class ButcherTableau:
         sums |= {f"dense row {j} at the step's end": (end[j], w) for j, w in enumerate(self.weights)}
         if self.error is not None:
             sums["error"] = (sum(self.error), 0.0)
-        for what, (found, expected) in sums.items():
+        for name, (found, expected) in sums.items():
             if abs(found - expected) > CONSISTENCY * max(1.0, abs(expected)):
                 raise InputError(
-                    f"{what} adds up to {found!r}",
+                    f"{name} adds up to {found!r}",
                     where=f"integrator {self.name}",
                     allowed=f"{expected!r}",
                     fix="check the coefficients against their source",
@@ -149,7 +149,7 @@ class ButcherTableau:
 
     @property
     def content(self) -> str:
-        """All numbers of the method as text, exactly: the part of a cache key that identifies it."""
+        """All numbers of the method as text, exactly: the part of a cache key that identifies the method."""
         return repr(
             (
                 self.nodes,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from armblocks.integration import system_functions
-from armblocks.integration.delay_history import MOST_SUBINTERVALS, DelayHistory
+from armblocks.integration.delay_history import MAX_SUBINTERVALS, DelayHistory
 from armblocks.integration.evaluation import Evaluation
 from armblocks.integration.frame import Frame
 from armblocks.integration.method import Method
@@ -82,7 +82,7 @@ class Delays:
         f, r, history = self.frame, self.frame.r, self.history
         self.records.extra_stages_once(time, h)
         before = f.counts[Count.HISTORY_ROWS]
-        most, many = (before + 2 * count for count in (MOST_SUBINTERVALS - 1, MOST_SUBINTERVALS // 2))
+        max_rows, half_rows = (before + 2 * count for count in (MAX_SUBINTERVALS - 1, MAX_SUBINTERVALS // 2))
         factor = r.real(1.0)
         begin, end = r.real(time), r.real(new_time)
         half = fma(0.5, new_time - time, time)
@@ -92,7 +92,7 @@ class Delays:
             a, b = begin.value, end.value
             length, known = b - a, f.counts[Count.HISTORY_ROWS]
             # After the maximum number, the rest of the step is one subinterval.
-            last = known >= most
+            last = known >= max_rows
             b = select(last, new_time, b)
             for part, mark in ((0.5, 1.0), (1.0, 0.0)):
                 self._point(part, a, b, time, new_time, h)
@@ -110,7 +110,7 @@ class Delays:
                 f.counts[Count.HISTORY_ROWS] = known
                 end.value = fma(0.5, length, a)
                 subintervals.again()
-            factor.value = factor.value * select(known >= many, 1.1, 1.0)
+            factor.value = factor.value * select(known >= half_rows, 1.1, 1.0)
             begin.value = b
             reached = fma(2.0, length, b)
             end.value = minimum(reached, new_time)

@@ -16,7 +16,7 @@ class JacobianPattern:
     """The sparsity pattern of the derivatives of ``(f, g)`` with respect to ``(x, w)``: entry k at rows[k],
     columns[k].
 
-    The first ``states`` rows and columns are those of the flow, the rest those of the implicit equations.
+    The first ``states`` rows and columns belong to the flow, all others to the implicit equations.
     """
 
     states: int
@@ -71,17 +71,17 @@ def plan_elimination(pattern: JacobianPattern) -> Elimination:
     upper: list[tuple[int, ...]] = []
     for i, row in enumerate(entries):
         filled = {place for _, place in row}
-        left = [place for place in filled if place < i]
-        heapq.heapify(left)
+        pending = [place for place in filled if place < i]
+        heapq.heapify(pending)
         eliminated: list[int] = []
-        while left:
-            k = heapq.heappop(left)
+        while pending:
+            k = heapq.heappop(pending)
             eliminated.append(k)
             for place in upper[k]:
                 if place not in filled:
                     filled.add(place)
                     if place < i:
-                        heapq.heappush(left, place)
+                        heapq.heappush(pending, place)
         lower.append(tuple(eliminated))
         upper.append(tuple(sorted(place for place in filled if place > i)))
     return Elimination(
@@ -94,7 +94,7 @@ def plan_elimination(pattern: JacobianPattern) -> Elimination:
 
 
 def _match_equations(pattern: JacobianPattern) -> list[int]:
-    """The equation of every unknown: its derivative for a state, else an implicit one by augmenting paths.
+    """The equation of every unknown: the derivative of a state, or an implicit equation by augmenting paths.
 
     Where no complete matching exists, the remaining unknowns get arbitrary equations. The matrix is then
     singular, which the numerical check detects.
@@ -131,27 +131,27 @@ def _match_equations(pattern: JacobianPattern) -> list[int]:
 def _minimum_degree_order(neighbours: Sequence[set[int]]) -> list[int]:
     """Repeatedly eliminate an unknown with the fewest neighbours, and connect its neighbours to each
     other."""
-    around = [set(near) for near in neighbours]
-    heap = [(len(near), place) for place, near in enumerate(around)]
+    adjacency = [set(adjacent) for adjacent in neighbours]
+    heap = [(len(adjacent), place) for place, adjacent in enumerate(adjacency)]
     heapq.heapify(heap)
     order: list[int] = []
-    done = [False] * len(around)
-    left = len(around)
+    done = [False] * len(adjacency)
+    remaining = len(adjacency)
     while heap:
         degree, place = heapq.heappop(heap)
-        if done[place] or degree != len(around[place]):
+        if done[place] or degree != len(adjacency[place]):
             continue
         done[place] = True
         order.append(place)
-        near = around[place]
-        left -= 1
-        if len(near) == left:
-            # The rest is fully connected: any order is equally good.
-            order.extend(sorted(near))
+        adjacent = adjacency[place]
+        remaining -= 1
+        if len(adjacent) == remaining:
+            # The remaining unknowns are fully connected: all orders have the same fill-in.
+            order.extend(sorted(adjacent))
             break
-        for other in near:
-            around[other] |= near
-            around[other] -= {other, place}
-            heapq.heappush(heap, (len(around[other]), other))
-        around[place] = set()
+        for other in adjacent:
+            adjacency[other] |= adjacent
+            adjacency[other] -= {other, place}
+            heapq.heappush(heap, (len(adjacency[other]), other))
+        adjacency[place] = set()
     return order

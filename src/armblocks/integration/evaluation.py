@@ -18,9 +18,9 @@ class Evaluation:
         self.history = history
         sizes, workspace = frame.sizes, frame.workspace
         self.implicit = define_solve(frame.r.program, workspace, sizes.algebraic) if sizes.algebraic else None
-        nowhere = frame.r.nowhere
-        self.z = frame.vector(workspace.z) if sizes.hybrid else nowhere
-        self.unknowns = frame.vector(workspace.trial_w) if sizes.hybrid else nowhere
+        null_array = frame.r.null_array
+        self.z = frame.vector(workspace.z) if sizes.hybrid else null_array
+        self.unknowns = frame.vector(workspace.trial_w) if sizes.hybrid else null_array
 
     def solve(self, t: Reals, x: Reals) -> None:
         """Write the delayed values at a point into ``z``, and the implicit unknowns into ``trial_w``."""
@@ -45,6 +45,6 @@ class Evaluation:
         f.r.call(system_functions.flow_jacobian, t, x, self.z, self.unknowns, f.p, J, T)
 
     def accept_unknowns(self) -> None:
-        """Set ``w`` to the solution found last."""
+        """Set ``w`` to the latest solution of the implicit equations."""
         workspace = self.frame.workspace
         self.frame.copy(workspace.trial_w, workspace.w, self.frame.sizes.algebraic)

@@ -18,7 +18,7 @@ from armblocks.routines.values import Boolean, Integer, Real
 
 EPSILON = 2.0**-52
 """Relative rounding error of a double."""
-SHORTEST_WINDOW = 2.0**-12
+MIN_WINDOW = 2.0**-12
 """Minimum distance of guard evaluations, as a fraction of a step."""
 NEAR_START = 2.0**-6
 """Event locations within this fraction of a step after its start are unreliable: the error of the dense
@@ -76,7 +76,7 @@ class EventSearch:
                     f.new_time.value = high.value
             self._store_signs_before(before.value, time)
             self.event_located.value = 1
-            # An event that coincides with a tick or breakpoint gets its time.
+            # An event that coincides with a tick or breakpoint gets the time of the tick or breakpoint.
             known, new_time = f.end.value, f.new_time.value
             f.new_time.value = select(new_time * SAME_ABOVE >= known, known, new_time)
 
@@ -94,7 +94,7 @@ class EventSearch:
         next_length = f.reals.after(Scalar.WINDOW)
         unknown = next_length[0] == float("inf")
         next_length[0] = select(unknown, 0.125 * h, minimum(next_length[0], h))
-        shortest = h * SHORTEST_WINDOW
+        shortest = h * MIN_WINDOW
         length = r.real(next_length[0])
         with r.part() as window:
             a = low.value
@@ -161,9 +161,9 @@ class EventSearch:
         """Set ``reason`` to the reason why the event location is unreliable, or to 0 if it is reliable.
 
         A location on the dense output is unreliable near the start of the step, and if the guard is near zero
-        at the start. A guard that leaves zero like a high power of time, such as the position of a mass that
-        starts from rest, may have the wrong sign on the dense output. At the ends of steps its sign is
-        correct.
+        at the start. A guard that leaves zero like a high power of time may have the wrong sign on the
+        dense output; an example is the position of a mass that starts from rest. At the ends of steps its
+        sign is correct.
         """
         f, r, functions, t = self.frame, self.frame.r, self.functions, self.events.point.memory
         self.count_fired_at(instant, time, h)
@@ -226,7 +226,7 @@ class EventSearch:
 
     def _take_step(self, time: Real, new_time: Real) -> None:
         f, h = self.frame, new_time - time
-        self.records.extra_done.value = 0
+        self.records.extra_stages_done.value = 0
         f.h.value = h
         f.new_time.value = new_time
         self.method.stages(time, h, new_time)
@@ -236,7 +236,7 @@ class EventSearch:
 
         At ``low`` no guard has fired, at ``high`` some guard has. Times within four units in the last place
         are one instant, so an event at a recorded time or a tick coincides with it. For times below a
-        millionth of the length of the run, the unit in the last place is the one at that time.
+        millionth of the length of the run, the unit in the last place of that time applies.
         """
         r = self.frame.r
         closest = (EPSILON * 1e-6) * self.frame.reals[Scalar.SPAN]
@@ -271,7 +271,7 @@ class EventSearch:
         # All stages are equal, so that the dense output is linear.
         for row in range(1, method.tableau.rows):
             copy(f.r, method.K(0), method.K(row), f.n)
-        self.records.extra_done.value = 1
+        self.records.extra_stages_done.value = 1
         method.set_y((1.0,), h)
         fired = self.events.mark_fired(minimum(new_time, f.clamp.value), self.y)
         f.leave_unless(fired != 0, Status.NON_FINITE)

@@ -20,9 +20,9 @@ from armblocks.routines.arithmetic import select
 from armblocks.routines.memory import IntegerVariable, Reals, RealVariable
 from armblocks.routines.values import Boolean, Integer, Real
 
-ITERATIONS_TOGETHER, MOST_ITERATIONS = 8, 32
+ITERATIONS_TOGETHER, MAX_ITERATIONS_PER_MODE = 8, 32
 """Mode iteration changes all inconsistent modes together in the first ``ITERATIONS_TOGETHER`` iterations plus
-one for each mode. It ends after ``MOST_ITERATIONS`` iterations for each mode."""
+one for each mode. It ends after ``MAX_ITERATIONS_PER_MODE`` iterations for each mode."""
 START_ITERATIONS = 400
 """Resets at the start of a run, beside one for each guard, within which loops of sampled values converge."""
 
@@ -124,7 +124,7 @@ class Events:
 
         In the first iterations all inconsistent modes change together, then only the first of them. With this
         least index rule the iteration ends for every complementarity problem with a P-matrix (Murty 1974). If
-        it still does not end, no choice of the modes is consistent, and the run ends.
+        the iteration does not end, no choice of the modes is consistent, and the run ends.
         """
         f, r, functions = self.frame, self.frame.r, self.functions
         yes, no = r.constant_boolean(True), r.constant_boolean(False)
@@ -183,7 +183,7 @@ class Events:
     def _recapture(self) -> None:
         """Capture the present values that belong to hysteresis modes, before the reset of this iteration."""
         f, r, workspace = self.frame, self.frame.r, self.frame.workspace
-        if not f.sizes.recaptured:
+        if not f.sizes.recaptured_states:
             return
         z, new_z, unknowns, ticking = (
             f.vector(place) for place in (workspace.z, workspace.new_z, workspace.trial_w, workspace.ticking)
@@ -192,19 +192,19 @@ class Events:
             ticking[clock] = 0.0
         t = self.point.memory
         r.call(system_functions.update, t, self.x, z, unknowns, f.p, ticking, new_z)
-        recaptured = r.integers("captured.again", f.sizes.recaptured)
-        for i in r.each(len(f.sizes.recaptured)):
+        recaptured = r.integers("captured.again", f.sizes.recaptured_states)
+        for i in r.each(len(f.sizes.recaptured_states)):
             z[recaptured[i]] = new_z[recaptured[i]]
 
     def _store_previous_modes(self) -> None:
         """Store the present values of hysteresis modes as their previous values.
 
-        Those of a subsystem that is being enabled keep the values from before the instant.
+        In a subsystem that is being enabled, the previous values are those from before the instant.
         """
         f, r = self.frame, self.frame.r
         z = f.vector(f.workspace.z)
-        always = [places for places in f.sizes.remembered if places[2] < 0]
-        gated = [places for places in f.sizes.remembered if places[2] >= 0]
+        always = [places for places in f.sizes.hysteresis_modes if places[2] < 0]
+        gated = [places for places in f.sizes.hysteresis_modes if places[2] >= 0]
         for kind, entries in (("always", always), ("gated", gated)):
             if not entries:
                 continue
@@ -223,16 +223,16 @@ class Events:
         f, r = self.frame, self.frame.r
         if self.functions.store_silenced_signs:
             r.call(self.functions.store_silenced_signs, f.reals)
-        if f.sizes.momentary:
-            z, momentary = f.vector(f.workspace.z), r.integers("momentary", f.sizes.momentary)
-            for i in r.each(len(f.sizes.momentary)):
+        if f.sizes.momentary_states:
+            z, momentary = f.vector(f.workspace.z), r.integers("momentary", f.sizes.momentary_states)
+            for i in r.each(len(f.sizes.momentary_states)):
                 z[momentary[i]] = 0.0
 
     def _count_iteration_without_event(self, time: Real, iterations: IntegerVariable) -> None:
         """Count an iteration without an event; return from the loop after too many of them."""
         self._count_events(time, iterations.value == 0, bounds=False)
         iterations.value = iterations.value + 1
-        allowed = iterations.value < MOST_ITERATIONS * self.modes
+        allowed = iterations.value < MAX_ITERATIONS_PER_MODE * self.modes
         self.frame.leave_unless(allowed, Status.INCONSISTENT_MODES)
 
     def _restrict_mode_changes(self, iterations: IntegerVariable, *, follows: bool) -> None:
@@ -243,7 +243,7 @@ class Events:
         r.call(self.functions.restrict_mode_changes, f.reals, r.constant_boolean(follows), one_by_one)
 
     def _store_fired_signs(self) -> None:
-        """Store the signs after the reset of the guards that fired; the others keep their stored signs."""
+        """Store the signs after the reset of the guards that fired; other guards keep their stored signs."""
         f, r, t = self.frame, self.frame.r, self.point.memory
         self.evaluation.solve(t, self.x)
         self.functions.evaluate(r, t, self.x, f.reals, f.p)

@@ -10,14 +10,14 @@ from armblocks.integration.workspace import Count
 from armblocks.routines.arithmetic import fma, maximum, select, square_root
 from armblocks.routines.values import Real
 
-CHECK_EVERY = 16
+CHECK_INTERVAL = 16
 """Number of steps between two checks for stability-limited steps: a power of two."""
 NEAR_BORDER = 0.97
 """Fraction of the stability interval beyond which a step counts as stability-limited (3.2 of 3.3, as in
 Hairer's DOPRI5)."""
 STIFF_CHECKS, NON_STIFF_CHECKS = 250, 6
 """Number of checks with a stability-limited step after which the system counts as stiff (4000 steps), and
-number of consecutive checks without one that reset the count."""
+number of consecutive accuracy-limited checks that reset this count."""
 
 
 class ExplicitMethod(Method):
@@ -85,7 +85,7 @@ class ExplicitMethod(Method):
             f.count[place] for place in (Count.STIFFNESS_STEPS, Count.STIFF, Count.NON_STIFF)
         )
         steps.value = steps.value + 1
-        with r.when(steps.value & (CHECK_EVERY - 1) == 0):
+        with r.when(steps.value & (CHECK_INTERVAL - 1) == 0):
             border = (NEAR_BORDER * self.butcher.real_stability) ** 2
             with r.when(self.stiffness() > border):
                 stiff.value = stiff.value + 1

@@ -28,6 +28,7 @@ COUNTS = (
     Count.NON_STIFF,
     Count.SHORT_STEPS,
 )
+"""The entries of the arrays of doubles and of integers that are variables during a call of the loop."""
 
 
 @dataclass(frozen=True, kw_only=True)

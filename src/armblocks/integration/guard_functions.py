@@ -11,15 +11,15 @@ from armblocks.routines.memory import Integers, Reals
 from armblocks.routines.routine import Program, Routine
 from armblocks.routines.values import Boolean, Integer, Real
 
-MOST_CLOSE_EVENTS = 1000
+MAX_CLOSE_EVENTS = 1000
 """Maximum number of consecutive close events whose distances do not shrink."""
 CLOSE_DISTANCE = 1e-12
 """Relative distance below which events count as close."""
-MOST_RAPID_EVENTS, RAPID_DISTANCE = 100_000, 1e-8
+MAX_RAPID_EVENTS, RAPID_DISTANCE = 100_000, 1e-8
 """Consecutive events count as endless after this number of them at this relative distance or less. The run
 advances by less than a thousandth of its time during them."""
 ZENO_EVENTS, ZENO_DISTANCE = 10, 2.0**-46
-"""Zeno behaviour: a guard has fired at least this many times in a row at shrinking distances, and the last
+"""Zeno behaviour: a guard has fired at least this many consecutive times at shrinking distances. The last
 distance is below this fraction of the time (about 100 units in the last place)."""
 FIRST_STEP = 0.01
 """Maximum first step after an event, relative to the time between the last two events of the guard."""
@@ -43,15 +43,17 @@ class GuardFunctions:
         self.count = len(sizes.directions)
         self.modes = sizes.modes
         self.followers = tuple(int(follows) for follows in sizes.followers)
-        self.silenced = sizes.silenced
-        self.locating = tuple(int(number in sizes.locating) for number in range(self.count))
+        self.silenced_guards = sizes.silenced_guards
+        self.locating_guards = tuple(int(number in sizes.locating_guards) for number in range(self.count))
         self.tangents = sizes.tangents
         self.states, self.discrete = sizes.states, sizes.discrete
         self.directions = tuple(float(direction) for direction in sizes.directions)
         self.mark_fired = program.define(self._mark_fired, "mark_fired")
         self.store_signs = program.define(self._store_signs, "store_signs")
         self.store_silenced_signs = (
-            program.define(self._store_silenced_signs, "store_silenced_signs") if sizes.silenced else None
+            program.define(self._store_silenced_signs, "store_silenced_signs")
+            if sizes.silenced_guards
+            else None
         )
         self.count_events = program.define(self._count_events, "count_events")
         self.possible_touches = program.define(self._possible_touches, "possible_touches")
@@ -93,7 +95,7 @@ class GuardFunctions:
             fired[i] = select(crossed, now, 0.0)
             total.value = total.value + crossed.count()
         z = reals.after(workspace.z)
-        for guard, place in self._silenced(r):
+        for guard, place in self._each_silenced_guard(r):
             active = (fired[guard] == 0.0) | (z[place] == 0.0)
             fired[guard] = select(active, fired[guard], 0.0)
             total.value = total.value - (~active).count()
@@ -135,13 +137,13 @@ class GuardFunctions:
         return found.value
 
     def _any_fired(self, r: Routine, reals: Reals, locating: Boolean) -> Boolean:
-        """Whether a guard of one kind is marked; clears the marks of the other kind. With ``locating`` the
-        kind is the guards that only locate mode changes, else all others. Guards of derivatives belong to
-        both."""
+        """Whether a selected guard is marked; clears the marks of all other guards. With ``locating``, the
+        guards that only locate mode changes are selected, else all others. Guards of derivatives are always
+        selected."""
         found, fired = r.boolean(False), reals.after(self.workspace.fired)
-        locates = r.integers("guard.locates", self.locating)
+        locates = r.integers("guard.locates", self.locating_guards)
         for i in r.each(self.count):
-            selected = _same(locates[i] != 0, locating)
+            selected = _equal(locates[i] != 0, locating)
             if self.tangents is not None:
                 selected = selected | (r.constant_integer(0) + i >= self.tangents[2])
             fired[i] = select(selected, fired[i], 0.0)
@@ -153,7 +155,7 @@ class GuardFunctions:
         found, contradictions = r.boolean(False), reals.after(self.workspace.contradictions)
         followers = r.integers("mode.follows", self.followers)
         for i in r.each(len(self.modes)):
-            selected = _same(followers[i] != 0, follows)
+            selected = _equal(followers[i] != 0, follows)
             found.value = found.value | (selected & (contradictions[i] != 0.0))
         return found.value
 
@@ -169,7 +171,7 @@ class GuardFunctions:
         changed = r.boolean(False)
         for i in r.each(len(self.modes)):
             place = indices[i]
-            selected = _same(followers[i] != 0, follows)
+            selected = _equal(followers[i] != 0, follows)
             inconsistent, before = selected & (contradictions[i] != 0.0), changed.value
             new_z[place] = select(inconsistent & ~before, new_z[place], z[place])
             changed.value = before | (inconsistent & only_first)
@@ -205,7 +207,7 @@ class GuardFunctions:
 
     def _possible_touches(self, r: Routine, reals: Reals, half: Real) -> Integer:
         """Count the guards that may have touched zero and returned within a window, although its three
-        values, ``half`` apart, have the same sign. Guards that have fired at its end are left out.
+        values, ``half`` apart, have the same sign. Guards that have fired at the end are not counted.
 
         A, M, B are the distances from zero at the beginning, in the middle and at the end. The parabola
         through them is M + (B - A) s / 2 + C s^2 / 2 with C = A - 2 M + B, for s from -1 to 1. A guard may
@@ -245,7 +247,8 @@ class GuardFunctions:
         self, reals: Reals, half: Real, i: Integer | int, side: Real, distances: tuple[Real, Real, Real]
     ) -> Boolean:
         """Whether the derivative of a guard differs too much from that at the end of the previous window.
-        False where the previous one is NaN."""
+
+        False where the previous derivative is NaN."""
         A, M, B = distances
         known = side * reals.after(self.workspace.guard_derivatives)[i]
         now = fma(-1.5, A, fma(2.0, M, -0.5 * B))
@@ -262,7 +265,7 @@ class GuardFunctions:
             reals.after(self.workspace.guard_derivatives)[i] = rise / half
 
     def _store_signs(self, r: Routine, reals: Reals, only_fired: Boolean) -> None:
-        """Store the signs of all guards, or of the fired ones only."""
+        """Store the signs of all guards, or of the fired guards only."""
         workspace = self.workspace
         values, signs, fired = (
             reals.after(place) for place in (workspace.guards, workspace.signs, workspace.fired)
@@ -280,31 +283,32 @@ class GuardFunctions:
             signs[i] = select(only_fired, after, side)
 
     def _store_silenced_signs(self, r: Routine, reals: Reals) -> None:
-        """Set the signs of silenced guards to those of their values, 0 included."""
+        """Set the signs of silenced guards to the signs of their values, including 0."""
         workspace = self.workspace
         values, signs, z = (reals.after(place) for place in (workspace.guards, workspace.signs, workspace.z))
-        for guard, place in self._silenced(r):
+        for guard, place in self._each_silenced_guard(r):
             signs[guard] = select(z[place] == 0.0, signs[guard], sign(values[guard]))
 
-    def _silenced(self, r: Routine) -> Iterator[tuple[Integer, Integer]]:
+    def _each_silenced_guard(self, r: Routine) -> Iterator[tuple[Integer, Integer]]:
         """A loop of the routine over the silenced guards; yields each with the index of its momentary
         value."""
-        if not self.silenced:
+        if not self.silenced_guards:
             return
-        guards, indices = zip(*self.silenced)
+        guards, indices = zip(*self.silenced_guards)
         of_guards, of_places = r.integers("silenced.guards", guards), r.integers("silenced.by", indices)
-        for i in r.each(len(self.silenced)):
+        for i in r.each(len(self.silenced_guards)):
             yield of_guards[i], of_places[i]
 
     def _count_events(self, r: Routine, t: Real, reals: Reals, counts: Integers, first: Boolean) -> Real:
-        """Count the events at a time, and the consecutive close ones. Returns the maximum length of the next
-        step, negative for endless events.
+        """Count the events at a time, and the consecutive close events.
+
+        Returns the maximum length of the next step, negative for endless events.
 
         ``first`` is false in further mode iterations at the same time. A guard is counted once at each time.
 
         Events are close if their distance is below ``CLOSE_DISTANCE`` times the time. A series with shrinking
         distances, such as a bouncing ball, may end. It counts as endless only if the distances reach the
-        rounding error of time, or after ``MOST_RAPID_EVENTS`` consecutive events.
+        rounding error of time, or after ``MAX_RAPID_EVENTS`` consecutive events.
         """
         workspace = self.workspace
         bound = r.real(float("inf"))
@@ -349,10 +353,10 @@ class GuardFunctions:
         counts[Count.CLOSE_EVENTS] = consecutive
         rapid_events = select(rapid, counts[Count.RAPID_EVENTS] + first.count(), 0)
         counts[Count.RAPID_EVENTS] = rapid_events
-        without_end = endless.value | (consecutive > MOST_CLOSE_EVENTS) | (rapid_events > MOST_RAPID_EVENTS)
+        without_end = endless.value | (consecutive > MAX_CLOSE_EVENTS) | (rapid_events > MAX_RAPID_EVENTS)
         return select(without_end, -1.0, bound.value)
 
 
-def _same(one: Boolean, other: Boolean) -> Boolean:
+def _equal(one: Boolean, other: Boolean) -> Boolean:
     """Whether both are true or both are false."""
     return (one & other) | (~one & ~other)

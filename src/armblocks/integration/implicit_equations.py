@@ -1,8 +1,8 @@
 """Newton's method for the implicit equations of a system, as a routine.
 
-``0 = residual(t, x, z, w, p)`` is solved for ``w`` wherever the system is evaluated, with the exact Jacobian,
-dense elimination with row pivoting, and halved steps while the residual does not fall. It starts from the
-``w`` of the last accepted step, so a repeated step gives identical results.
+At every evaluation of the system, ``0 = residual(t, x, z, w, p)`` is solved for ``w``. The method uses the
+exact Jacobian and dense elimination with row pivoting. It halves steps while the residual does not decrease.
+The iteration starts from ``w`` of the last accepted step, so a repeated step gives identical results.
 
 A point where the residual is exactly zero and the Jacobian is undefined is a solution. If Newton's method
 does not converge, or the Jacobian is singular, ``w`` becomes NaN. The loop then repeats
@@ -20,8 +20,8 @@ from armblocks.routines.memory import Reals
 from armblocks.routines.routine import Function, Program, Routine
 from armblocks.routines.values import Boolean, Real
 
-ITERATIONS = 50
-HALVINGS = 12
+MAX_ITERATIONS, MAX_HALVINGS = 50, 12
+"""Maximum number of iterations, and of halvings of one correction."""
 CONVERGED = 1e-13
 """Convergence: the last correction relative to ``1 + |w|`` is below this. The next correction would be of the
 order of its square."""
@@ -41,6 +41,8 @@ def define_solve(
 
 
 class _Newton:
+    """Emits Newton's method at one point."""
+
     def __init__(
         self, r: Routine, workspace: Workspace, unknowns: int, t: Reals, x: Reals, reals: Reals, p: Reals
     ) -> None:
@@ -61,6 +63,7 @@ class _Newton:
         )
 
     def write(self) -> None:
+        """Emit the iteration, which writes ``trial_w``."""
         r, n = self.r, self.n
         for i in r.range(0, n):
             self.trial[i] = self.accepted[i]
@@ -80,7 +83,7 @@ class _Newton:
                 size = self.correction()
                 with r.when(size <= CONVERGED):
                     search.leave()
-                iteration.again_when(size.ordered & (iterations.value < ITERATIONS))
+                iteration.again_when(size.ordered & (iterations.value < MAX_ITERATIONS))
                 with r.when(size <= ACCEPTABLE):
                     search.leave()
             for i in r.range(0, n):
@@ -113,7 +116,7 @@ class _Newton:
         return largest.value
 
     def damped_correction(self, before: Real) -> None:
-        """``w -= lambda d``, with ``lambda`` halved at most a dozen times until the residual decreases."""
+        """``w -= lambda d``. Halves ``lambda`` up to ``MAX_HALVINGS`` times until the residual decreases."""
         r = self.r
         length = r.real(1.0)
         with r.loop() as shorter:
@@ -126,5 +129,5 @@ class _Newton:
             r.call(residual, *self.point, self.trial, self.p, self.jacobian)
             after = self.square(self.jacobian)
             fell = after <= before
-            shorter.leave_when(fell | (length.value <= 2.0**-HALVINGS))
+            shorter.leave_when(fell | (length.value <= 2.0**-MAX_HALVINGS))
             length.value = length.value * 0.5

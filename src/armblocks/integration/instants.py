@@ -12,7 +12,7 @@ store left limits, ``update`` is called without a marked clock;
    stateful modes take their consistent values; this is repeated until nothing changes;
 4. the instant is recorded: signals are right-continuous;
 5. the integration restarts. The first step after an event is at most a hundredth of the time between the last
-   two events, and each later step at most ten times the one before. No step can then pass over several
+   two events, and each later step at most ten times the previous step. No step can then pass over several
    bounces whose distances shrink.
 
 Times within four units in the last place are one instant. So 3 times 0.1 s and 0.3 s coincide although their
@@ -96,13 +96,12 @@ class Instants(Schedule):
         f.end.value = earliest
 
     def instant(self) -> None:
-        """Process ticks and events at the time reached and record it; continue at the start of the next
-        piece."""
+        """Process ticks and events at the present time, record the instant, and start the next piece."""
         f = self.frame
         time = f.time.value
         until = time * SAME_ABOVE
         # A sample time within rounding of a tick or breakpoint is recorded with it. An event is located to
-        # the last place: a sample time after it, however close, is not recorded with it.
+        # the last place: a later sample time is not recorded with it, even if it is close.
         known = time >= f.end.value * SAME_BELOW
         recorded = select(known, until, time)
         self.record_left_limits(time)

@@ -13,12 +13,12 @@ from armblocks.integration.workspace import Count, LoopSizes
 Vector = NDArray[np.float64]
 
 INITIAL_SIZE = 1_000_000
-"""Initial number of doubles, 8 MB. The operating system provides the memory that is used."""
+"""Initial number of doubles, 8 MB. The operating system allocates only the memory that is used."""
 NO_LIMIT = np.iinfo(np.int64).max
 
 
 class JumpRecord:
-    """Two rows for each instant; the native loop counts them in ``counts``. Empty and disabled at first.
+    """Two rows for each instant; the native loop counts them in ``counts``. Initially empty and disabled.
 
     After :meth:`begin`, :meth:`share` and :meth:`enlarge` the memory has another address.
     """
@@ -28,31 +28,31 @@ class JumpRecord:
         self.memory: Vector = np.empty((0, row_width(sizes)))
         self.end: float | None = None
         """The time from which instants are not recorded, because the record has its maximum size."""
-        self._most = 0
+        self._max_rows = 0
         self.begin(0)
 
-    def begin(self, most: int) -> None:
-        """Begin an empty record of at most this number of rows; 0: no record."""
+    def begin(self, max_rows: int) -> None:
+        """Begin an empty record with at most ``max_rows`` rows; 0: no record."""
         width = self.memory.shape[1]
-        self._most = most
-        self.memory = np.empty((min(most, max(64, INITIAL_SIZE // width)), width))
+        self._max_rows = max_rows
+        self.memory = np.empty((min(max_rows, max(64, INITIAL_SIZE // width)), width))
         self._counts[Count.JUMPS] = 0
         self.enable()
 
     def share(self, record: JumpRecord) -> None:
         """Continue another record of the same system."""
-        self.memory, self.end, self._most = record.memory, record.end, record._most
+        self.memory, self.end, self._max_rows = record.memory, record.end, record._max_rows
         self.enable()
 
     def enable(self) -> None:
         """Set the counters of the native loop for the present memory."""
-        wanted = bool(self.memory.size) and self.end is None
-        self._counts[Count.JUMPS_RECORDED] = int(wanted)
-        self._counts[Count.JUMPS_CAPACITY] = len(self.memory) - JUMP_ROWS_OF_A_STEP if wanted else NO_LIMIT
+        enabled = bool(self.memory.size) and self.end is None
+        self._counts[Count.JUMPS_RECORDED] = int(enabled)
+        self._counts[Count.JUMPS_CAPACITY] = len(self.memory) - JUMP_ROWS_OF_A_STEP if enabled else NO_LIMIT
 
     def enlarge(self, time: float) -> None:
         """Double the memory; at its maximum size, end the record at the present ``time`` (s)."""
-        rows = min(self._most, 2 * len(self.memory))
+        rows = min(self._max_rows, 2 * len(self.memory))
         if rows == len(self.memory):
             self.end = time
         else:
@@ -65,8 +65,8 @@ class JumpRecord:
     def rows(self) -> Vector:
         """Both sides of the recorded instants, ``(M, 2, 2 + nx + nz + nw)``, as a view.
 
-        A row has the time of the evaluation in s, the number of samples recorded before it, the states, the
-        discrete variables and the unknowns of the implicit equations.
+        A row has the time of the evaluation in s, and the number of samples recorded before it. Then follow
+        the states, the discrete variables and the unknowns of the implicit equations.
         """
         # A run that failed within an instant has only its first side.
         complete = self._counts[Count.JUMPS] // 2

@@ -2,10 +2,10 @@
 
 ``E`` is one for the rows of the flow and zero for those of implicit equations. A large sparse matrix is
 eliminated in the order of :mod:`armblocks.integration.elimination_plan`, with its pivots on the diagonal and
-work in proportion to its entries. The residual of its first solution is checked, each row relative to its
-terms (Oettli, Prager, *Numer. Math.* 6 (1964) 405-409: no scaling of states or equations changes that). If it
-is too large, and always for small or nearly full matrices, the dense matrix is eliminated with row pivoting
-instead.
+work in proportion to its entries. The residual of the first solution is checked, each row relative to its
+terms (Oettli, Prager, *Numer. Math.* 6 (1964) 405-409; the check is invariant to scaling). If the
+residual is too large, and always for small or nearly full matrices, the dense matrix is eliminated with row
+pivoting instead.
 """
 
 from __future__ import annotations
@@ -19,30 +19,30 @@ from armblocks.routines.memory import Integers, Reals
 from armblocks.routines.routine import Function, Program, Routine
 from armblocks.routines.values import Boolean, Integer, Real
 
-SMALL = 8
-"""Up to this size the dense matrix is eliminated with pivoting, which is the fastest way."""
-FULL = 0.5
-"""The same applies if L and U have this fraction of all entries."""
+MAX_DENSE_SIZE = 8
+"""Maximum size of a matrix that is always eliminated densely with pivoting, which is fastest there."""
+MAX_FILL = 0.5
+"""A matrix is also eliminated densely if L and U have more than this fraction of all entries."""
 SCALING_ROUNDS = 6
 """Iterations after which the bound of the rates is within a factor of about two, for most matrices."""
-LARGEST_RESIDUAL = 1e-7
+MAX_RESIDUAL = 1e-7
 """Relative residual above which the elimination without pivoting counts as failed. An error of this size in
 the Jacobian causes an error far below the usual tolerances of a Rosenbrock method."""
 
 
 class LinearEquationsLayout:
-    """The positions of the linear equations in ``scratch``. No step reads what an earlier step wrote there.
+    """The positions of the linear equations in ``scratch``. No step reads data of an earlier step.
 
     The system's ``flow_jacobian`` writes ``J`` and ``T``. ``right`` has the order of the equations,
-    ``solution`` that of the unknowns. ``swaps`` are integers, and so is ``dense``: whether the dense matrix
-    was eliminated.
+    ``solution`` the order of the unknowns. ``swaps`` are integers, and so is ``dense``: whether the dense
+    matrix was eliminated.
     """
 
     def __init__(self, pattern: JacobianPattern) -> None:
         self.pattern = pattern
         self.n, self.size = pattern.states, pattern.size
-        plan: Elimination | None = plan_elimination(pattern) if pattern.size > SMALL else None
-        if plan is not None and plan.filled > FULL * pattern.size**2:
+        plan: Elimination | None = plan_elimination(pattern) if pattern.size > MAX_DENSE_SIZE else None
+        if plan is not None and plan.filled > MAX_FILL * pattern.size**2:
             plan = None
         self.plan = plan
         stored = 0 if plan is None else plan.filled
@@ -63,7 +63,7 @@ class LinearEquations:
     """The functions of a program that factor the matrix of a step and solve for its right sides.
 
     ``gamma`` is the coefficient of the method. :attr:`factor` is the cheapest elimination,
-    :attr:`factor_dense` the one with pivoting.
+    :attr:`factor_dense` the elimination with pivoting.
     """
 
     def __init__(self, program: Program, layout: LinearEquationsLayout, gamma: float) -> None:
@@ -86,7 +86,7 @@ class LinearEquations:
     def rate_bound(self) -> Function[[Reals], Real]:
         """An upper bound of the magnitudes of the eigenvalues of ``J``.
 
-        For any positive v, ``max_i (|J| v)_i / v_i`` is such a bound (Collatz, Wielandt; Horn, Johnson,
+        For any positive v, ``max_i (|J| v)_i / v_i`` is an upper bound (Collatz, Wielandt; Horn, Johnson,
         Matrix Analysis, 8.1.31 and 8.1.18). A few iterations of ``v = sqrt(v |J| v)`` adapt v to the scales
         of the states.
         """
@@ -146,7 +146,7 @@ class _Dense:
         self.elimination(scratch).factor(r)
 
     def solve_linear(self, r: Routine, scratch: Reals) -> None:
-        """Solve for the right side in ``scratch`` with the factors computed last."""
+        """Solve for the right side in ``scratch`` with the latest factors."""
         layout = self.layout
         if self.solve_sparse is not None:
             with r.unless(scratch.integers[layout.dense] != 0):
@@ -263,7 +263,7 @@ class _Sparse:
                 part = coefficient * solution[unknowns[entries.places[k]]]
                 residual.value = residual.value - part
                 terms.value = terms.value + abs(part)
-            accurate.value = accurate.value & (abs(residual.value) <= LARGEST_RESIDUAL * terms.value)
+            accurate.value = accurate.value & (abs(residual.value) <= MAX_RESIDUAL * terms.value)
         return accurate.value
 
     def order(self, r: Routine) -> tuple[Integers, Integers]:

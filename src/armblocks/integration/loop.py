@@ -1,12 +1,12 @@
-"""The whole loop of a one-step method as one native function around the functions of a system.
+"""The whole loop of a one-step method as one native function, which calls the functions of a system.
 
-One call takes many steps: stages, error estimate, step control, values at the sample instants, ticks, events
-and restarts at breakpoints, without returning to Python. The whole state of the loop is in two flat arrays
+One call takes many steps: stages, error estimate, step control, recorded samples, ticks, events and
+restarts at breakpoints, without returning to Python. The whole state of the loop is in two flat arrays
 (:mod:`armblocks.integration.workspace`). A run can therefore stop after any number of steps and continue with
 bitwise identical results.
 
-The loop has these parts: a :class:`~armblocks.integration.method.Method` takes a step,
-:class:`~armblocks.integration.step_control.Steps` chooses its length, a
+The loop has three parts. A :class:`~armblocks.integration.method.Method` computes a step.
+:class:`~armblocks.integration.step_control.Steps` chooses the step size. A
 :class:`~armblocks.integration.schedule.Schedule` determines where steps end and the actions there. The
 schedule is :class:`~armblocks.integration.segments.Segments` for a system without ticks and events, else
 :class:`~armblocks.integration.instants.Instants` with its clocks, events and delayed signals.
@@ -44,7 +44,7 @@ POINTERS = 13
 
 @lru_cache(maxsize=64)
 def loop_text(tableau: Tableau, sizes: LoopSizes, pattern: JacobianPattern | None) -> Mapping[str, str]:
-    """LLVM IR of the loop ``advance`` and its functions, by symbol. Systems of equal sizes share it."""
+    """LLVM IR of the loop ``advance`` and its functions, by symbol. Systems of equal sizes share the IR."""
     program = Program()
     layout = None if pattern is None else LinearEquationsLayout(pattern)
     define_loop(program, "advance", tableau, Workspace(tableau, sizes), sizes, layout)
@@ -125,7 +125,7 @@ class _Loop:
         self.steps = Steps(frame, self.method, records, self.schedule)
 
     def write(self) -> None:
-        """The whole body; at the end the variables are written to the arrays."""
+        """Emit the body of the loop. At its end, the variables are stored in the arrays."""
         f, r = self.frame, self.frame.r
         with r.part() as f.body, r.stages(INSTANT, START, STEP) as stages:
             self.schedule.enter(stages)
@@ -141,7 +141,7 @@ class _Loop:
         f.store_variables()
 
     def start(self) -> None:
-        """Evaluate the first derivative of a segment, record samples at its start, choose the first step."""
+        """Evaluate the derivative at the start of a segment, record samples there, choose the step size."""
         f, method = self.frame, self.method
         time = f.time.value
         method.evaluate(time, method.x, 0)

@@ -54,7 +54,7 @@ class Method(ABC):
 
     # The step.
 
-    def prepare(self, time: Real) -> None:  # noqa: B027  # most methods need nothing
+    def prepare(self, time: Real) -> None:  # noqa: B027  # most methods have no such part
         """Compute the part of a step that does not depend on its length."""
 
     @abstractmethod
@@ -78,7 +78,7 @@ class Method(ABC):
         return self.norm(h, change_to(self.tableau.end_row))
 
     def check_stiffness(self, h: Real) -> None:  # noqa: B027
-        """Check at intervals whether another method is faster; pause if so."""
+        """Check at intervals whether another method is faster; pause the run in that case."""
 
     def set_point(self, time: Real) -> Reals:
         """The time of an evaluation. Before a breakpoint it is clamped, so that a source keeps its old

@@ -93,24 +93,24 @@ class NativeIntegrator:
     ) -> Integration:
         """A run from ``start`` to ``stop``, ready for its first step.
 
-        ``start`` is the state ``(n,)`` at ``samples[0]``, or a point. ``samples`` (N,) s, strictly ascending:
-        the recorded times; the last one is the default of ``stop``. ``breakpoints`` (nb,) s, in any order: a
-        step ends exactly on each one inside the run. Before a breakpoint, ``f`` is evaluated no later than
-        the last double before it; after it the integration restarts. ``step`` s: grid of a fixed-step method
-        (its times are ``k step``); ``rtol``, ``atol``, ``max_step`` s: for adaptive methods. With a
-        ``checkpoint`` the run continues from there, with the results of the run that wrote it. With
-        ``detect_stiffness`` it pauses where a method for stiff systems, or an explicit method again, is
-        faster (:attr:`Integration.other_method_faster`). ``span`` s: approximate length of the run, for the
+        ``start`` is the state ``(n,)`` at ``samples[0]``, or a point. ``samples (N,)`` s: the recorded times,
+        strictly ascending; the last is the default of ``stop``. ``breakpoints (nb,)`` s, in any order: a step
+        ends exactly at each breakpoint inside the run. Before a breakpoint, ``f`` is evaluated no later than
+        the last double before it; after it, the integration restarts. ``step`` s: grid of a fixed-step
+        method, whose times are ``k step``. ``rtol``, ``atol``, ``max_step`` s: for adaptive methods.
+        ``checkpoint``: the run continues from there, with the results of the run that wrote it.
+        ``detect_stiffness``: the run pauses where the other method, explicit or for stiff systems, is faster
+        (:attr:`Integration.other_method_faster`). ``span`` s: approximate length of the run, for the
         resolution of events near time 0 (default: ``stop``). ``jumps``: maximum number of rows for both sides
-        of the instants; 0: they are not recorded. Arguments are not checked.
+        of the instants; with 0 they are not recorded. Arguments are not checked.
         """
         if not isinstance(start, RunPoint):
             start = RunPoint(time=float(samples[0]), x=start)
-        begins, stop = start.time, float(samples[-1]) if stop is None else stop
+        begin_time, stop = start.time, float(samples[-1]) if stop is None else stop
         if checkpoint is not None:
-            begins = float(checkpoint.reals[Scalar.TIME])
+            begin_time = float(checkpoint.reals[Scalar.TIME])
         # A set instead of np.unique, which would load all of numpy.ma.
-        inside = np.array(sorted({float(time) for time in breakpoints if begins < time <= stop}))
+        inside = np.array(sorted({float(time) for time in breakpoints if begin_time < time <= stop}))
         ends = inside if inside.size and inside[-1] == stop else np.append(inside, stop)
         clamps = ends.copy()
         clamps[: inside.size] = np.nextafter(inside, -np.inf)
@@ -132,11 +132,11 @@ class NativeIntegrator:
         run.enable_stiffness_detection(
             max(1, int(run.counts[Count.STIFFNESS_DETECTION])) if detect_stiffness else 0
         )
-        if stop <= begins and not self.sizes.hybrid:
+        if stop <= begin_time and not self.sizes.hybrid:
             run.states[0] = start.x
             run.counts[Count.SAMPLE] = 1
             run.status = Status.DONE
-        elif stop <= begins:
+        elif stop <= begin_time:
             run.counts[Count.SEGMENT] = run.counts[Count.SEGMENTS]  # process the instant, take no step
         return run
 
@@ -178,7 +178,7 @@ def needed_tapes(sizes: LoopSizes) -> tuple[str, ...]:
 
 
 class Integration:
-    """One run. Its whole state is in two arrays, so the results do not depend on how many calls it takes."""
+    """One run. Its whole state is in two arrays, so results do not depend on the number of calls."""
 
     def __init__(
         self,
@@ -261,7 +261,7 @@ class Integration:
             self.counts[Count.END + clock] = number
 
     def _set_history(self, start: RunPoint) -> None:
-        """The initial history: that of the point, or the constant initial values."""
+        """Set the initial history: the history of the point, or the constant initial values."""
         workspace, lines = self.integrator.workspace, self.integrator.sizes.delays
         history = start.history
         if not history.size:
@@ -276,7 +276,7 @@ class Integration:
         self.counts[first + len(lines) :] = -1
 
     def end_step_at(self, time: float) -> None:
-        """Let a step end exactly at a later time (s), and restart there."""
+        """Add a breakpoint at a later time (s): a step ends exactly there, and the integration restarts."""
         p, samples, *bounds = self.inputs
         ends, clamps = (bound[self.counts[Count.SEGMENT] :] for bound in bounds)
         place = int(np.searchsorted(ends, time))
@@ -339,7 +339,7 @@ class Integration:
         self.status = Status.PAUSED
 
     def present_checkpoint(self) -> Checkpoint:
-        """The arrays as they are, between two calls of :meth:`advance`."""
+        """A copy of the present arrays, between two calls of :meth:`advance`."""
         return _checkpoint(self, self.reals.copy(), self.counts.copy())
 
     @property
@@ -355,7 +355,7 @@ class Integration:
 
     @property
     def trial_unknowns(self) -> Vector:
-        """Unknowns of the implicit equations at the point evaluated last, ``(nw,)``: NaN if not found."""
+        """Implicit unknowns at the latest evaluation point, ``(nw,)``; NaN if they were not found."""
         return self._vector(self.integrator.workspace.trial_w, self.integrator.sizes.algebraic)
 
     def enable_stiffness_detection(self, changes: int) -> None:
@@ -370,8 +370,11 @@ class Integration:
 
     @property
     def other_method_faster(self) -> bool:
-        """Whether the run paused because another method is faster from here on: stability has limited the
-        steps of an explicit method, or an explicit method could have taken the steps of a stiff one."""
+        """Whether the run paused because another method is now faster.
+
+        Stability has limited the steps of an explicit method, or an explicit method could have taken the
+        steps of a method for stiff systems.
+        """
         if self.status is not Status.PAUSED or not self.counts[Count.STIFFNESS_DETECTION]:
             return False
         if self._explicit:
@@ -384,12 +387,12 @@ class Integration:
 
     @property
     def instants(self) -> int:
-        """Instants with ticks so far."""
+        """The number of instants with ticks so far."""
         return int(self.counts[Count.INSTANTS])
 
     @property
     def events(self) -> int:
-        """Guards that fired so far."""
+        """The number of fired guards so far."""
         return int(self.counts[Count.EVENTS])
 
     def positive_guards(self, guards: Sequence[int]) -> list[int]:
@@ -445,17 +448,17 @@ class Integration:
 
     @property
     def accepted(self) -> int:
-        """Steps taken."""
+        """The number of accepted steps."""
         return int(self.counts[Count.ACCEPTED])
 
     @property
     def rejected(self) -> int:
-        """Rejected steps, because their error was too large."""
+        """The number of steps that were rejected because of their error."""
         return int(self.counts[Count.REJECTED])
 
     @property
     def evaluations(self) -> int:
-        """Evaluations of the derivative."""
+        """The number of evaluations of the derivative."""
         return int(self.counts[Count.EVALUATIONS])
 
     def _stage_derivatives(self) -> Vector:

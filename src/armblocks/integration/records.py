@@ -31,7 +31,7 @@ class Records:
         self.method = method
         self.evaluation = evaluation
         self.point = point
-        self.extra_done = frame.r.integer(0)
+        self.extra_stages_done = frame.r.integer(0)
         """Whether the extra stages of the step are evaluated."""
 
     def samples(self, time: Real, until: Real, h: Real | None) -> None:
@@ -81,7 +81,7 @@ class Records:
         return self.frame.counts[Count.JUMPS_RECORDED] != 0
 
     def record_side(self, time: Real, sample: Integer, x: Reals) -> None:
-        """Record one side of a jump: ``x``, ``z``, and ``w`` that was solved for them last. ``sample`` is the
+        """Record one side of a jump: ``x``, ``z``, and the latest solution ``w``. ``sample`` is the
         number of samples before this side."""
         f, workspace, sizes = self.frame, self.frame.workspace, self.frame.sizes
         number = f.counts[Count.JUMPS]
@@ -98,9 +98,9 @@ class Records:
         """Evaluate the extra stages of the dense output, unless this is already done for the present step."""
         if not self.method.has_extra_stages:
             return
-        with self.frame.r.when(self.extra_done.value == 0):
+        with self.frame.r.when(self.extra_stages_done.value == 0):
             self.method.extra_stages(time, h)
-            self.extra_done.value = 1
+            self.extra_stages_done.value = 1
 
     def checkpoint(self, condition: Boolean) -> None:
         """Save the state once, before the first step that the end of the run limits. A longer run continues

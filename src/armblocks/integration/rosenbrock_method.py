@@ -2,16 +2,16 @@
 
 The rows of K are the derivative at the start of the step, the stages, and the derivative at its end. Error
 norm, first step and dense output are therefore shared with the explicit methods. The Jacobian is evaluated
-once a step, also if the step is repeated with a shorter length. Infinite and NaN entries of the Jacobian (the
-derivative of a square root at zero) are replaced by zero. The derivative of the state is finite there, and
-the error estimate includes the effect of the replacement.
+once per step, even if the step is repeated with a shorter length. Infinite and NaN entries of the Jacobian
+(the derivative of a square root at zero) are replaced by zero. The derivative of the state is finite there,
+and the error estimate includes the effect of the replacement.
 """
 
 from __future__ import annotations
 
 from armblocks.integration.butcher_tableau import Row
 from armblocks.integration.evaluation import Evaluation
-from armblocks.integration.explicit_method import CHECK_EVERY
+from armblocks.integration.explicit_method import CHECK_INTERVAL
 from armblocks.integration.frame import Frame, copy
 from armblocks.integration.linear_equations import LinearEquations, LinearEquationsLayout
 from armblocks.integration.method import Index, Method
@@ -22,8 +22,9 @@ from armblocks.routines.memory import Reals
 from armblocks.routines.values import Real
 
 STABLE_BELOW, STABLE_CHECKS = 2.0, 16
-"""An explicit method could take a step if its length times the fastest rate is below this bound; and the
-number of consecutive checks with this result after which it takes over (times four after each return)."""
+"""An explicit method could take a step if its length times the fastest rate is below this bound. After this
+number of consecutive checks with this result, the explicit method takes over. The number is multiplied by
+four after each return to this method."""
 
 
 class RosenbrockMethod(Method):
@@ -62,7 +63,7 @@ class RosenbrockMethod(Method):
                 self.set_y((0.0, *tableau.matrix[stage]), h)
                 self.evaluate(fma(tableau.nodes[stage], h, time), self.y, row)
                 source = self.K(row)
-            self._right(source, stage, h)
+            self._right_side(source, stage, h)
             r.call(self.equations.solve, self.scratch)
             if stage == 0 and self.equations.is_accurate:
                 # If the elimination without pivoting failed, repeat it with pivoting.
@@ -74,8 +75,7 @@ class RosenbrockMethod(Method):
         self.evaluate(new_time, self.y, tableau.end_row)
 
     def error_norm(self, h: Real, error: Row) -> Real:
-        """The norm of the embedded estimate or of the defect in the middle of the step, whichever is
-        larger."""
+        """The larger of two norms: the embedded estimate, and the defect in the middle of the step."""
         assert self._time is not None
         r, tableau = self.r, self.rosenbrock
         ends = self.norm(h, error)
@@ -96,7 +96,7 @@ class RosenbrockMethod(Method):
             self.right.after(self.n)[i] = 0.0
         r.call(self.equations.solve, self.scratch)
         between = h * self.mean_square(weighted)
-        # If either is NaN the result is NaN, and the step is repeated with a shorter length.
+        # If one of the norms is NaN, the result is NaN, and the step is repeated with a shorter length.
         return select(between < ends, ends, between + ends * 0.0)
 
     def check_stiffness(self, h: Real) -> None:
@@ -111,7 +111,7 @@ class RosenbrockMethod(Method):
             f.count[place] for place in (Count.STIFFNESS_STEPS, Count.STIFF, Count.NON_STIFF)
         )
         steps.value = steps.value + 1
-        checked = steps.value & (CHECK_EVERY - 1)
+        checked = steps.value & (CHECK_INTERVAL - 1)
         due = (f.counts[Count.STIFFNESS_DETECTION] != 0) & (checked == 0)
         with r.when(due):
             stable = h * r.call(self.equations.rate_bound, self.scratch) < STABLE_BELOW
@@ -120,7 +120,7 @@ class RosenbrockMethod(Method):
             reached = non_stiff.value >= required.value
             f.steps_of_call.value = select(reached, f.arrays.max_steps, f.steps_of_call.value)
 
-    def _right(self, source: Reals, stage: int, h: Real) -> None:
+    def _right_side(self, source: Reals, stage: int, h: Real) -> None:
         """``right = f + sum_j couplings[j] k[j] + h time_weight T``."""
         tableau, T = self.rosenbrock, self.scratch.after(self.layout.T)
         weight = tableau.time_weights[stage]

@@ -80,11 +80,11 @@ class RosenbrockTableau:
         checks |= {f"dense row {j} at the step's end": (ends[j], w) for j, w in enumerate(self.weights)}
         if self.error is not None:
             checks["error"] = (float(np.array(self.error) @ sums), 0.0)
-        for what, (found, expected) in checks.items():
+        for name, (found, expected) in checks.items():
             # The coefficients are published with 15 or 16 digits and are multiplied by numbers of up to 300.
             if abs(found - expected) > 100 * CONSISTENCY * max(1.0, abs(expected)):
                 raise InputError(
-                    f"{what} adds up to {found!r}",
+                    f"{name} adds up to {found!r}",
                     where=f"integrator {self.name}",
                     allowed=f"{expected!r}",
                     fix="check the coefficients against their source",
@@ -97,7 +97,7 @@ class RosenbrockTableau:
 
     @property
     def stages(self) -> int:
-        """Systems of linear equations that one step solves."""
+        """Number of systems of linear equations that one step solves."""
         return len(self.nodes)
 
     @property
@@ -149,7 +149,7 @@ class RosenbrockTableau:
 
     @property
     def content(self) -> str:
-        """All numbers of the method as text, exactly: the part of a cache key that identifies it."""
+        """All numbers of the method as text, exactly: the part of a cache key that identifies the method."""
         numbers = (
             self.gamma,
             self.nodes,
@@ -188,12 +188,12 @@ def from_textbook(
     return {
         "gamma": gamma[0][0],
         "nodes": tuple(float(sum(map(Fraction, row))) for row in alpha),
-        "matrix": tuple(_over(row, inverse)[:i] for i, row in enumerate(alpha)),
+        "matrix": tuple(_times_inverse(row, inverse)[:i] for i, row in enumerate(alpha)),
         "couplings": tuple(tuple(float(-entry) for entry in row[:-1]) for row in inverse),
         "time_weights": tuple(float(sum(map(Fraction, row))) for row in gamma),
-        "weights": _over(b, inverse),
-        "dense": tuple(zip(*(_over(column, inverse) for column in zip(*dense)))),
-        "error": None if error is None else _over(error, inverse),
+        "weights": _times_inverse(b, inverse),
+        "dense": tuple(zip(*(_times_inverse(column, inverse) for column in zip(*dense)))),
+        "error": None if error is None else _times_inverse(error, inverse),
     }
 
 
@@ -207,8 +207,8 @@ def _inverse(gamma: Sequence[Sequence[float]]) -> list[list[Fraction]]:
     return rows
 
 
-def _over(weights: Sequence[float], inverse: Sequence[Sequence[Fraction]]) -> Row:
-    """A row of weights times the triangular matrix ``inverse``; a shorter row counts as padded with zeros."""
+def _times_inverse(weights: Sequence[float], inverse: Sequence[Sequence[Fraction]]) -> Row:
+    """A row of weights times the triangular matrix ``inverse``; a shorter row is padded with zeros."""
     exact = [Fraction(weight) for weight in weights]
     return tuple(
         float(sum((exact[k] * inverse[k][j] for k in range(j, len(exact))), Fraction(0)))

@@ -53,7 +53,7 @@ def is_history(numbers: Vector, width: int) -> bool:
 
 
 def fits(checkpoint: Checkpoint, workspace: Workspace, sizes: LoopSizes) -> bool:
-    """Whether the arrays have the sizes and indices of a loop; those of a damaged file may not."""
+    """Whether the arrays have the sizes and indices of a loop. The arrays of a damaged file may differ."""
     reals, counts = checkpoint.reals, checkpoint.counts
     if reals.size < workspace.size or counts.size != workspace.counts:
         return False

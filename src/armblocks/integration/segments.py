@@ -37,14 +37,14 @@ class Segments(Schedule):
         self.frame.leave_unless(finite, Status.NON_FINITE)
 
     def handle_non_finite(self, time: Real, finite: Boolean, accepted: Part) -> None:
-        """Return from the loop if steps of minimum length are not finite."""
+        """Return from the loop if the result of a step of minimum length is not finite."""
         self.frame.leave_unless(finite, Status.NON_FINITE)
 
     def accept(self, stages: Stages) -> None:
-        """Record the samples of the step and accept it; at the end of a segment, restart."""
+        """Record the samples of the step and accept it. At a breakpoint, start the next segment."""
         f, records = self.frame, self.records
         new_time = f.new_time.value
-        records.extra_done.value = 0
+        records.extra_stages_done.value = 0
         records.samples(f.time.value, new_time, f.h.value)
         f.copy(f.workspace.y, f.workspace.x, f.n)
         f.copy(
@@ -68,7 +68,7 @@ class Segments(Schedule):
         stages.go(START)
 
     def record_breakpoint(self, time: Real) -> None:
-        """Record both sides of a breakpoint, where a sample at this time is already recorded."""
+        """Record the values before and after a breakpoint. A sample at its time is already recorded."""
         f = self.frame
         x, sample = f.vector(f.workspace.x), f.count[Count.SAMPLE].value
         first = sample == 0
@@ -79,7 +79,7 @@ class Segments(Schedule):
 
 
 def choose_first_step(frame: Frame, method: Method, records: Records, time: Real) -> None:
-    """Choose the length of the first step from the derivative, limited by the end of the run."""
+    """Choose the length of the first step from the derivative, limited by the end of the segment."""
     interval = frame.end.value - time
     length, bounded = method.first_step(time, interval, frame.max_step)
     records.checkpoint(bounded & (frame.end.value >= frame.last_end))

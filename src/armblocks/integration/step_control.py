@@ -17,17 +17,18 @@ from armblocks.routines.arithmetic import fma, inverse_root, maximum, minimum, s
 from armblocks.routines.values import Real
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
-SHORT_EVERY, SHORT_BACK = 64, 8
+"""Safety factor of the step length, and the minimum and the maximum ratio of consecutive step lengths."""
+SHORT_CHECK_INTERVAL, SHORT_DECREASE = 64, 8
 """Number of steps between two checks for needlessly short steps (a power of two), and the decrease of their
-count at a check that finds none."""
+count at a check without a short step."""
 SHORT_CHANGE, RESOLVED = 1000.0, 4.0
 """A step is needlessly short if ``h |f(end) - f(start)|``, in units of the tolerance, is below the smaller of
 ``SHORT_CHANGE`` and ``RESOLVED * rtol^(2/(q + 1) - 1)``; q is the order of the error estimate. A step across
 a jump of ``f`` is accepted once this change is below 1 over the smallest weight of the error, some hundreds.
 For a smooth solution of rate L the change is ``(h L)^2 / rtol``, and the error estimate makes ``(h L)^2``
 about 10 to 50 times ``rtol^(2/(q + 1))``, which is more than ``RESOLVED``."""
-MOST_STEPS = 1e8
-"""A run with needlessly short steps ends if it would need more than this number of further steps."""
+MAX_FURTHER_STEPS = 1e8
+"""Maximum number of further steps that a run with needlessly short steps may need; above it, the run ends."""
 
 
 class Steps:
@@ -51,7 +52,7 @@ class Steps:
         """Emit the stages of a step to ``new_time``; return its length."""
         f = self.frame
         if f.sizes.hybrid:
-            self.records.extra_done.value = 0
+            self.records.extra_stages_done.value = 0
         h = new_time - time
         f.new_time.value = new_time
         f.h.value = h
@@ -98,7 +99,7 @@ class Steps:
         f.scalar[Scalar.STEP].value = following
 
     def _check_short_steps(self, h: Real) -> None:
-        """Every ``SHORT_EVERY`` steps, check whether the step is needlessly short; end the run if most are.
+        """Check at intervals whether the step is needlessly short; end the run if most steps are.
 
         If the equations jump without an event, for example a sign in a feedback loop, every method shrinks
         its steps until the jump is within the tolerance. Stability has the same effect on the steps of an
@@ -106,7 +107,7 @@ class Steps:
         """
         f, r, method = self.frame, self.frame.r, self.method
         tableau, short = method.tableau, f.count[Count.SHORT_STEPS]
-        with r.when(f.count[Count.ACCEPTED].value & (SHORT_EVERY - 1) == 0):
+        with r.when(f.count[Count.ACCEPTED].value & (SHORT_CHECK_INTERVAL - 1) == 0):
             new_time = f.new_time.value
             with r.when((new_time < f.end.value) & (h < f.max_step)):
                 # rtol^(2/(q+1) - 1), computed as rtol^(-1/(q+1)) to the power q - 1
@@ -116,12 +117,12 @@ class Steps:
                     power = power * root
                 with r.when(method.derivative_change(h) < minimum(r.constant(SHORT_CHANGE), power)):
                     short.value = short.value + 1
-                    far = f.last_end - new_time > MOST_STEPS * h
+                    far = f.last_end - new_time > MAX_FURTHER_STEPS * h
                     long = short.value >= method.short_checks
                     with r.when(far & long):
                         f.leave(Status.MINIMUM_STEP)
                 with r.otherwise():
-                    less = short.value - SHORT_BACK
+                    less = short.value - SHORT_DECREASE
                     short.value = select(less > 0, less, 0)
 
     def _fixed(self) -> None:

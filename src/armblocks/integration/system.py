@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 
-ENDING = ("stop", "fail")
+ENDING_ACTIONS = ("stop", "fail")
 """The actions of guards that end a run when they are positive."""
 _PARAMETER_FUNCTIONS = ("initial_states", "initial_discrete", "initial_algebraic", "breakpoints")
 _FUNCTIONS = (
@@ -56,7 +56,8 @@ def cached_system(key: str, trace: Callable[[], HybridSystem]) -> CompiledSystem
 
     ``key`` must cover everything that the equations depend on, including parameter values; the sources of
     this package are added to it. ``trace()`` is only called if the key is not in the cache: otherwise neither
-    tracing nor CasADi nor the LLVM optimiser is used. Raises what ``trace`` and :func:`compile_system` raise.
+    tracing nor CasADi nor the LLVM optimiser is used. Raises the errors of ``trace`` and
+    :func:`compile_system`.
     """
     if cache.folder() is None:
         return compile_system(trace())
@@ -106,7 +107,7 @@ class CompiledSystem:
         self.called: tuple[str, ...] = tuple(description["called"])
         """Blocks whose outputs are computed in Python at their ticks."""
         self.loops: tuple[tuple[str, ...], ...] = tuple(tuple(names) for names in description["loops"])
-        """The signals of each linear loop that is solved in place."""
+        """The signals of each linear loop that is solved symbolically."""
         self.sizes = LoopSizes(
             states=self.states.size,
             discrete=self.discrete.size,
@@ -117,17 +118,22 @@ class CompiledSystem:
             ),
             clocks=tuple((float(period), float(offset)) for period, offset in description["clocks"]),
             directions=tuple(int(direction) for direction in description["guard_directions"]),
-            stops=tuple(k for k, action in enumerate(description["guard_actions"]) if action in ENDING),
+            stops=tuple(
+                k for k, action in enumerate(description["guard_actions"]) if action in ENDING_ACTIONS
+            ),
             captures=bool(description["captures"]),
             modes=tuple(int(place) for place in description["modes"]),
             followers=tuple(bool(follows) for follows in description["followers"]),
-            remembered=tuple(
-                (int(mode), int(before), int(working)) for mode, before, working in description["remembered"]
+            hysteresis_modes=tuple(
+                (int(mode), int(before), int(working))
+                for mode, before, working in description["hysteresis_modes"]
             ),
-            recaptured=tuple(int(place) for place in description["recaptured"]),
-            momentary=tuple(int(place) for place in description["momentary"]),
-            silenced=tuple((int(guard), int(place)) for guard, place in description["silenced"]),
-            locating=tuple(int(guard) for guard in description["locating"]),
+            recaptured_states=tuple(int(place) for place in description["recaptured_states"]),
+            momentary_states=tuple(int(place) for place in description["momentary_states"]),
+            silenced_guards=tuple(
+                (int(guard), int(place)) for guard, place in description["silenced_guards"]
+            ),
+            locating_guards=tuple(int(guard) for guard in description["locating_guards"]),
             tangents=None if description["tangents"] is None else tuple(description["tangents"]),
         )
         self._breakpoint_count = int(description["breakpoints"])
@@ -247,10 +253,9 @@ class CompiledSystem:
         return y
 
     def loop_matrices(self, t: Vector, x: Vector, z: Vector, w: Vector, p: Vector) -> list[Vector]:
-        """For each of ``loops`` with n signals the matrices ``(N, n, n)`` of its equations, at N times.
+        """The matrices ``(N, n, n)`` of the equations of each loop with n signals, at N times.
 
-        The tape is interpreted: the condition of a loop is estimated at few times, and compilation would take
-        longer.
+        The tape is interpreted: condition numbers are needed at few times, and compilation would take longer.
         """
         from armblocks.compiler.interpret import interpret
 
@@ -309,11 +314,11 @@ def _describe(system: HybridSystem, tapes: Mapping[str, Tape]) -> dict[str, Any]
         "captures": system.captures,
         "modes": list(system.modes),
         "followers": list(system.followers),
-        "remembered": [list(places) for places in system.remembered],
-        "recaptured": list(system.recaptured),
-        "momentary": list(system.momentary),
-        "silenced": [list(places) for places in system.silenced],
-        "locating": list(system.locating),
+        "hysteresis_modes": [list(places) for places in system.hysteresis_modes],
+        "recaptured_states": list(system.recaptured_states),
+        "momentary_states": list(system.momentary_states),
+        "silenced_guards": [list(places) for places in system.silenced_guards],
+        "locating_guards": list(system.locating_guards),
         "tangents": system.tangents,
         "guard_directions": list(system.guard_directions),
         "guard_names": list(system.guard_names),

@@ -21,7 +21,7 @@ class Status(IntEnum):
     NON_FINITE_START = 4
     """The derivative at the start of a segment is NaN or infinite."""
     ENDLESS_EVENTS = 5
-    """Endless events: at one instant, or at ever shorter distances."""
+    """Events without end: at one instant, or at decreasing distances."""
     HISTORY_FULL = 6
     """The history of delayed signals needs more memory: enlarge it and call again."""
     STOPPED = 7
@@ -41,7 +41,7 @@ class Scalar(IntEnum):
     STEP = 1
     """Length of the next step; with a fixed step, the spacing of the grid."""
     TRIED = 2
-    """Length of the step tried last."""
+    """Length of the latest trial step."""
     RTOL = 3
     ATOL = 4
     MAX_STEP = 5
@@ -63,8 +63,8 @@ class Scalar(IntEnum):
 class Count(IntEnum):
     """Indices in the array of integers.
 
-    After them come the number of the next tick of every clock, then the first and the last row of the history
-    that each delayed signal reads. A last row of -1 stands for the newest.
+    Behind them are the number of the next tick of every clock, and the first and the last row of the history
+    that each delayed signal reads. A last row of -1 means the newest row.
     """
 
     SAMPLE = 0
@@ -80,7 +80,7 @@ class Count(IntEnum):
     REJECTED = 7
     EVALUATIONS = 8
     RESTARTED = 9
-    """Whether the next step is the first after a restart, so that its length is chosen anew."""
+    """Whether the next step is the first after a restart, so that its length is chosen again."""
     INSTANTS = 10
     """Instants with ticks so far."""
     EVENTS = 11
@@ -90,7 +90,7 @@ class Count(IntEnum):
     SAVED = 13
     """Whether the checkpoint has been written."""
     STIFFNESS_STEPS = 14
-    """Number of steps so far; every ``CHECK_EVERY``-th step is checked for stiffness."""
+    """Number of steps so far; every ``CHECK_INTERVAL``-th step is checked for stiffness."""
     STIFF = 15
     """Explicit methods: number of checks with a stability-limited step. Methods for stiff systems: number of
     consecutive checks without stiffness after which an explicit method replaces them."""
@@ -106,7 +106,7 @@ class Count(IntEnum):
     HISTORY_CAPACITY = 20
     """Capacity in rows."""
     SHORT_STEPS = 21
-    """Number of checks that found a needlessly short step, minus ``SHORT_BACK`` for every check that did
+    """Number of checks that found a needlessly short step, minus ``SHORT_DECREASE`` for every check that did
     not."""
     RAPID_EVENTS = 22
     """Consecutive events whose distances are at most ``RAPID_DISTANCE`` times the time."""
@@ -123,7 +123,7 @@ class Stage(IntEnum):
     """The stage at which the loop is entered."""
 
     INSTANT = 0
-    """Ticks and events at the time reached, then the start."""
+    """Ticks and events at the present time, then the start."""
     START = 1
     """The first derivative."""
     RUNNING = 2
@@ -150,13 +150,13 @@ class LoopSizes:
     - ``captures``: whether ``update`` is also called just before every instant.
     - ``modes``: the indices of the modes in ``z``. ``followers``: for each mode, whether it is a following
       mode.
-    - ``remembered``: the indices in ``z`` of the hysteresis modes, each with the index of its previous value
-      and of the mode without which that value is kept, -1 for none.
-    - ``recaptured``: the indices in ``z`` of the captured values that belong to hysteresis modes.
-    - ``momentary``: the indices in ``z`` that are set to 0 at the end of every instant.
-    - ``silenced``: guards, each with an index of ``momentary``; the guard does not fire while that value is
-      nonzero.
-    - ``locating``: the guards that only locate mode changes.
+    - ``hysteresis_modes``: three indices in ``z`` each: the mode, its previous value, and a mode that is 0
+      while the previous value does not change (-1: none).
+    - ``recaptured_states``: the indices in ``z`` of the captured values that belong to hysteresis modes.
+    - ``momentary_states``: the indices in ``z`` that are set to 0 at the end of every instant.
+    - ``silenced_guards``: guards, each with an index of ``momentary_states``. While that value is nonzero,
+      the guard does not fire.
+    - ``locating_guards``: the guards that only locate mode changes.
     - ``tangents``: the first entries of ``x``, ``z`` and the guards that belong to derivatives, if there are
       any.
     """
@@ -171,11 +171,11 @@ class LoopSizes:
     captures: bool = False
     modes: tuple[int, ...] = ()
     followers: tuple[bool, ...] = ()
-    remembered: tuple[tuple[int, int, int], ...] = ()
-    recaptured: tuple[int, ...] = ()
-    momentary: tuple[int, ...] = ()
-    silenced: tuple[tuple[int, int], ...] = ()
-    locating: tuple[int, ...] = ()
+    hysteresis_modes: tuple[tuple[int, int, int], ...] = ()
+    recaptured_states: tuple[int, ...] = ()
+    momentary_states: tuple[int, ...] = ()
+    silenced_guards: tuple[tuple[int, int], ...] = ()
+    locating_guards: tuple[int, ...] = ()
     tangents: tuple[int, int, int] | None = None
 
     @property
@@ -197,15 +197,15 @@ class Workspace:
 
     - ``z``, ``w``: discrete variables and implicit unknowns of the last accepted step.
     - ``new_x``, ``new_z``: the result of a reset or update.
-    - ``trial_w``: the implicit unknowns at the point evaluated last.
+    - ``trial_w``: the implicit unknowns at the latest evaluation point.
     - ``guards``: their present values; ``guards_before``, ``guards_middle``: at the beginning and in the
       middle of the searched window.
     - ``guard_derivatives``: their derivatives at the end of the previous window (NaN: unknown).
     - ``signs``: their stored signs (0: none yet); ``guards_at_start``, ``signs_at_start``: values and signs
       at the start of the step.
     - ``fired``: the marks of the guards that fired; ``last``: the time of the last event of each guard.
-    - ``gap``: the time between its last two events; ``shrinking``: how many times in a row this time became
-      shorter.
+    - ``gap``: the time between its last two events; ``shrinking``: the number of
+      consecutive decreases of this time.
     - ``repeats``: the number of its events among the latest consecutive close events.
     - ``contradictions``: nonzero for inconsistent modes.
     - ``ticking``: the marks of the clocks.

@@ -15,10 +15,10 @@ from armblocks.matlab.function_kinds import (
     Arithmetic,
     Function,
     MismatchError,
-    along_dimension,
-    created,
+    array_function,
+    creation_function,
     dimension_of,
-    whole,
+    reduction_function,
 )
 
 MAX_ELEMENTS = 100_000
@@ -38,7 +38,7 @@ def _norm(ops: Arithmetic, x: Any, kind: Any = None) -> Any:
         raise MismatchError("the argument is a matrix, whose norm(A) would be its largest singular value")
     if not (kind is None or (isinstance(kind, str) and kind == "fro")):
         raise MismatchError("the option is not known; allowed is 'fro'")
-    return ops.length_of(x)
+    return ops.norm(x)
 
 
 def _vectors(ops: Arithmetic, name: str, count: int | None, *vectors: Any) -> list[list[Any]]:
@@ -109,8 +109,13 @@ def _extents(sizes: Sequence[Any]) -> tuple[int, int]:
 
 
 def range_of(first: float, step: float, last: float) -> NDArray[np.float64]:
-    """``first:step:last``: the elements are first + k step. Raises :class:`MismatchError`."""
-    steps = (last - first) / step if step else math.nan
+    """``first:step:last``: the elements are first + k step, none for a step of 0.
+
+    Raises :class:`MismatchError` for numbers that are not finite.
+    """
+    if step == 0.0:
+        return np.zeros((1, 0))
+    steps = (last - first) / step
     if not (math.isfinite(step) and math.isfinite(steps)):
         raise MismatchError("the steps do not lead to the last number")
     # As in MATLAB: a last number within rounding belongs to the range, and the upper half of the elements is
@@ -147,7 +152,7 @@ def _translation(ops: Arithmetic, *arguments: Any) -> Any:
     entries = [entry for value in arguments for entry in ops.entries(value)]
     if len(arguments) not in (1, 3) or len(entries) != 3:
         raise MismatchError(
-            f"{len(arguments)} arguments with {len(entries)} elements are no translation; "
+            f"{len(arguments)} arguments with {len(entries)} elements are not a translation; "
             "allowed are x, y, z, or [x y z], or a 4x4 pose"
         )
     x, y, z = entries
@@ -187,7 +192,7 @@ def _rotations() -> Mapping[str, Function]:
     for prefix, extent, kind in (("rot", 3, "rotation matrix"), ("trot", 4, "pose")):
         for axis, letter in enumerate("xyz"):
             name = f"{prefix}{letter}"
-            functions[name] = whole(
+            functions[name] = array_function(
                 "angle, 'deg'",
                 f"The {extent}x{extent} {kind} of a rotation about {letter}; "
                 "the angle in rad, with `'deg'` in degrees.",
@@ -200,22 +205,24 @@ def _rotations() -> Mapping[str, Function]:
 
 
 FUNCTIONS_OF_ARRAYS: Mapping[str, Function] = {
-    "zeros": created(
+    "zeros": creation_function(
         "m, n", "m x n zeros; `zeros(n)` is square.", lambda *n: np.zeros(_extents(n)), optional=2
     ),
-    "ones": created("m, n", "m x n ones; `ones(n)` is square.", lambda *n: np.ones(_extents(n)), optional=2),
-    "eye": created(
+    "ones": creation_function(
+        "m, n", "m x n ones; `ones(n)` is square.", lambda *n: np.ones(_extents(n)), optional=2
+    ),
+    "eye": creation_function(
         "m, n", "The identity matrix; `eye(n)` is square.", lambda *n: np.eye(*_extents(n)), optional=2
     ),
-    "linspace": created(
+    "linspace": creation_function(
         "first, last, n", "n numbers with equal distances; 100 without n.", _linspace, optional=1
     ),
-    "sum": along_dimension("The sum of the elements.", ARRAYS, lambda ops, x: ops.total(x), reserved=True),
-    "prod": along_dimension(
-        "The product of the elements.", ARRAYS, lambda ops, x: ops.folded(lambda a, b: a * b, x)
+    "sum": reduction_function("The sum of the elements.", ARRAYS, lambda ops, x: ops.total(x), reserved=True),
+    "prod": reduction_function(
+        "The product of the elements.", ARRAYS, lambda ops, x: ops.fold(lambda a, b: a * b, x)
     ),
-    "mean": along_dimension("The mean of the elements.", ARRAYS, _mean),
-    "norm": whole(
+    "mean": reduction_function("The mean of the elements.", ARRAYS, _mean),
+    "norm": array_function(
         "x, 'fro'",
         "The length of a vector; of a matrix, `norm(A, 'fro')` is the root of the sum of all squares.",
         ARRAYS,
@@ -224,25 +231,27 @@ FUNCTIONS_OF_ARRAYS: Mapping[str, Function] = {
         takes_text=True,
         reserved=True,
     ),
-    "dot": whole("a, b", "The scalar product of two vectors.", ARRAYS, _dot),
-    "cross": whole("a, b", "The vector product of two vectors with 3 elements.", ARRAYS, _cross),
-    "transpose": whole(
+    "dot": array_function("a, b", "The scalar product of two vectors.", ARRAYS, _dot),
+    "cross": array_function("a, b", "The vector product of two vectors with 3 elements.", ARRAYS, _cross),
+    "transpose": array_function(
         "A", "The transpose, as `A'`.", ARRAYS, lambda ops, x: ops.transposed_matrix(x), reserved=True
     ),
-    "diag": whole(
+    "diag": array_function(
         "x",
         "The diagonal of a matrix, or the matrix with this diagonal.",
         ARRAYS,
         lambda ops, x: ops.diagonal(x),
         reserved=True,
     ),
-    "inv": whole("A", "The inverse of a matrix.", ARRAYS, lambda ops, x: ops.inverse(x), reserved=True),
-    "trace": whole("A", "The sum of the diagonal.", ARRAYS, _trace),
-    "numel": whole("x", "The number of elements.", ARRAYS, _count(lambda m, n: m * n)),
-    "length": whole(
+    "inv": array_function(
+        "A", "The inverse of a matrix.", ARRAYS, lambda ops, x: ops.inverse(x), reserved=True
+    ),
+    "trace": array_function("A", "The sum of the diagonal.", ARRAYS, _trace),
+    "numel": array_function("x", "The number of elements.", ARRAYS, _count(lambda m, n: m * n)),
+    "length": array_function(
         "x", "The larger of rows and columns.", ARRAYS, _count(lambda m, n: max(m, n) if m * n else 0)
     ),
-    "size": whole(
+    "size": array_function(
         "x, k",
         "Rows and columns, in formulas those of a column for vectors; `size(A, 1)` is the number of rows, "
         "`size(A, 2)` that of columns.",
@@ -252,7 +261,7 @@ FUNCTIONS_OF_ARRAYS: Mapping[str, Function] = {
     ),
 }
 RIGID_MOTIONS: Mapping[str, Function] = {
-    "transl": whole(
+    "transl": array_function(
         "x, y, z",
         "The 4x4 pose of a translation, also `transl([x y z])`; of a pose, its translation.",
         GEOMETRY,
@@ -260,7 +269,7 @@ RIGID_MOTIONS: Mapping[str, Function] = {
         optional=2,
     ),
     **_rotations(),
-    "SE3": whole(
+    "SE3": array_function(
         "x, y, z",
         "The 4x4 pose of a translation, also `SE3([x y z])`; `SE3()` is the identity.",
         GEOMETRY,

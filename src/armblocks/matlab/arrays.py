@@ -16,21 +16,21 @@ from armblocks.matlab.source import Location
 from armblocks.rounded_functions import power
 
 Array = NDArray[np.float64]
-"""MATLAB's only number: a matrix, always with two axes. A scalar is (1, 1), the empty matrix is (0, 0).
+"""MATLAB's numeric type: a matrix, always with two axes. A scalar is (1, 1), the empty matrix is (0, 0).
 
 The results of comparisons and logical operators are arrays of Booleans, as they select elements when they are
-indices. :func:`array_of` makes numbers of them.
+indices. :func:`array_of` converts them to numbers.
 """
 
 MAX_COMPUTED_ELEMENTS = 20_000_000
 """Maximum number of elements that one script may compute, which limits time and memory."""
-ROUNDED_WORK = 1000
-"""Cost of a sine or a power relative to a sum."""
+ROUNDED_FUNCTION_COST = 1000
+"""Cost of a correctly rounded function, such as a sine or a power, relative to a sum."""
 
 
 EXPONENTS = range(-64, 65)
-"""Exponents of matrices."""
-POWERS_OF_MATRICES = "numbers, or a square matrix with a whole exponent from -64 to 64"
+"""Allowed exponents of matrix powers."""
+ALLOWED_MATRIX_POWERS = "numbers, or a square matrix with a whole exponent from -64 to 64"
 
 
 @dataclass
@@ -55,7 +55,7 @@ def scalar(value: float) -> Array:
 
 
 def empty() -> Array:
-    """``[]``"""
+    """The empty matrix ``[]``."""
     return np.zeros((0, 0))
 
 
@@ -151,7 +151,7 @@ def operate(location: Location, budget: Budget, operator: str, left: object, rig
         return _matrix_power(location, budget, a, b)
 
 
-_COMPARED: dict[str, Callable[[Array, Array], NDArray[np.bool_]]] = {
+_COMPARISONS: dict[str, Callable[[Array, Array], NDArray[np.bool_]]] = {
     "==": np.equal,
     "~=": np.not_equal,
     "<": np.less,
@@ -159,7 +159,7 @@ _COMPARED: dict[str, Callable[[Array, Array], NDArray[np.bool_]]] = {
     ">": np.greater,
     ">=": np.greater_equal,
 }
-_ELEMENTWISE = frozenset(("+", "-", ".*", "./", ".\\", ".^", *_COMPARED))
+_ELEMENTWISE = frozenset(("+", "-", ".*", "./", ".\\", ".^", *_COMPARISONS))
 _SCALAR_OPERATIONS: dict[str, Callable[[Array, Array], Array]] = {
     "+": np.add,
     "-": np.subtract,
@@ -175,11 +175,11 @@ def _elementwise(location: Location, budget: Budget, operator: str, a: Array, b:
         raise location.error(
             f"'{operator}' of {kind_of(a)} and {kind_of(b)}", allowed="equal sizes, or a number on one side"
         )
-    budget.spend(location, max(a.size, b.size) * (ROUNDED_WORK if operator == "^" else 1))
+    budget.spend(location, max(a.size, b.size) * (ROUNDED_FUNCTION_COST if operator == "^" else 1))
     if operator == "^" and np.any((a < 0) & (b != np.floor(b))):
         raise location.error("a root of a negative number is complex", allowed="real numbers")
-    if operator in _COMPARED:
-        return cast("Array", _COMPARED[operator](a, b))
+    if operator in _COMPARISONS:
+        return cast("Array", _COMPARISONS[operator](a, b))
     return _SCALAR_OPERATIONS[operator](a, b)
 
 
@@ -210,7 +210,7 @@ def _matrix_power(location: Location, budget: Budget, a: Array, b: Array) -> Arr
     if a.shape[0] != a.shape[1] or exponent not in EXPONENTS:
         raise location.error(
             f"'^' of {kind_of(a)} and {kind_of(b)}",
-            allowed=POWERS_OF_MATRICES,
+            allowed=ALLOWED_MATRIX_POWERS,
             fix="write .^ for powers element by element",
         )
     budget.spend(location, a.size * (a.shape[0] + 8))
@@ -227,47 +227,47 @@ def _product(a: Array, b: Array) -> Array:
     return total
 
 
-def stacked(location: Location, budget: Budget, rows: Sequence[Sequence[object]]) -> Array:
+def concatenated(location: Location, budget: Budget, rows: Sequence[Sequence[object]]) -> Array:
     """``[a b; c d]`` of arrays."""
-    bands: list[Array] = []
+    row_blocks: list[Array] = []
     for row in rows:
         parts = [array_of(location, value, "an element of a matrix") for value in row]
         parts = [part for part in parts if part.size] or parts[:1]
         if len({part.shape[0] for part in parts}) > 1:
             raise location.error("the elements of a row differ in height", allowed="equal heights in a row")
-        bands.append(np.hstack(parts))
-    bands = [band for band in bands if band.size]
-    if not bands:
+        row_blocks.append(np.hstack(parts))
+    row_blocks = [row_block for row_block in row_blocks if row_block.size]
+    if not row_blocks:
         return empty()
-    widths = [band.shape[1] for band in bands]
+    widths = [row_block.shape[1] for row_block in row_blocks]
     if len(set(widths)) > 1:
         raise location.error(
             f"the rows of the matrix have {', '.join(map(str, widths[:8]))} elements",
             allowed="as many elements in every row",
             fix="complete the short row, or put '...' at the end of a continued line",
         )
-    check_size(location, sum(band.shape[0] for band in bands), widths[0])
-    budget.spend(location, sum(band.size for band in bands))
-    matrix = np.vstack(bands)
+    check_size(location, sum(row_block.shape[0] for row_block in row_blocks), widths[0])
+    budget.spend(location, sum(row_block.size for row_block in row_blocks))
+    matrix = np.vstack(row_blocks)
     logical = all(is_logical(value) for row in rows for value in row)
     return cast("Array", matrix != 0.0) if logical else matrix
 
 
-def index_of(location: Location, value: object, maximum: int, shown: str = "") -> int:
-    """A 1-based index as a 0-based one; ``shown`` is the name of the indexed value in messages."""
+def index_of(location: Location, value: object, maximum: int, label: str = "") -> int:
+    """A 1-based index as a 0-based one; ``label`` is the name of the indexed value in messages."""
     number = number_of(location, value, "an index")
     if not (1 <= number <= maximum) or number != int(number):
         raise location.error(
             f"the index {number:g} is not possible here",
-            allowed=f"{shown}(1) to {shown}({maximum})"
-            if shown and maximum
+            allowed=f"{label}(1) to {label}({maximum})"
+            if label and maximum
             else f"a whole number from 1 to {maximum}",
         )
     return int(number) - 1
 
 
 def positions(
-    location: Location, shape: tuple[int, int], indices: Sequence[object], shown: str
+    location: Location, shape: tuple[int, int], indices: Sequence[object], label: str
 ) -> NDArray[np.intp]:
     """The positions that ``array(i)`` or ``array(i, j)`` selects, counted column by column from 0.
 
@@ -277,33 +277,37 @@ def positions(
     extents = {1: (rows * columns,), 2: shape}.get(len(indices))
     if extents is None:
         raise location.error(f"{len(indices)} indices are given", allowed="1 or 2")
-    chosen = [_chosen(location, index, extent, shown) for index, extent in zip(indices, extents)]
-    if rows * columns == 0 and any(part.size for part in chosen):
+    index_positions = [
+        _index_positions(location, index, extent, label) for index, extent in zip(indices, extents)
+    ]
+    if rows * columns == 0 and any(part.size for part in index_positions):
         raise location.error("an element of an empty matrix is read", allowed="elements that exist")
-    if len(chosen) == 2:
-        check_size(location, chosen[0].size, chosen[1].size)
-        return chosen[0].reshape(-1, 1) + rows * chosen[1].reshape(1, -1)
+    if len(index_positions) == 2:
+        check_size(location, index_positions[0].size, index_positions[1].size)
+        return index_positions[0].reshape(-1, 1) + rows * index_positions[1].reshape(1, -1)
     index = indices[0]
     if index is None:
-        return chosen[0].reshape(-1, 1)
+        return index_positions[0].reshape(-1, 1)
     selected_shape = index.shape if is_array(index) else (0, 0)
     if is_logical(index):
-        selected_shape = (1, chosen[0].size) if selected_shape[0] == 1 else (chosen[0].size, 1)
+        selected_shape = (
+            (1, index_positions[0].size) if selected_shape[0] == 1 else (index_positions[0].size, 1)
+        )
     if 1 in shape and rows * columns != 1 and (1 in selected_shape or 0 in selected_shape):
-        return chosen[0].reshape((-1, 1) if columns == 1 else (1, -1))
-    return chosen[0].reshape(selected_shape, order="F")
+        return index_positions[0].reshape((-1, 1) if columns == 1 else (1, -1))
+    return index_positions[0].reshape(selected_shape, order="F")
 
 
-def _chosen(location: Location, index: object, extent: int, shown: str) -> NDArray[np.intp]:
+def _index_positions(location: Location, index: object, extent: int, label: str) -> NDArray[np.intp]:
     if index is None:
         return np.arange(extent)
     if is_logical(index):
-        chosen = np.flatnonzero(index.ravel(order="F"))
-        if chosen.size and chosen[-1] >= extent:
-            index_of(location, scalar(float(chosen[-1] + 1)), extent, shown)
-        return chosen
+        index_positions = np.flatnonzero(index.ravel(order="F"))
+        if index_positions.size and index_positions[-1] >= extent:
+            index_of(location, scalar(float(index_positions[-1] + 1)), extent, label)
+        return index_positions
     numbers = array_of(location, index, "an index").ravel(order="F")
-    indices = [index_of(location, scalar(float(number)), max(extent, 1), shown) for number in numbers]
+    indices = [index_of(location, scalar(float(number)), max(extent, 1), label) for number in numbers]
     return np.array(indices, dtype=np.intp)
 
 

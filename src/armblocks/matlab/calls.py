@@ -13,22 +13,30 @@ from armblocks.matlab.functions import TABLE
 from armblocks.matlab.source import Location
 
 
+def selected_function(name: str, arguments: Sequence[Any]) -> tuple[Function, Sequence[Any]]:
+    """The function that a call selects and its arguments: ``max(A, [], 2)`` selects a reduction of ``A``."""
+    function = TABLE[name]
+    if function.reduction and len(arguments) == 3 and 0 in arguments[1].shape:
+        return function.reduction, (arguments[0], arguments[2])
+    return function, arguments
+
+
 def call_function(
     ops: Arithmetic,
     location: Location,
     name: str,
+    function: Function,
     arguments: Sequence[Any],
     constant: Callable[[Any], NDArray[np.float64] | None],
 ) -> Any:
-    """The value of ``name(arguments)`` of a function in the table, with the given arithmetic.
+    """The value of a function of the table, with the given arithmetic.
 
     ``constant`` returns the numbers of an argument, or ``None`` where it depends on symbols. Raises an error
     at ``location`` for arguments that do not fit.
     """
-    function = TABLE[name]
     _check_count(location, name, function, len(arguments))
     try:
-        if not function.creates:
+        if not function.creates_array:
             return function.compute(ops, *arguments)
         numbers = [constant(argument) for argument in arguments]
         if any(number is None for number in numbers):

@@ -43,11 +43,11 @@ class Values(Protocol[V]):
         ...
 
     def negative(self, location: Location, value: V) -> V:
-        """``-value``"""
+        """The negative ``-value``."""
         ...
 
     def logical_not(self, location: Location, value: V) -> V:
-        """``~value``: 1 where the value is 0, else 0."""
+        """The logical negation ``~value``: 1 where the value is 0, else 0."""
         ...
 
     def operate(self, location: Location, operator: str, left: V, right: V) -> V:
@@ -59,27 +59,27 @@ class Values(Protocol[V]):
         ...
 
     def matrix(self, location: Location, rows: Sequence[Sequence[V]]) -> V:
-        """``[a b; c d]``"""
+        """The matrix ``[a b; c d]``."""
         ...
 
     def cell(self, location: Location, elements: Sequence[V]) -> V:
-        """``{a, b}``"""
+        """The cell array ``{a, b}``."""
         ...
 
     def range(self, location: Location, parts: Sequence[V]) -> V:
-        """``first:last`` or ``first:step:last``"""
+        """The range ``first:last`` or ``first:step:last``."""
         ...
 
     def transposed(self, location: Location, value: V) -> V:
-        """``value'``"""
+        """The transpose ``value'``."""
         ...
 
-    def index(self, location: Location, value: V, written: Expression) -> V:
-        """The value of an index that is ``written`` so."""
+    def index(self, location: Location, value: V, expression: Expression) -> V:
+        """The value of an index; ``expression`` is its syntax tree."""
         ...
 
-    def element(self, location: Location, value: V, indices: Sequence[V | None], shown: str) -> V:
-        """``value(indices)``, where ``None`` is ``:``; ``shown`` is its name in messages, or empty."""
+    def element(self, location: Location, value: V, indices: Sequence[V | None], label: str) -> V:
+        """``value(indices)``, where ``None`` is ``:``; ``label`` is its name in messages, or empty."""
         ...
 
     def last_index(self, location: Location, value: V, position: int, count: int) -> V:
@@ -87,19 +87,21 @@ class Values(Protocol[V]):
         ...
 
     def cell_element(self, location: Location, value: V, indices: Sequence[V | None]) -> V:
-        """``value{indices}``"""
+        """The element ``value{indices}`` of a cell array."""
         ...
 
     def field(self, location: Location, value: V, name: str) -> V:
-        """``value.name``"""
+        """The field ``value.name``."""
         ...
 
     def check_function(self, location: Location, name: str, called: bool) -> None:
-        """Raise an error unless there is a function of this name; ``called`` with arguments or not."""
+        """Raise an error unless there is a function of this name; ``called``: whether it has arguments."""
         ...
 
-    def call(self, location: Location, name: str, arguments: Sequence[V], written: Sequence[Expression]) -> V:
-        """``name(arguments)`` of a function; ``written`` are the syntax trees of the arguments."""
+    def call(
+        self, location: Location, name: str, arguments: Sequence[V], expressions: Sequence[Expression]
+    ) -> V:
+        """``name(arguments)`` of a function; ``expressions`` are the syntax trees of the arguments."""
         ...
 
 
@@ -142,7 +144,7 @@ class Evaluator(Generic[V]):
                 raise location.error("'end' and ':' are used outside of an index", allowed="v(end), A(:, 1)")
 
     def indices(self, value: V, arguments: Sequence[Expression]) -> list[V | None]:
-        """The indices of ``value``: ``end`` is its last element, ``None`` stands for ``:``."""
+        """The indices of ``value``: ``end`` is its last element, ``None`` means ``:``."""
         values: list[V | None] = []
         for position, argument in enumerate(arguments):
             self._indexed.append((value, position, len(arguments)))
@@ -177,7 +179,7 @@ class Evaluator(Generic[V]):
     def _postfix(self, expression: Postfix) -> V:
         base, steps = expression.base, expression.steps
         location = self._source.location(base.at)
-        shown = base.name if isinstance(base, Name) else ""
+        label = base.name if isinstance(base, Name) else ""
         if isinstance(base, Name) and base.name not in self._variables:
             arguments: tuple[Expression, ...] = ()
             if isinstance(steps[0], Parentheses):
@@ -185,14 +187,14 @@ class Evaluator(Generic[V]):
             self._values.check_function(location, base.name, bool(arguments))
             values = [self.value(argument) for argument in arguments]
             value = self._values.call(location, base.name, values, arguments)
-            shown = ""
+            label = ""
         else:
             value = self.value(base)
         for step in steps:
-            value = self._step(value, step, shown)
+            value = self._step(value, step, label)
         return value
 
-    def _step(self, value: V, step: Step, shown: str) -> V:
+    def _step(self, value: V, step: Step, label: str) -> V:
         location = self._source.location(step.at)
         match step:
             case Transpose():
@@ -202,4 +204,4 @@ class Evaluator(Generic[V]):
             case Braces(arguments=arguments):
                 return self._values.cell_element(location, value, self.indices(value, arguments))
             case Parentheses(arguments=arguments):
-                return self._values.element(location, value, self.indices(value, arguments), shown)
+                return self._values.element(location, value, self.indices(value, arguments), label)

@@ -12,14 +12,14 @@ from armblocks.matlab.functions import TABLE
 from armblocks.matlab.operators import COMPARISONS
 from armblocks.matlab.parser import parse_formula
 from armblocks.matlab.source import Position, formula_source
-from armblocks.matlab.symbols import Oriented, Symbol, Symbols
+from armblocks.matlab.symbols import OrientedVector, Symbol, Symbols
 from armblocks.matlab.syntax import Chain, Expression, Name, Parentheses, Postfix, levels, parts_of
 
 MAX_FORMULA_LENGTH = 4000
 """Maximum number of characters of a formula; longer ones should be diagrams."""
 
-_SIDES: Mapping[str, float] = {">": -1e-300, "<=": -1e-300, ">=": 1e-300, "<": 1e-300}
-"""An offset below any signal resolution: it assigns the boundary itself to one side."""
+_BOUNDARY_OFFSETS: Mapping[str, float] = {">": -1e-300, "<=": -1e-300, ">=": 1e-300, "<": 1e-300}
+"""Offsets, smaller than any signal resolution, that assign equality to one side of a comparison."""
 
 
 class Formula:
@@ -72,7 +72,7 @@ class Formula:
         return self._value(self._tree, names)
 
     def switching_functions(self, names: Mapping[str, SX]) -> list[SX]:
-        """Quantities whose zeros are the changes of comparisons in the formula: left minus right of each.
+        """Functions with a zero where a comparison in the formula changes: left minus right side of each.
 
         At equality the offset gives the value of the comparison. For a formula without comparisons the result
         is its value.
@@ -82,7 +82,7 @@ class Formula:
             for part in level:
                 if isinstance(part, Chain) and part.rest[0].operator in COMPARISONS:
                     left, right = (self._value(side, names) for side in parts_of(part))
-                    differences.append(left - right + _SIDES.get(part.rest[0].operator, 0.0))
+                    differences.append(left - right + _BOUNDARY_OFFSETS.get(part.rest[0].operator, 0.0))
         return differences or [self.trace(names)]
 
     def _value(self, expression: Expression, names: Mapping[str, SX]) -> SX:
@@ -92,11 +92,11 @@ class Formula:
             raise self._source.location(expression.at).error(
                 f"the text '{value[:40]}' is not a number", allowed="numbers and names without quotes"
             )
-        return value.value if isinstance(value, Oriented) else value
+        return value.value if isinstance(value, OrientedVector) else value
 
 
 def _names(tree: Expression) -> Iterator[tuple[str, bool]]:
-    """All names in a tree, each with whether it is called or indexed."""
+    """All names in a tree, and for each whether it is called or indexed."""
     called: set[int] = set()
     for level in levels(tree):
         for part in level:

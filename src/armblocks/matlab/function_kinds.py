@@ -19,7 +19,7 @@ class MismatchError(Exception):
 
 
 class Arithmetic(Protocol):
-    """The operations that the functions of the table are written in, besides ``+ - * < == …`` of arrays.
+    """The operations that implement the functions of the table, in addition to ``+ - * < == …`` of arrays.
 
     ``Any`` is an array of numbers or of symbols. All operations act element by element, except those of whole
     arrays, which are listed last.
@@ -47,7 +47,7 @@ class Arithmetic(Protocol):
         ...
 
     def sign(self, value: Any) -> Any:
-        """-1, 0 or 1."""
+        """The sign: -1, 0 or 1."""
         ...
 
     def absolute(self, value: Any) -> Any:
@@ -55,15 +55,15 @@ class Arithmetic(Protocol):
         ...
 
     def minimum(self, left: Any, right: Any) -> Any:
-        """The smaller one; the other where one is NaN."""
+        """The smaller value; if one is NaN, the other one."""
         ...
 
     def maximum(self, left: Any, right: Any) -> Any:
-        """The larger one; the other where one is NaN."""
+        """The larger value; if one is NaN, the other one."""
         ...
 
     def quotient(self, left: Any, right: Any) -> Any:
-        """``left ./ right``"""
+        """The elementwise quotient ``left ./ right``."""
         ...
 
     def remainder(self, left: Any, right: Any) -> Any:
@@ -74,23 +74,23 @@ class Arithmetic(Protocol):
         """``yes`` where the condition is not 0, else ``no``."""
         ...
 
-    def both(self, left: Any, right: Any) -> Any:
+    def logical_and(self, left: Any, right: Any) -> Any:
         """1 where both are not 0, else 0."""
         ...
 
-    def either(self, left: Any, right: Any) -> Any:
+    def logical_or(self, left: Any, right: Any) -> Any:
         """1 where one is not 0, else 0."""
         ...
 
     def constant(self, array: NDArray[np.float64]) -> Any:
-        """An array of numbers."""
+        """The value of an array of numbers."""
         ...
 
     def shape(self, value: Any) -> tuple[int, int]:
         """Rows and columns."""
         ...
 
-    def folded(self, combine: Callable[[Any, Any], Any], value: Any) -> Any:
+    def fold(self, combine: Callable[[Any, Any], Any], value: Any) -> Any:
         """All elements of a vector, or those of each column of a matrix, combined from first to last."""
         ...
 
@@ -98,7 +98,7 @@ class Arithmetic(Protocol):
         """The sum of a vector, or the sums of the columns of a matrix."""
         ...
 
-    def length_of(self, value: Any) -> Any:
+    def norm(self, value: Any) -> Any:
         """The square root of the sum of the squares of all elements."""
         ...
 
@@ -115,7 +115,7 @@ class Arithmetic(Protocol):
         ...
 
     def from_rows(self, rows: Sequence[Sequence[Any]]) -> Any:
-        """A matrix of numbers and elements."""
+        """The matrix with these rows of elements."""
         ...
 
     def transposed_matrix(self, value: Any) -> Any:
@@ -131,7 +131,7 @@ class Arithmetic(Protocol):
         ...
 
     def cosine_sine(self, angle: Any) -> tuple[Any, Any]:
-        """Cosine and sine of a number, exact at quarter turns if it is constant."""
+        """Cosine and sine of a number, exact at multiples of pi/2 if it is constant."""
         ...
 
 
@@ -154,20 +154,22 @@ class Function:
     min_arguments: int
     max_arguments: int
     compute: Callable[..., Any]
-    """From :class:`Arithmetic` and the arguments; with ``creates``, from plain numbers to an array."""
+    """From :class:`Arithmetic` and the arguments; with ``creates_array``, from plain numbers to an array."""
     elementwise: bool = False
     """Whether the arguments are combined element by element."""
-    creates: bool = False
-    """Whether the arguments determine a size: they must be constant."""
+    creates_array: bool = False
+    """Whether the arguments are the size of the result; they must be constant."""
     real_from: float = -math.inf
     real_to: float = math.inf
     """The interval of arguments with real values. Scripts raise an error outside; formulas give NaN."""
     reserved: bool = False
     """Whether no parameter may have this name. Parameters hide the other functions, as in MATLAB."""
     elementary: bool = False
-    """Whether an element costs much more than a sum, as numbers are computed by integer arithmetic."""
+    """Whether numbers are computed by integer arithmetic, which is much slower than a sum."""
     takes_text: bool = False
     """Whether the optional argument is text in quotes."""
+    reduction: Function | None = None
+    """The function of ``(x, k)`` that a call with ``(x, [], k)`` selects."""
 
     def may_be_text(self, position: int) -> bool:
         """Whether the argument at a position, counted from 0, may be text."""
@@ -175,7 +177,7 @@ class Function:
 
 
 def constant(value: float, meaning: str, *, reserved: bool = False) -> Function:
-    """A number with a name."""
+    """A named constant."""
 
     def compute(ops: Arithmetic) -> Any:
         return ops.constant(np.array([[value]]))
@@ -191,11 +193,11 @@ def constant(value: float, meaning: str, *, reserved: bool = False) -> Function:
     )
 
 
-def rounded(
+def rounded_function(
     name: str, meaning: str, group: str, real_from: float = -math.inf, real_to: float = math.inf
 ) -> Function:
     """A function of one argument of :mod:`armblocks.rounded_functions`."""
-    return elementwise(
+    return elementwise_function(
         "x",
         meaning,
         group,
@@ -207,12 +209,14 @@ def rounded(
     )
 
 
-def elementwise(arguments: str, meaning: str, group: str, compute: Compute, **options: Any) -> Function:
+def elementwise_function(
+    arguments: str, meaning: str, group: str, compute: Compute, **options: Any
+) -> Function:
     """A function of these arguments, element by element."""
-    return whole(arguments, meaning, group, compute, elementwise=True, **options)
+    return array_function(arguments, meaning, group, compute, elementwise=True, **options)
 
 
-def whole(
+def array_function(
     arguments: str, meaning: str, group: str, compute: Compute, *, optional: int = 0, **options: Any
 ) -> Function:
     """A function of whole arrays; the last ``optional`` arguments may be missing."""
@@ -228,7 +232,7 @@ def whole(
     )
 
 
-def along_dimension(
+def reduction_function(
     meaning: str, group: str, compute: Callable[[Arithmetic, Any], Any], **options: Any
 ) -> Function:
     """A function that reduces a vector to a number, and a matrix by column or along a dimension."""
@@ -237,28 +241,31 @@ def along_dimension(
         if dimension is None:
             return compute(ops, x)
         along, shape = dimension_of(ops, x, dimension), ops.shape(x)
-        if shape[along - 1] == 1 and shape != (1, 1):  # arrays of numbers only: each element by itself
+        # Arrays of numbers only: reduce each element separately.
+        if shape[along - 1] == 1 and shape != (1, 1):
             return np.array([compute(ops, np.array([[entry]])) for entry in ops.entries(x)]).reshape(shape)
         return (
             compute(ops, x) if along == 1 else ops.transposed_matrix(compute(ops, ops.transposed_matrix(x)))
         )
 
-    whole_meaning = f"{meaning[:-1]}; of a matrix by column, with `(A, 2)` by row."
-    return whole("x, k", whole_meaning, group, reduced, optional=1, **options)
+    reduction_meaning = f"{meaning[:-1]}; of a matrix by column, with `(A, 2)` by row."
+    return array_function("x, k", reduction_meaning, group, reduced, optional=1, **options)
 
 
 def dimension_of(ops: Arithmetic, x: Any, dimension: Any) -> int:
-    """1 for the rows, 2 for the columns. Raises :class:`MismatchError` for other values."""
+    """The dimension: 1 for the rows, 2 for the columns. Raises :class:`MismatchError` for other values."""
     number = ops.constant_number(dimension)
     if number not in (1.0, 2.0):
         raise MismatchError("the dimension is not 1 or 2")
     if not ops.has_orientation and 1 in ops.shape(x) and ops.shape(x) != (1, 1):
-        raise MismatchError("a vector of a formula is neither row nor column: leave out the dimension")
+        raise MismatchError("a vector of a formula is neither row nor column: omit the dimension")
     return int(number)
 
 
-def created(
+def creation_function(
     arguments: str, meaning: str, compute: Callable[..., NDArray[np.float64]], *, optional: int = 0
 ) -> Function:
     """An array of a given size, from plain numbers."""
-    return whole(arguments, meaning, ARRAYS, compute, optional=optional, creates=True, reserved=True)
+    return array_function(
+        arguments, meaning, ARRAYS, compute, optional=optional, creates_array=True, reserved=True
+    )

@@ -1,8 +1,8 @@
 """The table of all functions and constants of formulas and scripts.
 
-A function is one entry in ``number_functions`` or ``array_functions``. It is written once, in terms of
-:class:`~.function_kinds.Arithmetic`, for numbers and for symbols alike. Elementary functions of constants are
-correctly rounded in both (:mod:`armblocks.rounded_functions`).
+A function is one entry in ``number_functions`` or ``array_functions``. Its implementation uses
+:class:`~.function_kinds.Arithmetic`, so that it serves numbers and symbols. Elementary functions of
+constants are correctly rounded in both (:mod:`armblocks.rounded_functions`).
 """
 
 from __future__ import annotations

@@ -1,11 +1,14 @@
-"""From the characters of a script or formula to tokens.
+"""Converts the characters of a script or formula to tokens.
 
-This module handles the special cases of MATLAB's syntax: the quote that is a transpose after an operand and a
-string elsewhere, line continuation, block comments, newlines that end a statement outside brackets and a row
-inside them, and command syntax (``clear L``). It is more tolerant than MATLAB for statements that were broken
-over lines on a printed page: a line that ends with ``=`` or an operator continues on the next line, and a
-line that starts with ``=`` continues the previous line. MATLAB rejects both, so all scripts that MATLAB
-accepts have the same meaning here.
+This module handles the special cases of MATLAB's syntax:
+
+- a quote is a transpose after an operand, and starts a string elsewhere,
+- a newline ends a statement outside brackets, and a row inside them,
+- line continuation, block comments and command syntax (``clear L``).
+
+It accepts statements that a printed page splits into lines. A line that ends with ``=`` or an operator
+continues on the next line, and a line that starts with ``=`` continues the previous line. MATLAB rejects both
+forms. Scripts that MATLAB accepts therefore have the same meaning in this module.
 """
 
 from __future__ import annotations
@@ -57,9 +60,9 @@ _NAME = re.compile(r"[^\W\d]\w*")
 _OPERATOR = re.compile(
     "|".join(map(re.escape, sorted({*INFIX, *ALTERNATIVES, ".'", *"=~'()[]{},;.@"}, key=len, reverse=True)))
 )
-_UNFINISHED = frozenset((*INFIX, "=", ",", "(", "~"))
+_CONTINUED_OPERATORS = frozenset((*INFIX, "=", ",", "(", "~"))
 """Operators after which no statement can end."""
-_CLOSING = {"(": ")", "[": "]", "{": "}"}
+_CLOSING_BRACKETS = {"(": ")", "[": "]", "{": "}"}
 
 
 def tokenize(source: Source) -> list[Token]:
@@ -93,7 +96,9 @@ class _Lexer:
         if self.brackets:
             bracket, at = self.brackets[-1]
             raise self.source.location(at).error(
-                f"'{bracket}' is never closed", allowed="brackets in pairs", fix=f"add '{_CLOSING[bracket]}'"
+                f"'{bracket}' is never closed",
+                allowed="brackets in pairs",
+                fix=f"add '{_CLOSING_BRACKETS[bracket]}'",
             )
         last = Position(len(self.source.lines), len(self.source.lines[-1].rstrip()) + 1)
         self.tokens += [Token(Kind.END, "\n", last), Token(Kind.EOF, "", last)]
@@ -103,7 +108,7 @@ class _Lexer:
         return self.source.location(Position(line, column))
 
     def _block_comment(self, number: int, text: str) -> bool:
-        """Whether the line belongs to a block comment ``%{ … %}``; they nest."""
+        """Whether the line belongs to a block comment ``%{ … %}``. Block comments can be nested."""
         word = text.strip()
         if word == "%{":
             self.comment_starts.append(number)
@@ -115,7 +120,7 @@ class _Lexer:
         return False
 
     def _line(self, number: int, text: str) -> bool:
-        """Read one line; true where it ends in a continuation ``...``."""
+        """Read one line; returns whether it ends in a continuation ``...``."""
         position = 0
         spaced = True
         while position < len(text):
@@ -166,11 +171,11 @@ class _Lexer:
         )
 
     def _number(self, at: Position, text: str, match: re.Match[str], spaced: bool) -> int:
-        written = match.group()
+        literal = match.group()
         after = text[match.end() : match.end() + 1]
         if after.isalnum() or after == "_":
-            raise self._no_number(at, re.match(r"[\w.]+", text[match.start() :]))
-        digits = written.replace("_", "")
+            raise self._number_error(at, re.match(r"[\w.]+", text[match.start() :]))
+        digits = literal.replace("_", "")
         try:
             base = {"x": 16, "b": 2, "o": 8}.get(digits[1:2].lower())
             value = float(int(digits, base)) if base else float(digits.translate(_EXPONENTS))
@@ -178,19 +183,19 @@ class _Lexer:
             value = math.inf
         if math.isinf(value):
             raise self.source.location(at).error(
-                f"'{_short(written)}' is too large a number", allowed="magnitudes below 1.8e308"
+                f"'{_short(literal)}' is too large a number", allowed="magnitudes below 1.8e308"
             )
-        self.tokens.append(Token(Kind.NUMBER, written, at, spaced, value))
+        self.tokens.append(Token(Kind.NUMBER, literal, at, spaced, value))
         return match.end()
 
-    def _no_number(self, at: Position, word: re.Match[str] | None) -> ArmblocksError:
-        shown = _short(word.group()) if word else ""
-        if re.fullmatch(r"[0-9.]+(?:[eE][0-9]+)?[ij]", shown):
+    def _number_error(self, at: Position, word: re.Match[str] | None) -> ArmblocksError:
+        word_text = _short(word.group()) if word else ""
+        if re.fullmatch(r"[0-9.]+(?:[eE][0-9]+)?[ij]", word_text):
             return self.source.location(at).error(
-                f"'{shown}' is an imaginary number", allowed="real numbers", fix="use real numbers"
+                f"'{word_text}' is an imaginary number", allowed="real numbers", fix="use real numbers"
             )
         return self.source.location(at).error(
-            f"'{shown}' is not a number", allowed="numbers such as 12, .5, 1.8e-3"
+            f"'{word_text}' is not a number", allowed="numbers such as 12, .5, 1.8e-3"
         )
 
     def _string(self, at: Position, text: str, position: int, spaced: bool) -> int:
@@ -212,10 +217,10 @@ class _Lexer:
     def _operator(self, at: Position, operator: str, spaced: bool) -> None:
         if operator == "@":
             raise self.source.location(at).error("function handles ('@') are not supported")
-        if operator in _CLOSING:
+        if operator in _CLOSING_BRACKETS:
             self.brackets.append((operator, at))
         elif operator in (")", "]", "}"):
-            if not self.brackets or _CLOSING[self.brackets[-1][0]] != operator:
+            if not self.brackets or _CLOSING_BRACKETS[self.brackets[-1][0]] != operator:
                 raise self.source.location(at).error(
                     f"'{operator}' closes no bracket", allowed="brackets in pairs", fix="remove or match it"
                 )
@@ -232,21 +237,20 @@ class _Lexer:
         end = Position(line, len(self.source.lines[line - 1].rstrip()) + 1)
         if self.brackets and self.brackets[-1][0] in ("[", "{"):
             self.tokens.append(Token(Kind.ROW, "\n", end))
-        elif last is not None and last.kind is Kind.OPERATOR and last.text in _UNFINISHED:
+        elif last is not None and last.kind is Kind.OPERATOR and last.text in _CONTINUED_OPERATORS:
             return  # a statement cannot end here: the line was broken on a printed page
         elif self.brackets and self.source.is_file:
             bracket, start = self.brackets[-1]
             raise self.source.location(start).error(
                 f"'{bracket}' is not closed on its line",
                 allowed="a statement over several lines continues with '...'",
-                fix=f"add '{_CLOSING[bracket]}' or '...'",
+                fix=f"add '{_CLOSING_BRACKETS[bracket]}' or '...'",
             )
         elif not self.brackets:
             self.tokens.append(Token(Kind.END, "\n", end))
 
     def _undo_newline(self) -> None:
-        """For a line that starts with ``=``: remove the newlines before it, because it continues the
-        statement."""
+        """Remove the newlines before a line that starts with ``=``, because it continues the statement."""
         while self.tokens and self.tokens[-1].kind is Kind.END and self.tokens[-1].text == "\n":
             self.tokens.pop()
 

@@ -14,10 +14,11 @@ from armblocks import rounded_functions
 from armblocks.errors import UnknownNameError
 from armblocks.matlab.array_functions import range_of
 from armblocks.matlab.arrays import (
-    ROUNDED_WORK,
+    ROUNDED_FUNCTION_COST,
     Array,
     Budget,
     array_of,
+    concatenated,
     is_array,
     is_logical,
     kind_of,
@@ -25,16 +26,15 @@ from armblocks.matlab.arrays import (
     operate,
     positions,
     scalar,
-    stacked,
 )
-from armblocks.matlab.calls import call_function
+from armblocks.matlab.calls import call_function, selected_function
 from armblocks.matlab.function_kinds import MismatchError
 from armblocks.matlab.functions import TABLE
 from armblocks.matlab.source import Location
 from armblocks.matlab.syntax import Expression
 from armblocks.spatial.rotation import cos_exact, sin_exact
 
-Plain = Array | str
+NumberOrText = Array | str
 
 
 class NumberArithmetic:
@@ -59,7 +59,7 @@ class NumberArithmetic:
         return np.ceil(value)
 
     def sign(self, value: Array) -> Array:
-        """-1, 0 or 1."""
+        """The sign: -1, 0 or 1."""
         return np.sign(value)
 
     def absolute(self, value: Array) -> Array:
@@ -67,15 +67,15 @@ class NumberArithmetic:
         return np.abs(value)
 
     def minimum(self, left: Array, right: Array) -> Array:
-        """The smaller one; the other where one is NaN."""
+        """The smaller value; if one is NaN, the other one."""
         return np.fmin(left, right)
 
     def maximum(self, left: Array, right: Array) -> Array:
-        """The larger one; the other where one is NaN."""
+        """The larger value; if one is NaN, the other one."""
         return np.fmax(left, right)
 
     def quotient(self, left: Array, right: Array) -> Array:
-        """``left ./ right``"""
+        """The elementwise quotient ``left ./ right``."""
         return left / right
 
     def remainder(self, left: Array, right: Array) -> Array:
@@ -86,16 +86,16 @@ class NumberArithmetic:
         """``yes`` where the condition is not 0, else ``no``."""
         return np.where(condition != 0.0, yes, no)
 
-    def both(self, left: Array, right: Array) -> Array:
+    def logical_and(self, left: Array, right: Array) -> Array:
         """1 where both are not 0, else 0."""
         return np.logical_and(left != 0.0, right != 0.0)
 
-    def either(self, left: Array, right: Array) -> Array:
+    def logical_or(self, left: Array, right: Array) -> Array:
         """1 where one is not 0, else 0."""
         return np.logical_or(left != 0.0, right != 0.0)
 
     def constant(self, array: NDArray[np.float64]) -> Array:
-        """An array of numbers."""
+        """The value of an array of numbers."""
         return array
 
     def shape(self, value: Array) -> tuple[int, int]:
@@ -103,7 +103,7 @@ class NumberArithmetic:
         rows, columns = value.shape
         return rows, columns
 
-    def folded(self, combine: Callable[[Any, Any], Any], value: Array) -> Array:
+    def fold(self, combine: Callable[[Any, Any], Any], value: Array) -> Array:
         """All elements of a vector, or those of each column of a matrix, combined from first to last."""
         rows = value.reshape(-1, 1) if 1 in value.shape else value
         if not rows.size:
@@ -113,10 +113,10 @@ class NumberArithmetic:
     def total(self, value: Array) -> Array:
         """The sum of a vector, or the sums of the columns of a matrix."""
         if value.size:
-            return self.folded(np.add, value)
+            return self.fold(np.add, value)
         return np.zeros((1, value.shape[1])) if value.shape[0] == 0 and value.shape[1] > 1 else scalar(0.0)
 
-    def length_of(self, value: Array) -> Array:
+    def norm(self, value: Array) -> Array:
         """The square root of the sum of the squares of all elements."""
         return np.sqrt(self.total((value * value).reshape(-1, 1, order="F")))
 
@@ -133,7 +133,7 @@ class NumberArithmetic:
         return float(value[0, 0]) if value.size == 1 else math.nan
 
     def from_rows(self, rows: Sequence[Sequence[Any]]) -> Array:
-        """A matrix of numbers and elements."""
+        """The matrix with these rows of elements."""
         return np.array(rows, dtype=np.float64)
 
     def transposed_matrix(self, value: Array) -> Array:
@@ -159,34 +159,34 @@ class NumberArithmetic:
             raise MismatchError("a singular matrix has no inverse") from None
 
     def cosine_sine(self, angle: Array) -> tuple[float, float]:
-        """Cosine and sine of a number, exact at quarter turns."""
+        """Cosine and sine of a number, exact at multiples of pi/2."""
         number = float(angle[0, 0])
         return cos_exact(number), sin_exact(number)
 
 
 class Numbers:
-    """The operations of expressions on numbers (:class:`~.evaluation.Values`), within a budget of work."""
+    """The operations of expressions on numbers (:class:`~.evaluation.Values`), within a budget."""
 
     def __init__(self, budget: Budget) -> None:
         self.budget = budget
         self._arithmetic = NumberArithmetic()
 
-    def number(self, value: float) -> Plain:
+    def number(self, value: float) -> NumberOrText:
         """A number."""
         return scalar(value)
 
-    def text(self, location: Location, value: str) -> Plain:
+    def text(self, location: Location, value: str) -> NumberOrText:
         """A text in quotes."""
         return value
 
     def negative(self, location: Location, value: object) -> Array:
-        """``-value``; 0 stays 0."""
+        """The negative ``-value``; 0 stays 0."""
         array = array_of(location, value, "the operand of '-'")
         self.budget.spend(location, array.size)
         return 0.0 - array if array.size == 1 and array[0, 0] == 0 else -array
 
     def logical_not(self, location: Location, value: object) -> Array:
-        """``~value``"""
+        """The logical negation ``~value``."""
         array = array_of(location, value, "the operand of '~'")
         self.budget.spend(location, array.size)
         return cast("Array", array == 0.0)
@@ -197,7 +197,7 @@ class Numbers:
 
     def logic(self, location: Location, operator: str, values: Sequence[object]) -> Array:
         """All values joined by one of ``&& || & |``."""
-        joined = np.logical_and if operator in ("&&", "&") else np.logical_or
+        combine = np.logical_and if operator in ("&&", "&") else np.logical_or
         result = array_of(location, values[0], f"the left operand of '{operator}'") != 0.0
         for value in values[1:]:
             other = array_of(location, value, f"the right operand of '{operator}'") != 0.0
@@ -207,23 +207,23 @@ class Numbers:
                     allowed="equal sizes, or a number on one side",
                 )
             self.budget.spend(location, max(result.size, other.size))
-            result = joined(result, other)
+            result = combine(result, other)
         return cast("Array", result)
 
-    def matrix(self, location: Location, rows: Sequence[Sequence[object]]) -> Plain:
+    def matrix(self, location: Location, rows: Sequence[Sequence[object]]) -> NumberOrText:
         """``[a b; c d]`` of arrays, or of texts in one row."""
         flat = [value for row in rows for value in row]
         texts = [value for value in flat if isinstance(value, str)]
         if texts and len(texts) == len(flat) and len(rows) == 1:
             return "".join(texts)
-        return stacked(location, self.budget, rows)
+        return concatenated(location, self.budget, rows)
 
-    def cell(self, location: Location, elements: Sequence[object]) -> Plain:
+    def cell(self, location: Location, elements: Sequence[object]) -> NumberOrText:
         """Cell arrays exist in scripts only."""
         raise location.error("a cell array is not a number", allowed="[a b; c d]")
 
     def range(self, location: Location, parts: Sequence[object]) -> Array:
-        """``first:last`` or ``first:step:last``"""
+        """The range ``first:last`` or ``first:step:last``."""
         ends = [number_of(location, part, "an end of a range") for part in parts]
         first, step, last = (ends[0], 1.0, ends[1]) if len(ends) == 2 else ends
         try:
@@ -234,33 +234,33 @@ class Numbers:
         return elements
 
     def transposed(self, location: Location, value: object) -> Array:
-        """``value'``"""
+        """The transpose ``value'``."""
         array = array_of(location, value, "the operand of the transpose")
         self.budget.spend(location, array.size)
         return cast("Array", (array != 0.0).T) if is_logical(value) else array.T.copy()
 
-    def index(self, location: Location, value: Plain, written: Expression) -> Plain:
+    def index(self, location: Location, value: NumberOrText, expression: Expression) -> NumberOrText:
         """The value of an index: positions, or a logical array that selects elements."""
         return value
 
-    def element(self, location: Location, value: object, indices: Sequence[object], shown: str) -> Array:
+    def element(self, location: Location, value: object, indices: Sequence[object], label: str) -> Array:
         """``value(indices)``, where ``None`` is ``:``."""
         if not is_array(value):
             raise location.error(f"() is used on {kind_of(value)}", allowed="matrices and arrays of links")
         self.budget.spend(location, value.size)
         rows, columns = value.shape
-        return value.ravel(order="F")[positions(location, (rows, columns), indices, shown)]
+        return value.ravel(order="F")[positions(location, (rows, columns), indices, label)]
 
     def last_index(self, location: Location, value: object, position: int, count: int) -> Array:
         """``end`` as index ``position`` of ``count`` indices."""
         array = array_of(location, value, "the value with the index 'end'")
         return scalar(float(array.size if count == 1 else array.shape[min(position, 1)]))
 
-    def cell_element(self, location: Location, value: object, indices: Sequence[object]) -> Plain:
+    def cell_element(self, location: Location, value: object, indices: Sequence[object]) -> NumberOrText:
         """Cell arrays exist in scripts only."""
         raise location.error(f"{{}} is used on {kind_of(value)}", allowed="cell arrays")
 
-    def field(self, location: Location, value: object, name: str) -> Plain:
+    def field(self, location: Location, value: object, name: str) -> NumberOrText:
         """``A.T`` is the transpose; numbers have no other fields."""
         if is_array(value) and name == "T":
             return self.transposed(location, value)
@@ -272,17 +272,18 @@ class Numbers:
             raise UnknownNameError("function" if called else "name", name, TABLE, where=location.source.name)
 
     def call(
-        self, location: Location, name: str, arguments: Sequence[object], written: Sequence[Expression]
-    ) -> Plain:
+        self, location: Location, name: str, arguments: Sequence[object], expressions: Sequence[Expression]
+    ) -> NumberOrText:
         """``name(arguments)`` of a function in the table. Complex results are errors."""
         function = TABLE[name]
         if name in ("power", "pow") and len(arguments) == 2:
             return self.operate(location, ".^", *arguments)
-        plain: list[Any] = [
+        values: list[Any] = [
             value if isinstance(value, str) and function.may_be_text(k) else _argument(location, value, name)
             for k, value in enumerate(arguments)
         ]
-        arrays = [value for value in plain if is_array(value)]
+        function, selected = selected_function(name, values)
+        arrays = [value for value in selected if is_array(value)]
         if function.elementwise:
             _check_sizes(location, name, arrays)
         for array in arrays if function.elementwise else ():
@@ -292,9 +293,9 @@ class Numbers:
                     allowed=f"arguments from {function.real_from:g} to {function.real_to:g}",
                 )
         size = max((array.size for array in arrays), default=1)
-        self.budget.spend(location, size * (ROUNDED_WORK if function.elementary else 1))
+        self.budget.spend(location, size * (ROUNDED_FUNCTION_COST if function.elementary else 1))
         with np.errstate(all="ignore"):
-            result = call_function(self._arithmetic, location, name, plain, np.asarray)
+            result = call_function(self._arithmetic, location, name, function, selected, np.asarray)
         array = cast("Array", result if is_logical(result) else np.asarray(result, dtype=np.float64))
         self.budget.spend(location, array.size)
         return array

@@ -1,4 +1,4 @@
-"""From tokens to expressions, with MATLAB's precedences and its rule for blanks inside matrices.
+"""Converts tokens to expressions, with MATLAB's precedences and its rule for blanks inside matrices.
 
 In formulas, ``u[1]`` is an index like ``u(1)``; in scripts, a bracket directly after an operand starts
 another element of a matrix, as in MATLAB.
@@ -48,7 +48,7 @@ KEYWORDS = frozenset(
         persistent return spmd switch try while""",
     )
 )
-"""Words that a script cannot use as names. Formulas have no statements: there, these words may be names."""
+"""Words that a script cannot use as names. In formulas these words may be names."""
 
 
 def parse_formula(source: Source) -> Expression:
@@ -73,7 +73,7 @@ class Parser:
         self.in_matrix = False
         self.depth = 0
         self.indices = 0
-        """Number of open indices and calls around the present token."""
+        """Number of open indices and calls around the current token."""
 
     # -- tokens ------------------------------------------------------------------------------------------
 
@@ -110,8 +110,8 @@ class Parser:
             expected = "an operator"
         message = f"{shown} is not allowed here" + (f", expected {expected}" if expected else "")
         if token.kind is Kind.END and token.text == "\n":
-            whole = "statement" if self.source.is_file else "formula"
-            message = f"the {whole} ends where {expected or 'something else'} is expected"
+            text_kind = "statement" if self.source.is_file else "formula"
+            message = f"the {text_kind} ends where {expected or 'something else'} is expected"
         fix = ""
         if token.text == "=" and not self.source.is_file:
             fix = "compare with '=='"
@@ -132,23 +132,23 @@ class Parser:
         try:
             tree = self._operators(Level.OR_ELSE)
         except RecursionError:
-            raise self._too_deep(start) from None
+            raise self._depth_error(start) from None
         if self.depth == 0 and next(islice(levels(tree), MAX_TREE_DEPTH, None), None):
-            raise self._too_deep(start)
+            raise self._depth_error(start)
         return tree
 
-    def _too_deep(self, at: Position) -> ArmblocksError:
+    def _depth_error(self, at: Position) -> ArmblocksError:
         return self.source.location(at).error(
             "the expression is nested too deeply",
             allowed=f"{MAX_TREE_DEPTH} levels of operators",
             fix="split it",
         )
 
-    def _operators(self, loosest: Level) -> Expression:
-        """Operands and the operators between them that bind at least as tightly as ``loosest``."""
+    def _operators(self, min_level: Level) -> Expression:
+        """Operands and the operators between them that bind at least as tightly as ``min_level``."""
         at = self.token.at
-        operand = self._not_word(loosest) if self._is_word("not") else self._signed()
-        while (level := self._level()) is not None and level >= loosest:
+        operand = self._not_word(min_level) if self._is_word("not") else self._signed()
+        while (level := self._level()) is not None and level >= min_level:
             if level is Level.RANGE:
                 operand = self._range(operand, at)
                 continue
@@ -185,9 +185,9 @@ class Parser:
         calls = following.text == "(" and not following.spaced
         return self.token.kind is Kind.NAME and self.token.text == word and not calls and not self.in_matrix
 
-    def _not_word(self, loosest: Level) -> Expression:
+    def _not_word(self, min_level: Level) -> Expression:
         token = self.take()
-        if loosest > Level.NOT_WORD:
+        if min_level > Level.NOT_WORD:
             raise self.source.location(token.at).error(
                 "'not' needs brackets here", allowed="~x, or not(x)", fix="write ~"
             )
@@ -213,8 +213,10 @@ class Parser:
         rest: list[Operation] = []
         while self._level() is Level.POWER:
             token = self.take()
-            behind = self._signs()
-            rest.append(Operation(token.text, _with_signs(behind, self._postfix(exponent=True)), token.at))
+            exponent_signs = self._signs()
+            rest.append(
+                Operation(token.text, _with_signs(exponent_signs, self._postfix(exponent=True)), token.at)
+            )
             if self._at_transpose():
                 power, steps = Chain(operand, tuple(rest), at), list[Step]()
                 while self._at_transpose():
@@ -235,7 +237,7 @@ class Parser:
         return self.at_operator("'", ".'") and not (self.in_matrix and self.token.spaced)
 
     def _postfix(self, *, exponent: bool = False) -> Expression:
-        """An operand and what follows it; an ``exponent`` ends before a transpose."""
+        """An operand with its indices, fields and transposes; an ``exponent`` ends before a transpose."""
         at = self.token.at
         base = self._primary()
         steps: list[Step] = []
@@ -247,7 +249,7 @@ class Parser:
             return Postfix(base.base, (*base.steps, *steps), at)
         return Postfix(base, tuple(steps), at) if steps else base
 
-    def _step(self, base: Expression, further: bool) -> Step | None:
+    def _step(self, base: Expression, has_steps: bool) -> Step | None:
         token = self.token
         if token.kind is not Kind.OPERATOR or (self.in_matrix and token.spaced):
             return None
@@ -256,7 +258,7 @@ class Parser:
             return Transpose(token.at)
         if token.text == "(":
             return Parentheses(self._arguments("(", ")"), token.at)
-        if token.text == "[" and not (self.source.is_file or token.spaced or further):
+        if token.text == "[" and not (self.source.is_file or token.spaced or has_steps):
             return Parentheses(self._arguments("[", "]"), token.at) if isinstance(base, Name) else None
         if token.text == "{":
             return Braces(self._arguments("{", "}"), token.at)

@@ -8,19 +8,19 @@ from typing import NamedTuple
 
 from armblocks.errors import ArmblocksError, FormatError, InputError
 
-SCRIPTS = (
+SCRIPT_SYNTAX = (
     "straight-line scripts of the Robotics Toolbox: link, robot, Link, Revolute, Prismatic, SerialLink, "
     "their fields, cell arrays, matrices, arithmetic, common functions, comments, clear"
 )
-FORMULAS = (
+FORMULA_SYNTAX = (
     "numbers, names, u(1) or u[1], [1 2; 3 4], + - * / ^, comparisons, && || ~ and functions such as sin, "
     "sqrt, max"
 )
 
 MAX_QUOTE_LENGTH = 100
-"""Characters of a line that a message repeats."""
+"""Maximum number of characters of a line that a message quotes."""
 POINTER = "\u00bb"
-"""Marks the column in a quoted line. Unlike ``^``, it is no operator; old code pages have it, too."""
+"""Marks the column in a quoted line. Unlike ``^``, it is not an operator; old code pages contain it, too."""
 
 
 class Position(NamedTuple):
@@ -76,9 +76,9 @@ class Location:
             within = f"line {line}, column" if len(source.lines) > 1 and not source.is_file else "column"
             what = f"{what}, in {within} {column}: {quoted}"
         if source.is_file:
-            return FormatError(what, where=f"{source.name}:{line}", allowed=allowed or SCRIPTS, fix=fix)
+            return FormatError(what, where=f"{source.name}:{line}", allowed=allowed or SCRIPT_SYNTAX, fix=fix)
         return InputError(
-            what, where=source.name, allowed=allowed or FORMULAS, fix=fix or "correct the formula"
+            what, where=source.name, allowed=allowed or FORMULA_SYNTAX, fix=fix or "correct the formula"
         )
 
 

@@ -47,18 +47,18 @@ def spelling(expression: Expression) -> str:
             return operator + _bracketed(operand, Level.POWER)
         case Chain(first=first, rest=rest):
             level = INFIX[rest[0].operator]
-            pieces = [_bracketed(first, Level(level + 1))]
+            text_parts = [_bracketed(first, Level(level + 1))]
             for operation in rest:
                 operand = _operand_of_power if level is Level.POWER else _bracketed
                 blank = "" if level >= Level.PRODUCT else " "
-                pieces += [blank, operation.operator, blank, operand(operation.operand, Level(level + 1))]
-            return "".join(pieces)
+                text_parts += [blank, operation.operator, blank, operand(operation.operand, Level(level + 1))]
+            return "".join(text_parts)
         case Range(parts=parts):
             return ":".join(_bracketed(part, Level.SUM) for part in parts)
         case Postfix(base=base, steps=steps):
-            whole = _bracketed(base, Level.OPERAND)
-            bare = not (isinstance(base, Number) and isinstance(steps[0], Field))  # not 5.T
-            return (whole if bare else f"({whole})") + "".join(map(_step, steps))
+            operand_text = _bracketed(base, Level.OPERAND)
+            is_unambiguous = not (isinstance(base, Number) and isinstance(steps[0], Field))  # not 5.T
+            return (operand_text if is_unambiguous else f"({operand_text})") + "".join(map(_step, steps))
 
 
 def _row(elements: Sequence[Expression]) -> str:
@@ -89,12 +89,12 @@ def _level(expression: Expression) -> Level:
             return Level.OPERAND
 
 
-def _bracketed(expression: Expression, loosest: Level) -> str:
+def _bracketed(expression: Expression, min_level: Level) -> str:
     text = spelling(expression)
-    return text if _level(expression) >= loosest else f"({text})"
+    return text if _level(expression) >= min_level else f"({text})"
 
 
-def _operand_of_power(expression: Expression, loosest: Level) -> str:
+def _operand_of_power(expression: Expression, min_level: Level) -> str:
     """An exponent: its signs need no brackets, ``2^-1``, unless a power follows them, ``2^(-1^2)``.
 
     A transpose in an exponent needs brackets, because ``A^b'`` is ``(A^b)'``.
@@ -103,4 +103,4 @@ def _operand_of_power(expression: Expression, loosest: Level) -> str:
         return expression.operator + _operand_of_power(expression.operand, Level.OPERAND)
     if isinstance(expression, Postfix) and any(isinstance(step, Transpose) for step in expression.steps):
         return f"({spelling(expression)})"
-    return _bracketed(expression, loosest)
+    return _bracketed(expression, min_level)

@@ -1,4 +1,4 @@
-"""From tokens to the statements of a script."""
+"""Converts tokens to the statements of a script."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from armblocks.matlab.syntax import (
     Transpose,
 )
 
-_TARGETS = "name, name{i}, name.field …"
+_ALLOWED_TARGETS = "name, name{i}, name.field …"
 
 
 def parse_script(source: Source) -> tuple[Statement, ...]:
@@ -57,11 +57,11 @@ def _statement(parser: Parser) -> Statement:
         case Postfix(base=Name(name=name), steps=steps):
             targets = [step for step in steps if not isinstance(step, Transpose)]
             if len(targets) < len(steps):
-                raise location.error("a transpose cannot be assigned to", allowed=_TARGETS)
+                raise location.error("a transpose cannot be assigned to", allowed=_ALLOWED_TARGETS)
         case Matrix():
             raise location.error("assignment to several variables at once is not supported")
         case _:
-            raise location.error("the left side of '=' is not a variable", allowed=_TARGETS)
+            raise location.error("the left side of '=' is not a variable", allowed=_ALLOWED_TARGETS)
     result = Assignment(name, tuple(targets), parser.expression(), token.at)
     if parser.at_operator("="):
         raise location.error("two '=' in one statement", allowed="one assignment a statement")

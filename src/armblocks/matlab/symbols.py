@@ -4,8 +4,8 @@ A vector is neither row nor column: ``[1 2]`` and ``[1; 2]`` are the same, and `
 w. Two vectors are multiplied element by element, as in Simulink's Fcn block (an error in MATLAB for two
 rows); with a matrix ``*`` is the matrix product, as in MATLAB, and ``.*`` is elementwise.
 
-Where the orientation of a vector decides in MATLAB, and the text of the formula shows it, as in ``u'*A*u`` or
-``A(1, :)*A(:, 2)``, the formula is refused: see :class:`Oriented`.
+In some formulas the result in MATLAB depends on the orientation of a vector, and the text of the formula
+shows the orientation: ``u'*A*u``, ``A(1, :)*A(:, 2)``. Such formulas are errors, see :class:`OrientedVector`.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from armblocks.equations import elementary
 from armblocks.errors import ArmblocksError, UnknownNameError
 from armblocks.matlab.array_functions import range_of
-from armblocks.matlab.arrays import EXPONENTS, POWERS_OF_MATRICES, positions
-from armblocks.matlab.calls import call_function
+from armblocks.matlab.arrays import ALLOWED_MATRIX_POWERS, EXPONENTS, positions
+from armblocks.matlab.calls import call_function, selected_function
 from armblocks.matlab.function_kinds import MismatchError
 from armblocks.matlab.functions import TABLE
 from armblocks.matlab.source import Location
@@ -35,19 +35,19 @@ from armblocks.spatial.rotation import cos_exact, sin_exact
 
 
 @dataclass(frozen=True)
-class Oriented:
+class OrientedVector:
     """A vector that is a ``row`` or ``column`` of a matrix, a product with a matrix, or ``transposed``."""
 
     value: SX
     kind: str
 
 
-Symbol = SX | str | Oriented
+Symbol = SX | str | OrientedVector
 """Texts are arguments of functions only."""
 
 
-def _exact(operation: Callable[[Any, Any], Any]) -> Callable[[SX, SX], SX]:
-    """The operation, of constants in IEEE arithmetic: CasADi gives 0 for inf - inf, and 1 for nan == nan."""
+def _ieee_operation(operation: Callable[[Any, Any], Any]) -> Callable[[SX, SX], SX]:
+    """The operation, with IEEE arithmetic for constants: CasADi gives 0 for inf - inf, 1 for nan == nan."""
 
     def apply(left: SX, right: SX) -> SX:
         if not (left.is_constant() and right.is_constant()):
@@ -59,18 +59,18 @@ def _exact(operation: Callable[[Any, Any], Any]) -> Callable[[SX, SX], SX]:
 
 
 _OPERATIONS: Mapping[str, Callable[[SX, SX], SX]] = {
-    "+": _exact(operator.add),
-    "-": _exact(operator.sub),
-    "*": _exact(operator.mul),
-    "/": _exact(lambda left, right: left / right),
-    "\\": _exact(lambda left, right: right / left),
+    "+": _ieee_operation(operator.add),
+    "-": _ieee_operation(operator.sub),
+    "*": _ieee_operation(operator.mul),
+    "/": _ieee_operation(lambda left, right: left / right),
+    "\\": _ieee_operation(lambda left, right: right / left),
     "^": lambda left, right: elementary("power", left, right),
-    "<": _exact(operator.lt),
-    "<=": _exact(operator.le),
-    ">": _exact(lambda left, right: right < left),
-    ">=": _exact(lambda left, right: right <= left),
-    "==": _exact(operator.eq),
-    "~=": _exact(operator.ne),
+    "<": _ieee_operation(operator.lt),
+    "<=": _ieee_operation(operator.le),
+    ">": _ieee_operation(lambda left, right: right < left),
+    ">=": _ieee_operation(lambda left, right: right <= left),
+    "==": _ieee_operation(operator.eq),
+    "~=": _ieee_operation(operator.ne),
 }
 
 
@@ -96,7 +96,7 @@ class SymbolArithmetic:
         return casadi.ceil(value)
 
     def sign(self, value: SX) -> SX:
-        """-1, 0 or 1."""
+        """The sign: -1, 0 or 1."""
         return casadi.sign(value)
 
     def absolute(self, value: SX) -> SX:
@@ -104,15 +104,15 @@ class SymbolArithmetic:
         return casadi.fabs(value)
 
     def minimum(self, left: SX, right: SX) -> SX:
-        """The smaller one; the other where one is NaN."""
+        """The smaller value; if one is NaN, the other one."""
         return casadi.fmin(left, right)
 
     def maximum(self, left: SX, right: SX) -> SX:
-        """The larger one; the other where one is NaN."""
+        """The larger value; if one is NaN, the other one."""
         return casadi.fmax(left, right)
 
     def quotient(self, left: SX, right: SX) -> SX:
-        """``left ./ right``"""
+        """The elementwise quotient ``left ./ right``."""
         return _OPERATIONS["/"](left, right)
 
     def remainder(self, left: SX, right: SX) -> SX:
@@ -123,24 +123,24 @@ class SymbolArithmetic:
         """``yes`` where the condition is not 0, else ``no``."""
         return if_else(condition, yes, no)
 
-    def both(self, left: SX, right: SX) -> SX:
+    def logical_and(self, left: SX, right: SX) -> SX:
         """1 where both are not 0, else 0."""
         return logic_and(left != 0.0, right != 0.0)
 
-    def either(self, left: SX, right: SX) -> SX:
+    def logical_or(self, left: SX, right: SX) -> SX:
         """1 where one is not 0, else 0."""
         return logic_or(left != 0.0, right != 0.0)
 
     def constant(self, array: NDArray[np.float64]) -> SX:
-        """An array of numbers."""
-        return _plain(SX(np.asarray(array, dtype=np.float64))) if array.size else SX(0, 1)
+        """The value of an array of numbers."""
+        return _as_column(SX(np.asarray(array, dtype=np.float64))) if array.size else SX(0, 1)
 
     def shape(self, value: SX) -> tuple[int, int]:
         """Rows and columns; a vector is a column."""
         rows, columns = value.shape
         return rows, columns
 
-    def folded(self, combine: Callable[[Any, Any], Any], value: SX) -> SX:
+    def fold(self, combine: Callable[[Any, Any], Any], value: SX) -> SX:
         """All elements of a vector, or those of each column of a matrix, combined from first to last."""
         if not value.numel():
             raise MismatchError("the array is empty")
@@ -150,7 +150,7 @@ class SymbolArithmetic:
         """The sum of a vector, or the sums of the columns of a matrix."""
         return casadi.sum1(value)
 
-    def length_of(self, value: SX) -> SX:
+    def norm(self, value: SX) -> SX:
         """The square root of the sum of the squares of all elements."""
         return casadi.norm_fro(value)
 
@@ -167,7 +167,7 @@ class SymbolArithmetic:
         return float(value) if value.numel() == 1 and value.is_constant() else math.nan
 
     def from_rows(self, rows: Sequence[Sequence[Any]]) -> SX:
-        """A matrix of numbers and elements."""
+        """The matrix with these rows of elements."""
         return vertcat(*(horzcat(*row) for row in rows))
 
     def transposed_matrix(self, value: SX) -> SX:
@@ -185,7 +185,7 @@ class SymbolArithmetic:
         return casadi.inv(value)
 
     def cosine_sine(self, angle: SX) -> tuple[Any, Any]:
-        """Cosine and sine of a number, exact at quarter turns if it is constant."""
+        """Cosine and sine of a number, exact at multiples of pi/2 if it is constant."""
         if angle.is_constant():
             return cos_exact(float(angle)), sin_exact(float(angle))
         return elementary("cos", angle), elementary("sin", angle)
@@ -207,11 +207,11 @@ class Symbols:
         return value
 
     def negative(self, location: Location, value: Symbol) -> Symbol:
-        """``-value``"""
+        """The negative ``-value``."""
         return _oriented_like(-_symbol(location, value), value)
 
     def logical_not(self, location: Location, value: Symbol) -> Symbol:
-        """``~value``"""
+        """The logical negation ``~value``."""
         return logic_not(_symbol(location, value) != 0.0)
 
     def operate(self, location: Location, operator: str, left: Symbol, right: Symbol) -> Symbol:
@@ -228,14 +228,16 @@ class Symbols:
             raise location.error(
                 "the divisor is a matrix", allowed="inv(A) * b, or ./ for elementwise division"
             )
-        return _oriented_like(_together(location, _OPERATIONS[operator.removeprefix(".")], a, b), left, right)
+        return _oriented_like(
+            _elementwise(location, _OPERATIONS[operator.removeprefix(".")], a, b), left, right
+        )
 
     def logic(self, location: Location, operator: str, values: Sequence[Symbol]) -> Symbol:
         """All values joined by one of ``&& || & |``."""
-        gate = logic_and if operator in ("&&", "&") else logic_or
+        combine_pair = logic_and if operator in ("&&", "&") else logic_or
         first, *others = (_symbol(location, value) != 0.0 for value in values)
         for other in others:
-            first = _together(location, gate, first, other)
+            first = _elementwise(location, combine_pair, first, other)
         return first
 
     def matrix(self, location: Location, rows: Sequence[Sequence[Symbol]]) -> Symbol:
@@ -243,7 +245,7 @@ class Symbols:
         values = [] if rows else [SX(0, 1)]
         for row in rows:
             entries = [_symbol(location, entry) for entry in row]
-            columns = [entry for entry in row if isinstance(entry, Oriented) and entry.kind == "column"]
+            columns = [entry for entry in row if isinstance(entry, OrientedVector) and entry.kind == "column"]
             if columns and (len(rows) > 1 or len(row) > 1):
                 raise location.error(
                     "a column of a matrix, or a matrix times a vector, is combined with others in brackets",
@@ -260,7 +262,7 @@ class Symbols:
         if len({value.numel() for value in values}) > 1:
             lengths = ", ".join(str(value.numel()) for value in values)
             raise location.error(f"the rows of an array have {lengths} numbers", allowed="rows of one length")
-        return _plain(horzcat(*values).T)
+        return _as_column(horzcat(*values).T)
 
     def cell(self, location: Location, elements: Sequence[Symbol]) -> Symbol:
         """Cell arrays exist in scripts only."""
@@ -279,54 +281,56 @@ class Symbols:
             raise location.error(f"a range: {mismatch}", allowed="first:last or first:step:last") from None
 
     def transposed(self, location: Location, value: Symbol) -> Symbol:
-        """``value'``"""
+        """The transpose ``value'``."""
         array = _symbol(location, value)
         if array.shape[1] > 1 or array.numel() < 2:
-            return _plain(array.T)
-        kind = value.kind if isinstance(value, Oriented) else ""
-        return Oriented(array, {"row": "column", "column": "row"}.get(kind, "transposed"))
+            return _as_column(array.T)
+        kind = value.kind if isinstance(value, OrientedVector) else ""
+        return OrientedVector(array, {"row": "column", "column": "row"}.get(kind, "transposed"))
 
-    def index(self, location: Location, value: Symbol, written: Expression) -> Symbol:
+    def index(self, location: Location, value: Symbol, expression: Expression) -> Symbol:
         """The value of an index. Raises an error for a logical one."""
-        if is_logical(written):
+        if is_logical(expression):
             raise location.error(
                 "an index is a comparison or a logical value", allowed="positions counted from 1"
             )
         return value
 
     def element(
-        self, location: Location, value: Symbol, indices: Sequence[Symbol | None], shown: str
+        self, location: Location, value: Symbol, indices: Sequence[Symbol | None], label: str
     ) -> Symbol:
         """``value(indices)`` with constant indices, where ``None`` is ``:``."""
         array = _symbol(location, value)
-        chosen: list[NDArray[np.float64] | None] = []
+        index_arrays: list[NDArray[np.float64] | None] = []
         for index in indices:
             numbers = None if index is None else _constant(_symbol(location, index))
             if index is not None and numbers is None:
                 raise location.error(
-                    f"'{shown or 'the array'}' has no constant index", allowed=f"{shown or 'u'}(1) and so on"
+                    f"'{label or 'the array'}' has no constant index", allowed=f"{label or 'u'}(1) and so on"
                 )
-            chosen.append(numbers)
+            index_arrays.append(numbers)
         rows, columns = array.shape
-        if isinstance(value, Oriented) and value.kind == "row":
+        if isinstance(value, OrientedVector) and value.kind == "row":
             rows, columns = columns, rows
-        elif len(indices) == 2 and columns == 1 and not isinstance(value, Oriented):
-            chosen = _single_index(location, rows, chosen)
-        selected = positions(location, (rows, columns), chosen, shown)
+        elif len(indices) == 2 and columns == 1 and not isinstance(value, OrientedVector):
+            index_arrays = _single_index(location, rows, index_arrays)
+        selected = positions(location, (rows, columns), index_arrays, label)
         if selected.size == 1:
             return array[int(selected.flat[0])]
         entries = vertcat(*(array[int(k)] for k in selected.ravel(order="F")), SX(0, 1))
         if not selected.size:
             return SX(0, 1)
         shaped = reshape(entries, *selected.shape)
-        return _of_matrix(shaped) if array.shape[1] > 1 else _plain(shaped)
+        return _oriented_part(shaped) if array.shape[1] > 1 else _as_column(shaped)
 
     def last_index(self, location: Location, value: Symbol, position: int, count: int) -> Symbol:
         """``end`` as index ``position`` of ``count`` indices."""
         array = _symbol(location, value)
-        if count > 1 and array.shape[1] == 1 and array.numel() > 1 and not isinstance(value, Oriented):
-            raise _without_orientation(location)
-        extents = array.shape[::-1] if isinstance(value, Oriented) and value.kind == "row" else array.shape
+        if count > 1 and array.shape[1] == 1 and array.numel() > 1 and not isinstance(value, OrientedVector):
+            raise _orientation_error(location)
+        extents = (
+            array.shape[::-1] if isinstance(value, OrientedVector) and value.kind == "row" else array.shape
+        )
         return SX(float(array.numel() if count == 1 else extents[min(position, 1)]))
 
     def cell_element(self, location: Location, value: Symbol, indices: Sequence[Symbol | None]) -> Symbol:
@@ -346,7 +350,7 @@ class Symbols:
             raise UnknownNameError(kind, name, known, where=location.source.name)
 
     def call(
-        self, location: Location, name: str, arguments: Sequence[Symbol], written: Sequence[Expression]
+        self, location: Location, name: str, arguments: Sequence[Symbol], expressions: Sequence[Expression]
     ) -> Symbol:
         """``name(arguments)`` of a function in the table."""
         function = TABLE[name]
@@ -354,12 +358,13 @@ class Symbols:
             value if isinstance(value, str) and function.may_be_text(k) else _symbol(location, value)
             for k, value in enumerate(arguments)
         ]
+        function, selected = selected_function(name, values)
         if function.elementwise and len(values) > 1:
             _check_shapes(location, [value for value in values if isinstance(value, SX)])
-        result = call_function(self._arithmetic, location, name, values, _constant)
+        result = call_function(self._arithmetic, location, name, function, selected, _constant)
         if any(isinstance(value, SX) and value.shape[1] > 1 for value in values):
-            return _of_matrix(result)
-        return _oriented_like(_plain(result), *arguments) if function.elementwise else _plain(result)
+            return _oriented_part(result)
+        return _oriented_like(_as_column(result), *arguments) if function.elementwise else _as_column(result)
 
     def _known(self) -> set[str]:
         return {*self._names, *(name for name, function in TABLE.items() if function.max_arguments == 0)}
@@ -370,37 +375,39 @@ def _symbol(location: Location, value: Symbol) -> SX:
         raise location.error(
             f"the text '{value[:40]}' is not a number", allowed="numbers and names without quotes"
         )
-    return value.value if isinstance(value, Oriented) else value
+    return value.value if isinstance(value, OrientedVector) else value
 
 
-def _of_matrix(value: SX) -> Symbol:
-    """A part of a matrix, or a reduction of one: a vector is its row or column."""
+def _oriented_part(value: SX) -> Symbol:
+    """A part or a reduction of a matrix; a vector gets the orientation of its row or column."""
     if value.numel() < 2 or 1 not in value.shape:
         return value
-    return Oriented(_plain(value), "row" if value.shape[0] == 1 else "column")
+    return OrientedVector(_as_column(value), "row" if value.shape[0] == 1 else "column")
 
 
 def _oriented_like(result: SX, *operands: Symbol) -> Symbol:
     """The result of an operation element by element: a vector with the orientation of its operands."""
-    kinds = [operand.kind for operand in operands if isinstance(operand, Oriented)]
-    return Oriented(result, kinds[0]) if kinds and result.shape[1] == 1 and result.numel() > 1 else result
+    kinds = [operand.kind for operand in operands if isinstance(operand, OrientedVector)]
+    return (
+        OrientedVector(result, kinds[0]) if kinds and result.shape[1] == 1 and result.numel() > 1 else result
+    )
 
 
-def _without_orientation(location: Location) -> ArmblocksError:
+def _orientation_error(location: Location) -> ArmblocksError:
     return location.error(
         "a vector has two indices, but is neither row nor column in a formula", allowed="v(2), v(2:3), v(end)"
     )
 
 
 def _single_index(
-    location: Location, count: int, chosen: Sequence[NDArray[np.float64] | None]
+    location: Location, count: int, index_arrays: Sequence[NDArray[np.float64] | None]
 ) -> list[NDArray[np.float64] | None]:
     """The indices (k, 1) of ``v(k, 1)`` or ``v(1, k)``. Raises an error for others, unless v is a number."""
-    numbers = [float(index[0, 0]) for index in chosen if index is not None and index.size == 1]
+    numbers = [float(index[0, 0]) for index in index_arrays if index is not None and index.size == 1]
     if count == 1:
-        return list(chosen)
+        return list(index_arrays)
     if len(numbers) < 2 or 1.0 not in numbers:
-        raise _without_orientation(location)
+        raise _orientation_error(location)
     return [np.array([[max(numbers)]]), np.ones((1, 1))]
 
 
@@ -409,8 +416,8 @@ def _constant(value: object) -> NDArray[np.float64] | None:
     return evalf(value).full() if isinstance(value, SX) and value.is_constant() else None
 
 
-def _plain(value: SX) -> SX:
-    """Vectors as columns, whatever their origin."""
+def _as_column(value: SX) -> SX:
+    """The value, with a row vector converted to a column."""
     return value.T if value.shape[0] == 1 and value.shape[1] > 1 else value
 
 
@@ -421,7 +428,7 @@ def _is_matrix(left: SX, right: SX) -> bool:
 
 def _check_products(location: Location, operator: str, left: Symbol, right: Symbol) -> None:
     """Raise an error for a product of two vectors, one of which is a row, a column or a transpose."""
-    kinds = [value.kind for value in (left, right) if isinstance(value, Oriented)]
+    kinds = [value.kind for value in (left, right) if isinstance(value, OrientedVector)]
     if kinds:
         operand = {"transposed": "a transposed vector"}.get(kinds[0], f"a {kinds[0]} of a matrix or product")
         raise location.error(
@@ -440,7 +447,7 @@ def _matrix_power(location: Location, base: SX, exponent: SX) -> SX:
             "the power of a matrix is not supported for this exponent"
             if rows == columns
             else "a power of a matrix that is not square",
-            allowed=POWERS_OF_MATRICES,
+            allowed=ALLOWED_MATRIX_POWERS,
             fix="write .^ for powers element by element",
         )
     count = int(number[0, 0])
@@ -457,14 +464,14 @@ def _product(location: Location, left: SX, right: SX) -> Symbol:
             f"a matrix of {_size(left)} is multiplied by one of {_size(right)}",
             allowed="as many columns on the left as rows on the right; .* multiplies elementwise",
         )
-    return _of_matrix(mtimes(left, right))
+    return _oriented_part(mtimes(left, right))
 
 
 def _size(value: SX) -> str:
     return f"{value.shape[0]} x {value.shape[1]}"
 
 
-def _together(location: Location, function: Callable[..., SX], *values: SX) -> SX:
+def _elementwise(location: Location, function: Callable[..., SX], *values: SX) -> SX:
     _check_shapes(location, values)
     return function(*values)
 

@@ -15,7 +15,7 @@ from armblocks.matlab.source import Position
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """``1.8e-3``"""
+    """A number: ``1.8e-3``."""
 
     value: float
     at: Position
@@ -23,7 +23,7 @@ class Number:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """``'standard'``"""
+    """A text in quotes: ``'standard'``."""
 
     value: str
     at: Position
@@ -53,7 +53,7 @@ class All:
 
 @dataclass(frozen=True, slots=True)
 class Matrix:
-    """``[a b; c d]``; ``line_breaks``: only newlines separate rows, without ``;``."""
+    """A matrix: ``[a b; c d]``; ``line_breaks``: only newlines separate rows, without ``;``."""
 
     rows: tuple[tuple[Expression, ...], ...]
     line_breaks: bool
@@ -62,7 +62,7 @@ class Matrix:
 
 @dataclass(frozen=True, slots=True)
 class CellLiteral:
-    """``{a, b, c}``"""
+    """A cell array: ``{a, b, c}``."""
 
     elements: tuple[Expression, ...]
     at: Position
@@ -70,7 +70,7 @@ class CellLiteral:
 
 @dataclass(frozen=True, slots=True)
 class Prefix:
-    """``-operand`` or ``~operand``; a sequence of signs is reduced to one."""
+    """A signed operand: ``-operand`` or ``~operand``; a sequence of signs is reduced to one."""
 
     operator: str
     operand: Expression
@@ -89,7 +89,7 @@ class Operation:
 
 @dataclass(frozen=True, slots=True)
 class Chain:
-    """``first (operator operand)…``, all of one precedence, evaluated from the left."""
+    """Operations of one precedence, evaluated from the left: ``first (operator operand)…``."""
 
     first: Expression
     rest: tuple[Operation, ...]
@@ -98,7 +98,7 @@ class Chain:
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """``start:stop`` or ``start:step:stop``"""
+    """A range: ``start:stop`` or ``start:step:stop``."""
 
     parts: tuple[Expression, ...]
     at: Position
@@ -122,7 +122,7 @@ class Braces:
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """``.name``"""
+    """A field: ``.name``."""
 
     name: str
     at: Position
@@ -130,7 +130,7 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class Transpose:
-    """``'`` or ``.'``"""
+    """A transpose: ``'`` or ``.'``."""
 
     at: Position
 
@@ -154,7 +154,7 @@ Expression = Number | Text | Name | End | All | Matrix | CellLiteral | Prefix | 
 
 @dataclass(frozen=True, slots=True)
 class Assignment:
-    """``name steps = value``"""
+    """An assignment: ``name steps = value``."""
 
     name: str
     steps: tuple[Target, ...]
@@ -172,7 +172,7 @@ class Evaluation:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """``clear L``"""
+    """A command: ``clear L``."""
 
     words: tuple[str, ...]
     at: Position
@@ -220,8 +220,8 @@ def is_logical(expression: Expression) -> bool:
 
 
 def levels(expression: Expression) -> Iterator[tuple[Expression, ...]]:
-    """The expressions of a tree level by level: the whole, then its parts, then their parts …"""
+    """The expressions of a tree level by level: the root, then its parts, then the parts of these …"""
     level: tuple[Expression, ...] = (expression,)
     while level:
         yield level
-        level = tuple(part for whole in level for part in parts_of(whole))
+        level = tuple(part for parent in level for part in parts_of(parent))

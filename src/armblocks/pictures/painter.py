@@ -35,7 +35,7 @@ class Painter:
     scale: float
 
     def picture(self, picture: Picture) -> None:
-        """Paint the whole picture on its ground."""
+        """Paint the background and all marks of a picture."""
         self.paint([Rectangle(0, 0, picture.width, picture.height, fill=Tone.SURFACE)])
         with warnings.catch_warnings():
             # Characters that the font lacks are painted as boxes, without a warning; the SVG shows them
@@ -130,17 +130,17 @@ class Painter:
             weight="bold" if mark.bold else "normal",
             style="oblique" if mark.italic else "normal",
         )
-        back = 0.0
+        offset = 0.0
         if mark.anchor != "start":  # measuring a text takes as long as drawing it
             width, _, _ = self.renderer.get_text_width_height_descent(text, font, False)
-            back = {"middle": 0.5, "end": 1.0}[mark.anchor] * width
+            offset = {"middle": 0.5, "end": 1.0}[mark.anchor] * width
         x, y = mark.x * self.scale, mark.y * self.scale
-        x, y = (x, y + back) if mark.turn else (x - back, y)
+        x, y = (x, y + offset) if mark.rotation else (x - offset, y)
         if not self.renderer.flipy():
             y = self.height - y  # in texts y is downwards for pixels and upwards for pages
         gc = self.renderer.new_gc()
         gc.set_foreground(self._colour(mark.tone, 1.0), isRGBA=True)
-        self.renderer.draw_text(gc, x, y, text, font, float(mark.turn), ismath=False)
+        self.renderer.draw_text(gc, x, y, text, font, float(mark.rotation), ismath=False)
         gc.restore()
 
     def _raster(self, mark: Raster) -> None:

@@ -1,4 +1,4 @@
-"""A picture as a list of marks: made once, then written as SVG (:mod:`.svg`) or as PNG (:mod:`.png`).
+"""A picture as a list of marks: built once, then written as SVG (:mod:`.svg`) or as PNG (:mod:`.png`).
 
 Coordinates are px, x to the right, y down; marks are in painting order. Colours are tones, so that one
 picture is valid for the light and the dark theme.
@@ -76,7 +76,10 @@ class Disc:
 
 @dataclass(frozen=True, eq=False)
 class Text:
-    """One line of text; (x, y) is on its baseline, at its ``anchor``; ``turn`` degrees anticlockwise."""
+    """One line of text with its ``anchor`` on the baseline at (x, y).
+
+    ``rotation`` is in degrees, anticlockwise; ``mono`` selects a monospaced font.
+    """
 
     x: float
     y: float
@@ -87,7 +90,7 @@ class Text:
     bold: bool = False
     italic: bool = False
     mono: bool = False
-    turn: Literal[0, 90] = 0
+    rotation: Literal[0, 90] = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,15 +126,15 @@ class Picture:
     marks: list[Mark] = field(default_factory=list[Mark])
 
     def add(self, *marks: Mark) -> None:
-        """Paint marks on top of the present ones."""
+        """Add marks on top of the existing ones."""
         self.marks.extend(marks)
 
     def extend(self, marks: Iterable[Mark]) -> None:
-        """Paint many marks on top of the present ones."""
+        """Add many marks on top of the existing ones."""
         self.marks.extend(marks)
 
     def place(self, other: Picture, x: float, y: float) -> None:
-        """Paint another picture with its top left corner at (x, y)."""
+        """Add another picture with its top left corner at (x, y)."""
         self.marks.extend(moved(mark, x, y) for mark in other.marks)
 
 
@@ -152,7 +155,7 @@ def moved(mark: Mark, dx: float, dy: float) -> Mark:
             return replace(mark, x=mark.x + dx, y=mark.y + dy)
 
 
-def turned(mark: Mark, height: float) -> Mark:
+def rotated_clockwise(mark: Mark, height: float) -> Mark:
     """The mark rotated clockwise by 90 degrees with a sheet of this height; texts move but stay upright."""
     match mark:
         case Polyline():
@@ -165,7 +168,7 @@ def turned(mark: Mark, height: float) -> Mark:
             )
             return replace(mark, commands=commands)
         case Group():
-            return replace(mark, marks=tuple(turned(inner, height) for inner in mark.marks))
+            return replace(mark, marks=tuple(rotated_clockwise(inner, height) for inner in mark.marks))
         case Rectangle() | Raster():
             return replace(
                 mark, x=height - mark.y - mark.height, y=mark.x, width=mark.height, height=mark.width

@@ -21,11 +21,11 @@ FONT_STACK = (
 MONO_STACK = 'ui-monospace,"SF Mono",Menlo,Consolas,"DejaVu Sans Mono",monospace'
 
 TEXT_SIZE = 12.0
-"""px: axis labels, direct labels."""
+"""Font size of axis labels and direct labels, px."""
 SMALL_SIZE = 10.5
-"""px: tick labels, captions of details."""
+"""Font size of tick labels and of captions of details, px."""
 TITLE_SIZE = 13.5
-"""px: titles inside figures."""
+"""Font size of titles inside figures, px."""
 FIGURE_WIDTH = 960.0
 """Width of every full-width figure, px."""
 
@@ -68,7 +68,7 @@ class Tone(Enum):
 
 @dataclass(frozen=True)
 class Shade:
-    """One tone as ``#rrggbb`` on light and on dark ground."""
+    """One tone as ``#rrggbb`` on a light and on a dark background."""
 
     light: str
     dark: str

@@ -1,7 +1,8 @@
 """Pictures as SVG text.
 
-A separate file has light colours for all viewers, and dark colours for viewers that support the reader's
-colour preference. SVG for a page has its colours from the page's custom properties.
+An SVG file contains its colours. A media query selects the dark ones, if the viewer supports it. Inline SVG
+takes its colours from the CSS custom properties of the page. The classes of the marks are ``f-TONE`` (fill),
+``s-TONE`` (stroke) and ``m`` (monospaced text).
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ from armblocks.pictures.png_file import png_bytes
 from armblocks.pictures.style import FONT_STACK, MONO_STACK, PALETTE, Theme, Tone
 from armblocks.pictures.text_width import printable
 
-_MANY = 24
+_MAX_EXACT_POINTS = 24
+"""Lines with more points are written with one decimal instead of two."""
 
 
 def escape(text: str) -> str:
@@ -50,8 +52,7 @@ def number(value: float) -> str:
 
 
 def svg_marks(picture: Picture) -> str:
-    """Only the marks, without the element around them, for callers of both :func:`svg_file` and
-    :func:`svg_inline`."""
+    """The marks without the ``svg`` element, for both :func:`svg_file` and :func:`svg_inline`."""
     return _marks(picture.marks)
 
 
@@ -64,7 +65,7 @@ def svg_file(picture: Picture, *, theme: Theme | None = None, marks: str | None 
     background = f'<rect class="f-{Tone.SURFACE.value}" width="100%" height="100%"/>'
     return (
         '<?xml version="1.0" encoding="UTF-8"?>\n'
-        + _open_tag(picture, identifier="p", sized=True)
+        + _open_tag(picture, identifier="p", has_size=True)
         + f"<style>{rules}</style>{background}"
         + (svg_marks(picture) if marks is None else marks)
         + "</svg>\n"
@@ -74,11 +75,11 @@ def svg_file(picture: Picture, *, theme: Theme | None = None, marks: str | None 
 def svg_inline(picture: Picture, identifier: str, *, marks: str | None = None) -> str:
     """The SVG element for a page that has :func:`page_rules`; ``identifier`` is unique within the page."""
     inside = svg_marks(picture) if marks is None else marks
-    return f"{_open_tag(picture, identifier=identifier, sized=False)}{inside}</svg>"
+    return f"{_open_tag(picture, identifier=identifier, has_size=False)}{inside}</svg>"
 
 
 def page_rules() -> str:
-    """CSS for a page with inline SVG: tones as classes that read the page's custom properties."""
+    """CSS for a page with inline SVG: classes whose colours are the custom properties of the page."""
     rules = [f"svg text{{font-family:{FONT_STACK};font-variant-numeric:tabular-nums}}"]
     rules.append(f"svg .m{{font-family:{MONO_STACK}}}")
     rules += [
@@ -98,24 +99,24 @@ def _tone_rules(theme: Theme) -> str:
     return "".join(rules)
 
 
-def _open_tag(picture: Picture, *, identifier: str, sized: bool) -> str:
-    size = f'width="{number(picture.width)}" height="{number(picture.height)}" ' if sized else ""
+def _open_tag(picture: Picture, *, identifier: str, has_size: bool) -> str:
+    size = f'width="{number(picture.width)}" height="{number(picture.height)}" ' if has_size else ""
     described = f' aria-describedby="{identifier}-d"' if picture.description else ""
-    words = f'<title id="{identifier}-t">{escape(picture.title)}</title>'
+    labels = f'<title id="{identifier}-t">{escape(picture.title)}</title>'
     if picture.description:
-        words += f'<desc id="{identifier}-d">{escape(picture.description)}</desc>'
+        labels += f'<desc id="{identifier}-d">{escape(picture.description)}</desc>'
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" {size}'
         f'viewBox="0 0 {number(picture.width)} {number(picture.height)}" role="img" '
-        f'aria-labelledby="{identifier}-t"{described}>{words}'
+        f'aria-labelledby="{identifier}-t"{described}>{labels}'
     )
 
 
 def _paint(fill: Tone | None, stroke: Tone | None, width: float, opacity: float) -> str:
-    names = [f"f-{fill.value}"] if fill else []
+    classes = [f"f-{fill.value}"] if fill else []
     if stroke:
-        names.append(f"s-{stroke.value}")
-    text = f' class="{" ".join(names)}"' if names else ""
+        classes.append(f"s-{stroke.value}")
+    text = f' class="{" ".join(classes)}"' if classes else ""
     if fill is None:
         text += ' fill="none"'
     if stroke is not None and width != 1:
@@ -131,19 +132,19 @@ def _dash(dash: Sequence[float]) -> str:
 
 def _path_data(points: Points, closed: bool) -> str:
     array = np.asarray(points, dtype=np.float64)
-    if len(array) > _MANY and np.isfinite(array).all():
-        # One format call for the whole line is ten times as fast; a tenth of a px is finer than any screen.
+    if len(array) > _MAX_EXACT_POINTS and np.isfinite(array).all():
+        # One format call for the whole line is faster than one per point. Errors of 0.05 px are not visible.
         data = ("M%.1f %.1f" + "L%.1f %.1f" * (len(array) - 1)) % tuple(array.ravel().tolist())
         return data.replace(".0", "") + ("Z" if closed else "")
-    pieces: list[str] = []
-    pen = "M"
+    commands: list[str] = []
+    command = "M"
     for x, y in array.tolist():
         if not (math.isfinite(x) and math.isfinite(y)):
-            pen = "M"
+            command = "M"
             continue
-        pieces.append(f"{pen}{number(x)} {number(y)}")
-        pen = "L"
-    return "".join(pieces) + ("Z" if closed and pieces else "")
+        commands.append(f"{command}{number(x)} {number(y)}")
+        command = "L"
+    return "".join(commands) + ("Z" if closed and commands else "")
 
 
 def _marks(marks: Iterable[Mark]) -> str:
@@ -191,15 +192,15 @@ def _mark(mark: Mark) -> str:
 
 
 def _text(mark: Text) -> str:
-    names = f"f-{mark.tone.value}" + (" m" if mark.mono else "")
+    classes = f"f-{mark.tone.value}" + (" m" if mark.mono else "")
     extra = f' text-anchor="{mark.anchor}"' if mark.anchor != "start" else ""
     if mark.bold:
         extra += ' font-weight="600"'
     if mark.italic:
         extra += ' font-style="italic"'
-    if mark.turn:
+    if mark.rotation:
         extra += f' transform="rotate(-90 {number(mark.x)} {number(mark.y)})"'
     return (
         f'<text x="{number(mark.x)}" y="{number(mark.y)}" font-size="{number(mark.size)}" '
-        f'class="{names}"{extra}>{escape(mark.text)}</text>'
+        f'class="{classes}"{extra}>{escape(mark.text)}</text>'
     )

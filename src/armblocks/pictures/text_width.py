@@ -22,7 +22,7 @@ _BOLD = (
     716, 716, 493, 595, 478, 712, 652, 924, 645, 652, 582, 712, 365, 712, 838,
 )  # fmt: skip
 _OTHERS = {"°": 500, "·": 380, "–": 500, "²": 438, "³": 438, "µ": 736, "∫": 610, "…": 1000}
-_WIDEST = 1000
+_MAX_CHARACTER_WIDTH = 1000
 
 
 def text_width(text: str, size: float, *, bold: bool = False, mono: bool = False) -> float:
@@ -38,18 +38,18 @@ def text_width(text: str, size: float, *, bold: bool = False, mono: bool = False
         else:
             # East Asian and other wide characters have the width of an em; other Latin and Greek characters
             # less.
-            total += _OTHERS.get(character, 838 if ord(character) < 0x2E80 else _WIDEST)
+            total += _OTHERS.get(character, 838 if ord(character) < 0x2E80 else _MAX_CHARACTER_WIDTH)
     return total * size / 1000
 
 
-def shorten(text: str, size: float, room: float, *, bold: bool = False) -> str:
-    """The text, shortened with an ellipsis if it would be wider than ``room``."""
-    if text_width(text, size, bold=bold) <= room:
+def shorten(text: str, size: float, max_width: float, *, bold: bool = False) -> str:
+    """The text, shortened with an ellipsis if it would be wider than ``max_width``."""
+    if text_width(text, size, bold=bold) <= max_width:
         return text
-    kept = text
-    while kept and text_width(kept + "…", size, bold=bold) > room:
-        kept = kept[:-1]
-    return kept.rstrip() + "…"
+    shortened = text
+    while shortened and text_width(shortened + "…", size, bold=bold) > max_width:
+        shortened = shortened[:-1]
+    return shortened.rstrip() + "…"
 
 
 def printable(text: str) -> str:

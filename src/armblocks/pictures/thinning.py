@@ -15,15 +15,15 @@ def thin_out(time: _Array, values: _Array, columns: int) -> tuple[_Array, _Array
         return time, values
     bounds = np.searchsorted(time, np.linspace(float(time[0]), float(time[-1]), columns + 1))
     bounds[-1] = len(time)
-    picked: set[int] = {len(time) - 1}
+    indices: set[int] = {len(time) - 1}
     for a, b in zip(bounds[:-1].tolist(), bounds[1:].tolist()):
         if a == b:
             continue
-        piece = values[a:b]
-        finite = np.isfinite(piece)
-        picked.update((a, b - 1))
+        interval_values = values[a:b]
+        finite = np.isfinite(interval_values)
+        indices.update((a, b - 1))
         if finite.any():
-            picked.add(a + int(np.argmin(np.where(finite, piece, np.inf))))
-            picked.add(a + int(np.argmax(np.where(finite, piece, -np.inf))))
-    keep = np.array(sorted(picked))
-    return time[keep], values[keep]
+            indices.add(a + int(np.argmin(np.where(finite, interval_values, np.inf))))
+            indices.add(a + int(np.argmax(np.where(finite, interval_values, -np.inf))))
+    sorted_indices = np.array(sorted(indices))
+    return time[sorted_indices], values[sorted_indices]

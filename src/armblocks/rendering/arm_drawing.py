@@ -1,4 +1,4 @@
-"""Drawings of an arm: one pose, or poses of a motion with the tool's path (the paper's Figures 10 and 11)."""
+"""Drawings of an arm: one pose, or several poses of a motion with the path of the tool."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from armblocks.pictures.picture import Disc, Picture, Polyline, Raster, Rectangl
 from armblocks.pictures.style import FIGURE_WIDTH, SMALL_SIZE, TEXT_SIZE, Theme, Tone
 from armblocks.pictures.svg import svg_file
 from armblocks.rendering.camera import Camera
-from armblocks.rendering.render import Rendering, cropped, faded, over, render, shadow
+from armblocks.rendering.render import Rendering, composite, crop, render, shadow, with_opacity
 from armblocks.robot import Robot
 from armblocks.robot.geometry import Body, link_frames, reach, robot_bodies
 from armblocks.robot.shapes import Housing, Material
@@ -25,7 +25,7 @@ _Array = NDArray[np.float64]
 
 RASTER_SCALE = 2.0
 """Rendered pixels of the bodies per px of the figure."""
-GHOST = 0.26
+START_POSE_OPACITY = 0.26
 """Opacity of the start pose."""
 
 
@@ -48,19 +48,19 @@ class Stage:
     ) -> Stage:
         """A stage with a camera that shows all ``poses`` (K, L+2, 4, 4) and the ``path`` (N, 3) m."""
         bodies = robot_bodies(robot)
-        clouds = [
+        corner_points = [
             body.mesh.corners.reshape(-1, 3) @ pose[body.row, :3, :3].T + pose[body.row, :3, 3]
             for pose in poses
             for body in bodies
         ]
-        points = np.concatenate([*clouds, path])
+        points = np.concatenate([*corner_points, path])
         low, high = points.min(axis=0), points.max(axis=0)
         spacing = nice_step(float((high - low).max()) / 8)
-        feet = [c for c, body in zip(clouds, bodies) if body.row == 0]
-        foot = float(np.concatenate(feet)[:, 2].min()) if feet else float(low[2])
+        feet = [c for c, body in zip(corner_points, bodies) if body.row == 0]
+        base_height = float(np.concatenate(feet)[:, 2].min()) if feet else float(low[2])
         # The arm is on the floor, or on a pedestal if a pose reaches below its base.
-        floor = foot
-        if low[2] < foot - 0.02 * reach(robot):
+        floor = base_height
+        if low[2] < base_height - 0.02 * reach(robot):
             floor = math.floor(float(low[2]) / (spacing / 2)) * (spacing / 2)
         x0, y0 = ((math.floor(float(v) / spacing) - 8) * spacing for v in low[:2])
         x1, y1 = ((math.ceil(float(v) / spacing) + 8) * spacing for v in high[:2])
@@ -69,7 +69,7 @@ class Stage:
         camera = Camera.framing(np.concatenate([points, floor_corners]), width, height, margin=margin)
         return cls(
             bodies=bodies,
-            pedestal=_pedestal(robot, foot, floor),
+            pedestal=_pedestal(robot, base_height, floor),
             camera=camera,
             floor=floor,
             grid=(spacing, x0, x1, y0, y1),
@@ -86,29 +86,28 @@ class Stage:
         return render(meshes, self.camera, self.width, self.height, RASTER_SCALE)
 
 
-def moments_picture(
-    robot: Robot, time: _Array, poses: _Array, *, moments: int = 6, columns: int = 3
+def pose_sequence_picture(
+    robot: Robot, time: _Array, poses: _Array, *, count: int = 6, columns: int = 3
 ) -> Picture:
-    """The robot at equally spaced times of a run with the tool's path up to each time; the start is
-    transparent.
+    """The robot at equally spaced times of a run, with the tool's path; the start pose is transparent.
 
     ``time`` (N,) s, ``poses`` (N, L+2, 4, 4): base, links and tool in the world.
     """
-    instants: _Array = np.linspace(float(time[0]), float(time[-1]), moments)
-    samples = [int(np.argmin(np.abs(time - instant))) for instant in instants.tolist()]
+    sample_times: _Array = np.linspace(float(time[0]), float(time[-1]), count)
+    samples = [int(np.argmin(np.abs(time - sample_time))) for sample_time in sample_times.tolist()]
     path = poses[:, -1, :3, 3]
     gap = 12.0
     width = (FIGURE_WIDTH - gap * (columns - 1)) / columns
     width = math.floor(width)
     height, caption = round(width * 0.84), 34.0
     stage = Stage.framing(robot, poses[samples], path, width, height, margin=16.0)
-    ghost = stage.render(stage.meshes(poses[samples[0]]))
+    start_pose = stage.render(stage.meshes(poses[samples[0]]))
     floor = _floor(stage)
-    rows = math.ceil(moments / columns)
+    rows = math.ceil(count / columns)
     picture = Picture(
         width=FIGURE_WIDTH,
         height=rows * (height + caption) + (rows - 1) * gap + 22,
-        title=f"{robot.name} at {moments} moments",
+        title=f"{robot.name} at {count} times",
         description=(
             f"The arm {robot.name} at "
             + ", ".join(f"{axis_number(float(time[k]))} s" for k in samples)
@@ -122,8 +121,8 @@ def moments_picture(
         panel.add(Rectangle(0.5, 0.5, width - 1, height - 1, radius=6, fill=Tone.SUNKEN))
         panel.extend(floor)
         meshes = stage.meshes(poses[k])
-        body = ghost if number == 0 else stage.render(meshes)
-        panel.add(_raster(stage, meshes, body, None if number == 0 else ghost))
+        body = start_pose if number == 0 else stage.render(meshes)
+        panel.add(_raster(stage, meshes, body, None if number == 0 else start_pose))
         panel.extend(_path_marks(stage, body, path, k))
         panel.add(
             Text(2, height + 16, f"t = {axis_number(float(time[k]))} s", size=TEXT_SIZE, bold=True),
@@ -169,21 +168,23 @@ def arm_picture_svg(
     return svg_file(arm_picture(robot, q, width=size[0], height=size[1]), theme=theme)
 
 
-def _raster(stage: Stage, meshes: Sequence[TriangleMesh], body: Rendering, ghost: Rendering | None) -> Raster:
+def _raster(
+    stage: Stage, meshes: Sequence[TriangleMesh], body: Rendering, start_pose: Rendering | None
+) -> Raster:
     """Shadow, start pose and body as one image in the panel, without its empty margin."""
     rows, columns = round(stage.height * RASTER_SCALE), round(stage.width * RASTER_SCALE)
     canvas = np.zeros((rows, columns, 4), dtype=np.uint8)
     half = RASTER_SCALE / 2
-    soft = shadow(meshes, stage.camera, stage.floor, stage.width, stage.height, half)
-    doubled = np.repeat(np.repeat(soft, 2, axis=0), 2, axis=1)[:rows, :columns]
+    shadow_pixels = shadow(meshes, stage.camera, stage.floor, stage.width, stage.height, half)
+    doubled = np.repeat(np.repeat(shadow_pixels, 2, axis=0), 2, axis=1)[:rows, :columns]
     canvas[: doubled.shape[0], : doubled.shape[1]] = doubled
-    for layer, strength in ((ghost, GHOST), (body, 1.0)):
+    for layer, strength in ((start_pose, START_POSE_OPACITY), (body, 1.0)):
         if layer is None:
             continue
-        pixels = layer.pixels if strength == 1.0 else faded(layer.pixels, strength)
+        pixels = layer.pixels if strength == 1.0 else with_opacity(layer.pixels, strength)
         window = canvas[layer.top : layer.top + pixels.shape[0], layer.left : layer.left + pixels.shape[1]]
-        window[:] = over(pixels, window)
-    pixels, left, top = cropped(canvas)
+        window[:] = composite(pixels, window)
+    pixels, left, top = crop(canvas)
     return Raster(
         left / RASTER_SCALE,
         top / RASTER_SCALE,
@@ -201,7 +202,7 @@ def _floor(stage: Stage) -> list[Polyline]:
     ends = [*(((x, y0), (x, y1)) for x in xs), *(((x0, y), (x1, y)) for y in ys)]
     marks: list[Polyline] = []
     for a, b in ends:
-        line = stage.camera.flat(np.array([(*a, stage.floor), (*b, stage.floor)]))
+        line = stage.camera.to_pixels(np.array([(*a, stage.floor), (*b, stage.floor)]))
         shown = _clipped(line, stage.width, stage.height)
         if shown is not None:
             marks.append(Polyline(shown, stroke=Tone.HAIRLINE, width=0.7, sharp=True))
@@ -223,26 +224,26 @@ def _clipped(line: _Array, width: float, height: float) -> _Array | None:
     return np.stack([start + enter * step, start + leave * step]) if enter < leave else None
 
 
-def _path_marks(stage: Stage, body: Rendering, path: _Array, now: int) -> list[Polyline | Disc]:
+def _path_marks(stage: Stage, body: Rendering, path: _Array, current: int) -> list[Polyline | Disc]:
     """The future path as a dotted line; the past path fades with age and is dim behind bodies."""
     x, y, nearness = stage.camera.project(path)
     points = np.column_stack([x, y])
     hidden = body.nearness_at(x, y) > nearness * 1.01
     marks: list[Polyline | Disc] = []
-    if now < len(path) - 1:
+    if current < len(path) - 1:
         marks.append(
-            Polyline(_thinned(points[now:]), stroke=Tone.MUTED, width=1.0, dash=(1.5, 3.0), opacity=0.8)
+            Polyline(_thinned(points[current:]), stroke=Tone.MUTED, width=1.0, dash=(1.5, 3.0), opacity=0.8)
         )
-    pieces = 14
-    bounds = np.unique(np.linspace(0, now, pieces + 1).astype(int))
+    segment_count = 14
+    bounds = np.unique(np.linspace(0, current, segment_count + 1).astype(int))
     for first, last in pairwise(bounds.tolist()):
-        age = 1.0 - last / max(now, 1)
+        age = 1.0 - last / max(current, 1)
         for a, b, behind in _runs(hidden, first, last):
             opacity = (0.18 if behind else 1.0) * (1.0 - 0.62 * age)
             marks.append(
                 Polyline(_thinned(points[a : b + 1]), stroke=Tone.TRACE_0, width=2.0, opacity=opacity)
             )
-    (x0, y0), (x1, y1) = points[0].tolist(), points[now].tolist()
+    (x0, y0), (x1, y1) = points[0].tolist(), points[current].tolist()
     marks.append(Disc(x0, y0, 3.0, fill=Tone.SURFACE, stroke=Tone.TRACE_0, stroke_width=1.5))
     marks.append(Disc(x1, y1, 3.6, fill=Tone.TRACE_0, stroke=Tone.SURFACE, stroke_width=1.0))
     return marks
@@ -269,18 +270,18 @@ def _thinned(points: _Array, tolerance: float = 0.6) -> _Array:
     return points[np.unique(np.concatenate([[0], indices, [len(points) - 1]]))]
 
 
-def _pedestal(robot: Robot, foot: float, floor: float) -> tuple[TriangleMesh, ...]:
+def _pedestal(robot: Robot, base_height: float, floor: float) -> tuple[TriangleMesh, ...]:
     """A column from the robot's base down to the floor, if there is a gap and the base is upright."""
-    gap = foot - floor
+    gap = base_height - floor
     if gap < 0.01 * reach(robot) or robot.base.rotation[2][2] < 0.7:
         return ()
     r = 0.06 * reach(robot)
     x, y, _ = robot.base.translation
     column = _cone(1.15 * r, 1.05 * r, gap)
     plate = _cone(1.9 * r, 1.8 * r, 0.15 * r)
-    stand = np.eye(4)
-    stand[:3, 3] = (x, y, floor)
-    return tuple(triangles(shape).moved(stand) for shape in (column, plate))
+    placement = np.eye(4)
+    placement[:3, 3] = (x, y, floor)
+    return tuple(triangles(shape).moved(placement) for shape in (column, plate))
 
 
 def _cone(lower: float, upper: float, length: float) -> Housing:

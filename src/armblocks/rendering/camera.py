@@ -46,14 +46,14 @@ class Camera:
         lens.
         """
         a, e = math.radians(azimuth), math.radians(elevation)
-        back = np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])
+        toward_viewer = np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])
         right = np.array([-math.sin(a), math.cos(a), 0.0])
-        axes = np.stack([right, np.cross(back, right), back])
+        axes = np.stack([right, np.cross(toward_viewer, right), toward_viewer])
         low, high = points.min(axis=0), points.max(axis=0)
         extent = max(float(np.linalg.norm(high - low)), 1e-9)
-        eye = (low + high) / 2 + distance * extent * back
-        plain = cls(axes=axes, eye=eye, scale=1.0, shift=(0.0, 0.0))
-        x, y, _ = plain.project(points)
+        eye = (low + high) / 2 + distance * extent * toward_viewer
+        unit_camera = cls(axes=axes, eye=eye, scale=1.0, shift=(0.0, 0.0))
+        x, y, _ = unit_camera.project(points)
         scale = min(
             (width - 2 * margin) / max(float(np.ptp(x)), 1e-9),
             (height - 2 * margin) / max(float(np.ptp(y)), 1e-9),
@@ -65,7 +65,7 @@ class Camera:
         return cls(axes=axes, eye=eye, scale=scale, shift=shift)
 
     def project(self, points: _Array) -> tuple[_Array, _Array, _Array]:
-        """Positions to the right and downwards (px), and 1/depth (1/m, large is near), of points (..., 3)."""
+        """Positions to the right and downwards (px), and 1/depth (1/m, larger is nearer) of points."""
         local = (points - self.eye) @ self.axes.T
         nearness = -1.0 / local[..., 2]
         return (
@@ -74,7 +74,7 @@ class Camera:
             nearness,
         )
 
-    def flat(self, points: _Array) -> _Array:
+    def to_pixels(self, points: _Array) -> _Array:
         """Position in px (..., 2) of points (..., 3)."""
         x, y, _ = self.project(points)
         return np.stack([x, y], axis=-1)

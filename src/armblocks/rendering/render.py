@@ -153,23 +153,23 @@ def shadow(
     columns, rows = round(width * scale), round(height * scale)
     right, up = camera.axes[0], np.array([0.0, 0.0, 1.0])
     away = np.cross(up, right)  # horizontal, away from the viewer
-    fall = -up + 0.30 * right + 0.26 * away
+    light_direction = -up + 0.30 * right + 0.26 * away
     corners = np.concatenate([mesh.corners for mesh in meshes])
-    drop = np.maximum(corners[..., 2:] - floor, 0.0)
-    x, y, _ = camera.project(corners + drop * fall)
+    heights = np.maximum(corners[..., 2:] - floor, 0.0)
+    x, y, _ = camera.project(corners + heights * light_direction)
     mask = np.zeros(rows * columns)
     x, y = x * scale, y * scale
     _, column, row = _fragments(x, y, columns, rows)
     mask[row * columns + column] = 1.0
-    soft = mask.reshape(rows, columns)
+    blurred = mask.reshape(rows, columns)
     for _ in range(3):  # three box filters approximate a Gaussian filter (central limit theorem)
-        soft = _box_filter(_box_filter(soft, blur).T, blur).T
+        blurred = _box_filter(_box_filter(blurred, blur).T, blur).T
     pixels = np.zeros((rows, columns, 4), dtype=np.uint8)
-    pixels[..., 3] = np.rint(soft * 72)
+    pixels[..., 3] = np.rint(blurred * 72)
     return pixels
 
 
-def over(front: NDArray[np.uint8], back: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def composite(front: NDArray[np.uint8], back: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """``front`` composited over ``back``, both with straight alpha (Porter and Duff 1984)."""
     result = back.copy()
     result[back[..., 3] == 0] = 0
@@ -181,14 +181,14 @@ def over(front: NDArray[np.uint8], back: NDArray[np.uint8]) -> NDArray[np.uint8]
     return result
 
 
-def faded(pixels: NDArray[np.uint8], strength: float) -> NDArray[np.uint8]:
+def with_opacity(pixels: NDArray[np.uint8], strength: float) -> NDArray[np.uint8]:
     """The same pixels with their opacity multiplied by ``strength``, 0..1."""
     result = pixels.copy()
     result[..., 3] = np.rint(pixels[..., 3] * strength).astype(np.uint8)
     return result
 
 
-def cropped(pixels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], int, int]:
+def crop(pixels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], int, int]:
     """The part of the pixels that is not transparent, with its first column and row."""
     rows, columns = np.any(pixels[..., 3], axis=1), np.any(pixels[..., 3], axis=0)
     if not rows.any():
@@ -250,7 +250,7 @@ def _shade(normal: _Array, material: _Index) -> _Array:
     light = _GROUND + (_SKY - _GROUND) * (0.5 + 0.5 * normal[1])
     light += _KEY_STRENGTH * np.maximum(key @ normal, 0.0)
     light += _FILL_STRENGTH * np.maximum(fill @ normal, 0.0)
-    # Dark bodies have a light rim, so that graphite is visible on a dark ground.
+    # Dark bodies have a light rim, so that graphite is visible on a dark background.
     white = 0.10 * (1.0 - np.clip(normal[2], 0.0, 1.0)) ** 3
     white += _GLOSS[material] * np.exp(_SHARPNESS[material] * np.log(np.maximum(halfway @ normal, 1e-6)))
     return np.clip(_BASE[:, material] * light + white, 0.0, 1.0)
@@ -290,7 +290,7 @@ _SHARPNESS = np.array([_FINISH[m][2] for m in _MATERIALS])
 _BASE = np.stack([_to_linear(rgb(_FINISH[m][0])) for m in _MATERIALS], axis=1)
 
 _SRGB_STEPS = 4095
-"""Linear light in twelve bits: finer than eight bits of sRGB everywhere."""
+"""Number of steps of linear light, 12 bits: finer than 8 bits of sRGB everywhere."""
 
 
 def _srgb_table() -> NDArray[np.uint8]:

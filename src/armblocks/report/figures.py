@@ -18,19 +18,19 @@ from armblocks.pictures.numbers import axis_number, si_prefix
 from armblocks.pictures.picture import Picture, Text
 from armblocks.pictures.style import FIGURE_WIDTH, SMALL_SIZE, Tone
 from armblocks.pictures.svg import svg_marks
-from armblocks.rendering.arm_drawing import moments_picture
+from armblocks.rendering.arm_drawing import pose_sequence_picture
 from armblocks.report.charts.path_chart import path_chart, side_by_side
 from armblocks.report.charts.spectrum_chart import spectrum_chart
-from armblocks.report.charts.time_chart import Panel, Trace, fits_beside, time_chart
+from armblocks.report.charts.time_chart import Panel, Trace, label_fits, time_chart
 from armblocks.report.motion import Motion
 from armblocks.simulation.result import SimulationResult
 
 _Array = NDArray[np.float64]
 
 _DEGREES = 180 / math.pi
-_SPELLED = {"m/s2": "m/s²", "rad/s2": "rad/s²", "deg/s2": "deg/s²", "kg m2": "kg m²"}
-_FIRST_ENTRIES = 12
-"""Largest number of matrix entries that one chart shows; more lines cannot be distinguished."""
+_UNIT_SPELLING = {"m/s2": "m/s²", "rad/s2": "rad/s²", "deg/s2": "deg/s²", "kg m2": "kg m²"}
+_MAX_ENTRIES = 12
+"""Maximum number of matrix entries that one chart shows; more lines cannot be distinguished."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -56,8 +56,8 @@ def motion_figures(motion: Motion, prefix: str) -> Iterator[Figure]:
     yield Figure(
         name=f"{prefix}moments",
         section="motion",
-        caption=f"{robot.name} at six moments of the run, with the path of its tool.",
-        picture=moments_picture(robot, motion.time, motion.poses),
+        caption=f"{robot.name} at six times of the run, with the path of its tool.",
+        picture=pose_sequence_picture(robot, motion.time, motion.poses),
     )
     yield Figure(
         name=f"{prefix}tool-path",
@@ -68,7 +68,7 @@ def motion_figures(motion: Motion, prefix: str) -> Iterator[Figure]:
     yield Figure(
         name=f"{prefix}joints",
         section="motion",
-        caption="Joints over time. Dashed: the limits that a joint comes near to.",
+        caption="Joints over time. Dashed lines: limits that a joint approaches or exceeds.",
         picture=_joints(motion),
     )
 
@@ -107,17 +107,17 @@ def file_name(name: str) -> str:
     return name[:48] or "unnamed"
 
 
-def in_shown_unit(values: _Array, unit: str) -> tuple[_Array, str]:
+def in_display_unit(values: _Array, unit: str) -> tuple[_Array, str]:
     """Values and unit for display: degrees for radians, SI prefixes for very large or small values."""
     if unit.startswith("rad"):
         unit = "deg" + unit.removeprefix("rad")
-        return values * _DEGREES, _SPELLED.get(unit, unit)
+        return values * _DEGREES, _UNIT_SPELLING.get(unit, unit)
     finite = np.abs(values[np.isfinite(values)])
     factor, prefix = si_prefix(float(finite.max(initial=0.0)))
     # A prefix on a number without unit or on a unit with powers would mislead; usual numbers need no prefix.
     if not unit or unit.startswith("kg") or unit == "s" or 1e-3 < factor < 1e3:
-        return values, _SPELLED.get(unit, unit)
-    return values * factor, prefix + _SPELLED.get(unit, unit)
+        return values, _UNIT_SPELLING.get(unit, unit)
+    return values * factor, prefix + _UNIT_SPELLING.get(unit, unit)
 
 
 def _projections(motion: Motion) -> Picture:
@@ -175,8 +175,8 @@ def _joint_panel(
     motion: Motion, quantity: str, joint_unit: str, unit: str, values: _Array, limit: str
 ) -> Panel:
     robot = motion.robot
-    joints = [j for j, own in enumerate(robot.joint_units) if own == joint_unit]
-    shown, shown_unit = in_shown_unit(values[:, joints], unit)
+    joints = [j for j, entry_unit in enumerate(robot.joint_units) if entry_unit == joint_unit]
+    shown, shown_unit = in_display_unit(values[:, joints], unit)
     factor = _factor(unit, shown_unit, values[:, joints])
     traces: list[Trace] = []
     for column, j in enumerate(joints):
@@ -194,10 +194,10 @@ def _joint_panel(
 
 
 def _factor(unit: str, shown_unit: str, values: _Array) -> float:
-    """The factor that :func:`in_shown_unit` applied."""
+    """The factor that :func:`in_display_unit` applied."""
     if unit.startswith("rad"):
         return _DEGREES
-    if shown_unit == _SPELLED.get(unit, unit):
+    if shown_unit == _UNIT_SPELLING.get(unit, unit):
         return 1.0
     return si_prefix(float(np.abs(values[np.isfinite(values)]).max(initial=0.0)))[0]
 
@@ -214,23 +214,23 @@ def _scope(diagram: Diagram, block: str, view: View, result: SimulationResult, w
             path = result.resolve(f"{block}/{view.signals[number]}")
             slot = result.signals_layout[path]
             unit = slot.unit
-            entries = list(np.ndindex(*slot.shape))[:_FIRST_ENTRIES]
+            entries = list(np.ndindex(*slot.shape))[:_MAX_ENTRIES]
             columns.append(result[path].reshape(len(result.time), -1)[:, : len(entries)])
-            joined = () if label else _mux_labels(diagram, path, result)[: len(entries)]
+            mux_labels = () if label else _mux_labels(diagram, path, result)[: len(entries)]
             label = label or slot.title
-            joined = () if label else joined
-            name = label or (", ".join(joined) if 0 < len(joined) <= 3 else path)
+            mux_labels = () if label else mux_labels
+            name = label or (", ".join(mux_labels) if 0 < len(mux_labels) <= 3 else path)
             names.append(name)
-            if joined:
-                labels += joined
+            if mux_labels:
+                labels += mux_labels
                 continue
-            short = name if len(numbers) > 1 and fits_beside(name) else name.rpartition("/")[2]
+            short = name if len(numbers) > 1 and label_fits(name) else name.rpartition("/")[2]
             if slot.entries:
                 labels += slot.entries[: len(entries)]
                 continue
             labels += [f"{short}[{','.join(map(str, index))}]" if index else short for index in entries]
         # One prefix for all signals of a panel, so that they can be compared.
-        values, unit = in_shown_unit(np.hstack(columns), unit)
+        values, unit = in_display_unit(np.hstack(columns), unit)
         first = numbers[0] if len(labels) == 1 else 0
         traces = tuple(
             Trace(label=label, values=values[:, k], index=first + k) for k, label in enumerate(labels)
@@ -264,7 +264,7 @@ def _mux_labels(diagram: Diagram, path: str, result: SimulationResult) -> tuple[
 
 
 def _panel_groups(block: str, view: View, result: SimulationResult) -> list[list[int]]:
-    """Group the signals into panels: scalars of one unit share a panel, other signals have their own."""
+    """Group the signals into panels: scalars of one unit share a panel, other signals have one each."""
     panels: list[list[int]] = []
     by_unit: dict[str, list[int]] = {}
     for number, signal in enumerate(view.signals):
@@ -306,7 +306,7 @@ def _spectra(
         path = result.resolve(f"{block}/{signal}")
         slot = result.signals_layout[path]
         columns = result[path].reshape(len(result.time), -1)
-        for element, column in list(zip(slot.elements, columns.T))[:_FIRST_ENTRIES]:
+        for element, column in list(zip(slot.elements, columns.T))[:_MAX_ENTRIES]:
             spectrum = signal_spectrum(
                 result.time,
                 column,
@@ -317,7 +317,7 @@ def _spectra(
                 begin=settings.begin,
                 remove_mean=settings.remove_mean,
             )
-            lines.append((element, _SPELLED.get(slot.unit, slot.unit), spectrum))
+            lines.append((element, _UNIT_SPELLING.get(slot.unit, slot.unit), spectrum))
     return lines, settings
 
 
@@ -326,10 +326,10 @@ def _xy_graph(block: str, view: View, result: SimulationResult) -> Picture:
     flats = [result[path].reshape(len(result.time), -1)[:, 0] for path in paths]
     units = [result.units[path] for path in paths]
     if units[0] == units[1]:  # one prefix for both axes, so that a unit has the same length on both axes
-        both, x_unit = in_shown_unit(np.stack(flats), units[0])
-        (x, y), y_unit = both, x_unit
+        axis_values, x_unit = in_display_unit(np.stack(flats), units[0])
+        (x, y), y_unit = axis_values, x_unit
     else:
-        (x, x_unit), (y, y_unit) = (in_shown_unit(flat, unit) for flat, unit in zip(flats, units))
+        (x, x_unit), (y, y_unit) = (in_display_unit(flat, unit) for flat, unit in zip(flats, units))
     labels = [
         (view.labels[k] if k < len(view.labels) and view.labels[k] else path) + (f", {unit}" if unit else "")
         for k, (path, unit) in enumerate(zip(paths, (x_unit, y_unit)))

@@ -59,13 +59,13 @@ def write_linear_report(
     check_figure_formats(formats, where="write_linear_report")
     target = Path(folder)
     make_folder(target)
-    written: list[Path] = []
+    written_paths: list[Path] = []
     for name, draw in linear_figures(system, loop=loop, hertz=hertz).items():
         picture = draw()
         for kind in formats:
             path = target / f"{name}.{kind}"
             data = svg_file(picture).encode() if kind == "svg" else picture_png(picture)
             write_atomically(path, data)
-            written.append(path)
+            written_paths.append(path)
     system.save(target / "linear-system.json")
-    return (*written, target / "linear-system.json")
+    return (*written_paths, target / "linear-system.json")

@@ -80,16 +80,16 @@ def moving_arms(diagram: Diagram, result: SimulationResult) -> tuple[MovingArm, 
         if robot is not None and path is not None and result[path].shape[1:] == (robot.n,):
             groups.setdefault((robot, path), []).append(name)
     arms: list[MovingArm] = []
-    shown = {robot for (robot, _), names in groups.items() if any(_plots(diagram, n) for n in names)}
+    shown = {robot for (robot, _), names in groups.items() if any(_has_robot_view(diagram, n) for n in names)}
     for (robot, path), names in groups.items():
         # A controller computes torques for several q of one arm; the drawn arm is the simulated one.
-        if robot in shown and not any(_plots(diagram, n) for n in names):
+        if robot in shown and not any(_has_robot_view(diagram, n) for n in names):
             continue
         arms.append(_moving_arm(robot, path, _sources_first(diagram, names), result))
     return tuple(arms)
 
 
-def _plots(diagram: Diagram, name: str) -> bool:
+def _has_robot_view(diagram: Diagram, name: str) -> bool:
     return any(view.kind is ViewKind.ROBOT for view in diagram.blocks[name].views())
 
 

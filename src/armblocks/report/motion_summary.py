@@ -157,7 +157,7 @@ def summarise(
 
 SHOWN_AS_ZERO = 64.0 * float(np.finfo(np.float64).eps)
 """Values of a joint below this fraction of the largest joint's value are rounding errors."""
-_COMPARED = (
+_COMPARED_QUANTITIES = (
     ("position_min", "position_max"),
     ("position_margin",),
     ("speed_peak",),
@@ -182,7 +182,7 @@ def shown_summary(summary: MotionSummary) -> MotionSummary:
     for joint in summary.joints:
         same_unit = [other for other in summary.joints if other.unit == joint.unit]
         changes: dict[str, float] = {}
-        for names in _COMPARED:
+        for names in _COMPARED_QUANTITIES:
             sizes = [abs(getattr(other, name) or 0.0) for other in same_unit for name in names]
             if names == ("position_margin",):  # a difference of a position and a limit
                 sizes += [abs(end) for other in same_unit for end in other.position_limits or ()]
@@ -231,8 +231,8 @@ def _exceeded(
     first_time = float(time[first])
     if first > 0:
         before, after = float(excess[first - 1]), float(excess[first])
-        share = min(max(-before / (after - before), 0.0), 1.0)
-        first_time = float(time[first - 1]) + share * float(time[first] - time[first - 1])
+        fraction = min(max(-before / (after - before), 0.0), 1.0)
+        first_time = float(time[first - 1]) + fraction * float(time[first] - time[first - 1])
     limit = high if values[worst] > high else low
     convert, shown_unit = shown_unit_of(kind, unit)
     verb = {

@@ -19,11 +19,11 @@ from armblocks.report.page_tables import html_table, limits_table, loads_table, 
 from armblocks.robot import inertia_findings
 from armblocks.simulation.result import SimulationResult
 
-# Nothing may be loaded or run. Styles are in the page, pictures in data: addresses.
+# The page loads and runs nothing: styles are in the page, pictures are data: URLs.
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
 
-_OPEN_SHEETS = 6
-"""Up to this number of subsystems their drawings are open; with more, all are closed at first."""
+_MAX_OPEN_SHEETS = 6
+"""Maximum number of subsystems whose drawings are open at first; with more, all are closed."""
 
 _ICONS = {
     "error": '<path d="M7.9 2.5h4.2L17.5 7.9v4.2L12.1 17.5H7.9L2.5 12.1V7.9z" fill="none" '
@@ -61,10 +61,10 @@ def report_page(contents: ReportContents) -> str:
     name = escape(contents.diagram.name)
     sections: list[tuple[str, str, str]] = []
     motion_figures = [figure for figure in contents.figures if figure.section == "motion"]
-    share = len(motion_figures) // max(len(contents.motions), 1)
+    count = len(motion_figures) // max(len(contents.motions), 1)
     for number, (motion, summary) in enumerate(zip(contents.motions, contents.summaries)):
-        own = motion_figures[number * share : (number + 1) * share]
-        body = _motion(motion, summary, own)
+        arm_figures = motion_figures[number * count : (number + 1) * count]
+        body = _motion(motion, summary, arm_figures)
         sections.append((f"motion-{number + 1}", f"Motion of {escape(motion.robot.name)}", body))
     displays = _displays(contents)
     if displays:
@@ -109,7 +109,7 @@ def _facts(contents: ReportContents) -> str:
     facts: list[tuple[str, str, str]] = [
         ("Solver", escape(solver), ""),
         ("Steps", axis_number(run.steps), f"{axis_number(run.rejected)} rejected" if run.rejected else ""),
-        ("Instants recorded", axis_number(contents.result.time.size), ""),
+        ("Samples recorded", axis_number(contents.result.time.size), ""),
         ("Run in", *wall_time(run.wall_time)),
         ("Speed", axis_number(float(f"{run.real_time_factor:.3g}")), "× real time"),
     ]
@@ -174,8 +174,10 @@ def _figure(figure: Figure) -> str:
 
 def _figure_list(figures: Iterable[Figure]) -> str:
     listed = list(figures)
-    drawn = "".join(_figure(figure) for figure in listed)
-    return f'<div class="pair">{drawn}</div>' if all(figure.narrow for figure in listed) else drawn
+    figures_html = "".join(_figure(figure) for figure in listed)
+    return (
+        f'<div class="pair">{figures_html}</div>' if all(figure.narrow for figure in listed) else figures_html
+    )
 
 
 def _motion(motion: Motion, summary: MotionSummary, figures: Sequence[Figure]) -> str:
@@ -213,11 +215,11 @@ def _displays(contents: ReportContents) -> str:
 
 
 def _diagram(contents: ReportContents) -> str:
-    """The top level, then each subsystem in a part that can be opened and closed; open if there are few."""
-    state = " open" if len(contents.sheets) <= _OPEN_SHEETS else ""
+    """The drawing of the top level, then each subsystem in a collapsible part; open if there are few."""
+    state = " open" if len(contents.sheets) <= _MAX_OPEN_SHEETS else ""
     inner = "".join(
         f'<details class="sheet"{state}><summary>{escape(sheet.path)}</summary>'
-        + _drawing(sheet.picture, f"fig-sheet-{number}", _same(sheet))
+        + _drawing(sheet.picture, f"fig-sheet-{number}", _same_content_note(sheet))
         + "</details>"
         for number, sheet in enumerate(contents.sheets, start=1)
     )
@@ -234,8 +236,8 @@ def _drawing(picture: Picture, identifier: str, caption: str) -> str:
     return f'<figure class="wide"{wide}>{svg_inline(picture, identifier)}{caption_html}</figure>'
 
 
-def _same(sheet: Sheet) -> str:
-    return f"The same is inside {', '.join(sheet.same)}." if sheet.same else ""
+def _same_content_note(sheet: Sheet) -> str:
+    return f"The following subsystems have the same content: {', '.join(sheet.same)}." if sheet.same else ""
 
 
 def _run(contents: ReportContents) -> str:
@@ -262,11 +264,11 @@ def _run(contents: ReportContents) -> str:
             for name, value in sorted(result.parameters.items())
         ]
         text += "<h3>Parameters of the run</h3>" + html_table(
-            "As the run used them, SI units", [("Parameter", ""), ("Value", "")], values, words=True
+            "Values used in the run, in SI units", [("Parameter", ""), ("Value", "")], values, words=True
         )
     figures = [name for name in contents.files if name.startswith("figures/")]
     names = [name for name in contents.files if name not in figures]
     listed = ", ".join(f"<code>{escape(name)}</code>" for name in names)
     if figures:
         listed += f", and {len(figures)} figures in <code>figures/</code>"
-    return text + f'<h3>Files beside this page</h3><p class="files">{listed}</p>'
+    return text + f'<h3>Files in the same folder</h3><p class="files">{listed}</p>'

@@ -14,7 +14,7 @@ from armblocks.report.motion import Motion
 from armblocks.report.motion_summary import LimitFinding, LimitKind, MotionSummary, shown_unit_of
 
 MAX_NUMBERS = 64
-"""Longest array whose numbers are listed; of longer arrays only the range is given."""
+"""Maximum number of elements of an array that is listed; of larger arrays only the range is given."""
 
 
 def limits_table(summary: MotionSummary) -> str:
@@ -78,12 +78,21 @@ def loads_table(motion: Motion, summary: MotionSummary) -> str:
         )
         for index, joint in enumerate(summary.joints)
     ]
-    done = sum(joint.work_done or 0.0 for joint in summary.joints)
-    taken = sum(joint.work_taken or 0.0 for joint in summary.joints)
-    total = ["", "", "", "", "", _optional(summary.power_peak), table_number(done), table_number(taken)]
+    work_done = sum(joint.work_done or 0.0 for joint in summary.joints)
+    work_taken = sum(joint.work_taken or 0.0 for joint in summary.joints)
+    total = [
+        "",
+        "",
+        "",
+        "",
+        "",
+        _optional(summary.power_peak),
+        table_number(work_done),
+        table_number(work_taken),
+    ]
     rows.append(f'<tr><th scope="row">All</th>{"".join(_cell(text) for text in total)}</tr>')
     note = (
-        "Torques at the joint; the motor's are divided by the gear ratio, its speed multiplied by it. "
+        "Torques at the joint. Motor torques are divided by the gear ratio, motor speeds multiplied by it. "
         "Work done: positive work of the drives; taken: negative work, in braking."
     )
     return html_table(note, heads, rows)

@@ -60,17 +60,18 @@ def write_files(
 ) -> tuple[Path, ...]:
     """Write the files of the To File blocks of a diagram into ``folder``, each atomically.
 
-    Subfolders are created. Nothing is written outside the folder, also not through links. ``taken``: names in
-    the folder that must not be replaced. Returns the paths. Raises ``DiagramError`` if two blocks write the
-    same file, and ``FormatError`` if a file cannot be written or its path leaves the folder.
+    Subfolders are created. Nothing is written outside the folder, also not through symbolic links.
+    ``taken``: names in the folder that must not be replaced. Returns the paths. Raises ``DiagramError`` if
+    two blocks write the same file, and ``FormatError`` if a file cannot be written or its path leaves the
+    folder.
     """
     target = Path(folder)
-    written: list[Path] = []
+    written_paths: list[Path] = []
     for sink in sink_files(diagram, taken):
         path = target / sink.settings.file
         if not path.resolve().is_relative_to(target.resolve()):
             raise FormatError(
-                f"the file '{sink.settings.file}' of '{sink.block}' leads out of the folder by a link",
+                f"the file '{sink.settings.file}' of '{sink.block}' leads out of the folder through a link",
                 where=str(target),
                 allowed="files inside of the folder",
                 fix="remove the link or choose another folder",
@@ -89,5 +90,5 @@ def write_files(
         result.only({sink.variable: f"{sink.block}/{sink.signal}"}, rows).save(
             path, jumps=sink.settings.decimation == 1
         )
-        written.append(path)
-    return tuple(written)
+        written_paths.append(path)
+    return tuple(written_paths)

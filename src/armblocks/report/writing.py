@@ -72,13 +72,13 @@ def write_report(
     drawing = diagram_picture(diagram, result)
     diagram_path = target / "diagram.svg"
     data_paths = tuple(target / f"data.{kind}" for kind in data)
-    written: list[Path] = []
+    written_paths: list[Path] = []
     with _Writer() as writer:
         for figure in figures:
             for kind in formats:
                 path = target / "figures" / f"{figure.name}.{kind}"
                 writer.write(path, _encoding(figure, kind))
-                written.append(path)
+                written_paths.append(path)
         writer.write(diagram_path, svg_file(drawing).encode)
         for path in data_paths:
             result.save(path)
@@ -91,12 +91,14 @@ def write_report(
         figures=tuple(figures),
         drawing=drawing,
         sheets=_sheets(diagram, result),
-        files=tuple(path.relative_to(target).as_posix() for path in (diagram_path, *data_paths, *written)),
+        files=tuple(
+            path.relative_to(target).as_posix() for path in (diagram_path, *data_paths, *written_paths)
+        ),
     )
     page = target / "report.html"
     write_atomically(page, report_page(contents).encode())
     return ReportFiles(
-        folder=target, page=page, diagram=diagram_path, figures=tuple(written), data=data_paths
+        folder=target, page=page, diagram=diagram_path, figures=tuple(written_paths), data=data_paths
     )
 
 
@@ -189,6 +191,6 @@ def make_folder(folder: Path) -> None:
         raise FormatError(
             f"the report cannot be written ({error.strerror or error})",
             where=str(folder),
-            allowed="a folder that you may write to, on a disk with room",
+            allowed="a folder that you may write to, on a disk with free space",
             fix="give another folder or change its permissions",
         ) from error

@@ -11,6 +11,7 @@ from armblocks.robot.plausibility import (
     warn_of_implausible_values,
 )
 from armblocks.robot.robot import Robot
+from armblocks.robot.tips import deepest_tip, with_tip
 
 __all__ = [
     "JOINT_TYPES",
@@ -27,6 +28,7 @@ __all__ = [
     "Prismatic",
     "Revolute",
     "Robot",
+    "deepest_tip",
     "inertia_findings",
     "inertia_matrix",
     "link_from_dh",
@@ -36,4 +38,5 @@ __all__ = [
     "standard_dh",
     "warn_of_implausible_values",
     "warn_of_inertias",
+    "with_tip",
 ]

@@ -17,8 +17,10 @@ MAX_LINKS = 1000
 
 
 def check_robot(name: str, links: Sequence[Link], frames: Mapping[str, Transform], gravity: Vector3) -> None:
-    """Raise RobotError for the first inconsistency; warn (ArmblocksWarning) if friction accelerates a
-    joint."""
+    """Raise RobotError for the first inconsistency.
+
+    Warn (ArmblocksWarning) if friction accelerates a joint.
+    """
     robot = f"robot '{name}'"
     for k, link in enumerate(links):
         check_kind(link, Link, where=f"{robot}, link number {k + 1}")
@@ -31,7 +33,7 @@ def check_robot(name: str, links: Sequence[Link], frames: Mapping[str, Transform
         _check_finite(where, _link_numbers(link))
         if link.mass < 0:
             raise RobotError(
-                f"the mass is {link.mass:g} kg", where=where, allowed="zero or more", fix="check its sign"
+                f"the mass is {link.mass:g} kg", where=where, allowed="zero or more", fix="check the sign"
             )
         _check_joint(where, link.joint)
         if link.motor is not None:
@@ -51,11 +53,14 @@ def _check_tree(robot: str, links: Sequence[Link]) -> None:
     for link in links:
         if not link.name:
             raise RobotError(
-                "a link has no name", where=robot, allowed="a name that is not empty", fix="name it"
+                "a link has no name", where=robot, allowed="a name that is not empty", fix="name the link"
             )
         if link.name in parents:
             raise RobotError(
-                f"two links are named '{link.name}'", where=robot, allowed="unique names", fix="rename one"
+                f"two links are named '{link.name}'",
+                where=robot,
+                allowed="unique names",
+                fix="rename one of the links",
             )
         parents[link.name] = link.parent
     checked: set[str | None] = {None}
@@ -71,9 +76,9 @@ def _check_tree(robot: str, links: Sequence[Link]) -> None:
                     fix="name an existing link as parent, or None for the base",
                 )
             if name in path:
-                ring = [*path[path.index(name) :], name]
+                cycle = [*path[path.index(name) :], name]
                 raise RobotError(
-                    "links are each other's parents: " + " -> ".join(ring),
+                    "links are each other's parents: " + " -> ".join(cycle),
                     where=robot,
                     allowed="every chain of parents ends at the base",
                     fix="set the parent of one of them to None",
@@ -89,7 +94,7 @@ def _check_joint(where: str, joint: Joint) -> None:
             "the joint's axis is zero",
             where=where,
             allowed="a direction such as (0, 0, 1)",
-            fix="set the axis along which it moves",
+            fix="set the axis of the motion",
         )
     limits = joint.limits
     if limits.position is not None and limits.position[0] > limits.position[1]:
@@ -98,7 +103,7 @@ def _check_joint(where: str, joint: Joint) -> None:
             f"the position limits are reversed: from {low:g} to {high:g} {joint.unit}",
             where=where,
             allowed="the lower limit first",
-            fix="swap the two limits",
+            fix="exchange the two limits",
         )
     for kind, value in (("speed", limits.speed), ("torque", limits.torque)):
         if value is not None and value <= 0:
@@ -116,14 +121,14 @@ def _check_motor(where: str, motor: Motor) -> None:
             "the gear ratio is 0, so the motor cannot move the joint",
             where=where,
             allowed="any other number",
-            fix="use 1 for a direct drive, or no motor at all",
+            fix="use 1 for a direct drive, or omit the motor",
         )
     if motor.inertia < 0:
         raise RobotError(
             f"the motor inertia is {motor.inertia:g} kg m2",
             where=where,
             allowed="zero or more",
-            fix="check its sign",
+            fix="check the sign",
         )
     plus, minus = motor.coulomb_friction
     if motor.viscous_friction < 0 or plus < 0 or minus > 0:
@@ -139,9 +144,9 @@ def _check_motor(where: str, motor: Motor) -> None:
 def _check_dh(where: str, link: Link) -> None:
     if link.dh is None:
         return
-    text = (link.before, link.after, link.joint.letter, link.joint.axis, link.joint.offset)
+    stored = (link.before, link.after, link.joint.letter, link.joint.axis, link.joint.offset)
     row = link.dh.joint()
-    if text != (link.dh.before, link.dh.after, row.letter, row.axis, row.offset):
+    if stored != (link.dh.before, link.dh.after, row.letter, row.axis, row.offset):
         raise RobotError(
             "the D-H row disagrees with the link's transforms or joint",
             where=where,

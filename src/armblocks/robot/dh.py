@@ -117,7 +117,6 @@ def modified_dh(
 
 
 def serial_chain(links: Sequence[Link]) -> tuple[Link, ...]:
-    """The links as a chain: the parent of each link is the one before it, that of the first link is the
-    base."""
+    """The links as a chain: the parent of each link is the previous link, or the base for the first link."""
     parents = (None, *(link.name for link in links))
     return tuple(replace(link, parent=parent) for link, parent in zip(links, parents))

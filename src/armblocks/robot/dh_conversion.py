@@ -4,9 +4,9 @@ Both conventions describe the same product of rotations and translations,
 
     Rz(theta1) Tz(d1) · Tx(a1) Rx(alpha1) · Rz(theta2) Tz(d2) · Tx(a2) Rx(alpha2) …
 
-and split it at different places: a standard row has the transforms after its joint, a modified row those
-before it. The conversion therefore shifts alpha and a by one row; the remainder is added to the tool or the
-base. The link frames change, and centres of mass, inertias and shapes are transformed to the new frames.
+and divide it at different places: a standard row contains the transforms after its joint, a modified row
+those before it. The conversion therefore shifts alpha and a by one row; the remainder is added to the tool or
+the base. The link frames change, and centres of mass, inertias and shapes are transformed to the new frames.
 
 Sources: Corke, *Robotics, Vision and Control*, 2nd ed., 7.1.2; Craig, *Introduction to Robotics*, 3.4.
 """
@@ -40,16 +40,16 @@ def converted(robot: Robot, convention: DhConvention) -> Robot:
     if convention is DhConvention.MODIFIED:
         numbers = [(0.0, 0.0), *((row.alpha, row.a) for row in rows[:-1])]
         new_from_old = shifts  # pose of a link's old frame in its new frame, which precedes the shift
-        ends = {"tool": shifts[-1] @ robot.tool}
+        frames = {"tool": shifts[-1] @ robot.tool}
     else:
         numbers = [*((row.alpha, row.a) for row in rows[1:]), (0.0, 0.0)]
         new_from_old = [*(shift.inverse() for shift in shifts[1:]), Transform()]
-        ends = {"base": robot.base @ shifts[0]}
+        frames = {"base": robot.base @ shifts[0]}
     links = [
         _with_row(link, replace(row, alpha=alpha, a=a, convention=convention), shift)
         for link, row, (alpha, a), shift in zip(robot.links, rows, numbers, new_from_old)
     ]
-    return replace(robot, links=tuple(links), **ends)
+    return replace(robot, links=tuple(links), **frames)
 
 
 def reread(robot: Robot, convention: DhConvention) -> Robot:
@@ -75,17 +75,19 @@ def _rows(robot: Robot) -> Sequence[DhRow]:
         )
     if len({row.convention for row in rows}) > 1:
         raise RobotError(
-            "its rows are of both conventions",
+            "the robot has rows of both conventions",
             where=where,
-            allowed="rows of one convention throughout",
-            fix="write all rows in one of them",
+            allowed="rows of one convention only",
+            fix="write all rows in one convention",
         )
     return rows
 
 
 def _with_row(link: Link, row: DhRow, T_new_old: Transform) -> Link:
-    """The link with another row. Its body is transformed to the new frame, in which the old frame has the
-    given pose."""
+    """The link with another row, and its body transformed to the new frame.
+
+    ``T_new_old`` is the pose of the old frame in the new frame.
+    """
     R = T_new_old.R
     inertia = R @ link.I @ R.T
     geometry = link.geometry

@@ -13,7 +13,7 @@ from armblocks.spatial import Transform, transl, trotx, trotz
 
 
 class DhConvention(Enum):
-    """The position of the joint in the row."""
+    """Convention of a D-H row: the order of the joint motion and the constant transforms."""
 
     STANDARD = "standard"
     """``T = Rz(theta) Tz(d) Tx(a) Rx(alpha)``: the link frame is at the distal end of the link."""

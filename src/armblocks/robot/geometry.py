@@ -29,8 +29,8 @@ _Array = NDArray[np.float64]
 
 _BASE_RADIUS = 0.06  # radius of the first joint's drum, relative to the reach
 _TAPER = 0.82  # radius of each joint's drum, relative to the drum before
-_SMALLEST = 0.45  # minimum radius, relative to the first drum, so that wrists are visible
-_NEGLIGIBLE = 0.02  # shorter pieces, relative to a drum's radius, are not drawn
+_MIN_RADIUS = 0.45  # minimum radius, relative to the first drum, so that wrists are visible
+_NEGLIGIBLE = 0.02  # shorter parts, relative to a drum's radius, are not drawn
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -78,30 +78,30 @@ def reach(robot: Robot) -> float:
     """An upper bound of the distance from base to tip with prismatic joints at 0, m; at least 0.1."""
     length: dict[str, float] = {}
     for link in _parents_first(robot):
-        own = math.hypot(*link.before.translation) + math.hypot(*link.after.translation)
+        link_length = math.hypot(*link.before.translation) + math.hypot(*link.after.translation)
         if link.joint.linear and link.joint.limits.position:
-            own += max(abs(value + link.joint.offset) for value in link.joint.limits.position)
-        length[link.name] = own + (length[link.parent] if link.parent is not None else 0.0)
+            link_length += max(abs(value + link.joint.offset) for value in link.joint.limits.position)
+        length[link.name] = link_length + (length[link.parent] if link.parent is not None else 0.0)
     return max(0.1, *length.values()) + math.hypot(*robot.tool.translation)
 
 
 def _parents_first(robot: Robot) -> tuple[Link, ...]:
     """The links sorted so that each follows its parent; a description may list them in any order."""
-    known: set[str | None] = {None}
+    placed: set[str | None] = {None}
     ordered: list[Link] = []
     remaining = list(robot.links)
     while remaining:  # Robot has checked that there is no cycle, so every iteration places a link
-        ready = [link for link in remaining if link.parent in known]
+        ready = [link for link in remaining if link.parent in placed]
         ordered += ready
-        known.update(link.name for link in ready)
-        remaining = [link for link in remaining if link.name not in known]
+        placed.update(link.name for link in ready)
+        remaining = [link for link in remaining if link.name not in placed]
     return tuple(ordered)
 
 
 def link_frames(robot: Robot, q: Sequence[float]) -> NDArray[np.float64]:
     """Poses of base, every link and tool in the world at joint coordinates ``q``, (L+2, 4, 4), rad and m.
 
-    The rows of ``dynamics.trace_link_poses``, computed link by link for drawings without a compiled signal.
+    They are the rows of ``dynamics.trace_link_poses``, computed without compilation, for drawings.
     ``q`` is not checked.
     """
     frames: dict[str | None, Transform] = {None: robot.base}
@@ -115,8 +115,7 @@ def link_frames(robot: Robot, q: Sequence[float]) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """Sizes that several links share: the drum radius of every joint by link name, and the children of each
-    link."""
+    """Sizes that several links share: the drum radius of every joint, and the children of each link."""
 
     radius: dict[str, float]
     children: dict[str | None, list[Link]]
@@ -134,12 +133,11 @@ class _Plan:
             children.setdefault(link.parent, []).append(link)
             depth[link.name] = depth[link.parent] + (1 if link.joint.moves else 0)
             joints_before = depth[link.parent] if link.joint.moves else max(depth[link.parent] - 1, 0)
-            radius[link.name] = first * max(_TAPER**joints_before, _SMALLEST)
+            radius[link.name] = first * max(_TAPER**joints_before, _MIN_RADIUS)
         return cls(radius, children, {link.name: link for link in robot.links}, size)
 
-    def stands_up(self, link: Link) -> bool:
-        """Whether the link is a column on the base: a vertical joint whose body begins with a long upward
-        part."""
+    def is_column(self, link: Link) -> bool:
+        """Whether the link is a column on the base: a vertical joint and a body that begins upwards."""
         upright = link.before.R @ np.array(link.joint.axis)
         if link.parent is not None or not link.joint.angular or upright[2] < 0.99:
             return False
@@ -160,9 +158,9 @@ class _Plan:
         if parent is None or not (parent.joint.angular and link.joint.angular):
             return False
         T = parent.after.inverse()
-        gap = np.array(link.before.translation) - T.p
-        across = (T.R @ np.array(parent.joint.axis)) @ (link.before.R @ np.array(link.joint.axis))
-        return float(np.linalg.norm(gap)) < 0.5 * self.radius[link.name] and abs(float(across)) < 0.5
+        distance = np.array(link.before.translation) - T.p
+        normal = (T.R @ np.array(parent.joint.axis)) @ (link.before.R @ np.array(link.joint.axis))
+        return float(np.linalg.norm(distance)) < 0.5 * self.radius[link.name] and abs(float(normal)) < 0.5
 
 
 def _unit(vector: _Array) -> _Array:
@@ -185,14 +183,14 @@ def _aligned(origin: _Array, z: _Array, x_hint: _Array | None = None) -> Pose:
 
 def _body_path(start: _Array, start_axis: _Array, end: _Array, end_axis: _Array) -> list[_Array]:
     """Corner points from joint to joint: along the first axis, the common normal, the second axis."""
-    across = np.cross(start_axis, end_axis)
+    normal = np.cross(start_axis, end_axis)
     between = end - start
-    square = float(across @ across)
+    square = float(normal @ normal)
     if square < 1e-9:  # parallel axes: the common normal is not unique; follow the first axis first
         foot = start + (between @ start_axis) * start_axis
         return [start, foot, end, end]
-    s = float(np.cross(between, end_axis) @ across) / square
-    t = float(np.cross(between, start_axis) @ across) / square
+    s = float(np.cross(between, end_axis) @ normal) / square
+    t = float(np.cross(between, start_axis) @ normal) / square
     return [start, start + s * start_axis, end + t * end_axis, end]
 
 
@@ -202,7 +200,7 @@ def _link_shapes(robot: Robot, link: Link, plan: _Plan) -> list[Shape]:
     start, axis = T[:3, 3], T[:3, :3] @ np.array(link.joint.axis)
     r = plan.radius[link.name]
     shapes: list[Shape] = []
-    if plan.stands_up(link):
+    if plan.is_column(link):
         # The column rises from the base plate: the drum is a ring in the column, above the floor.
         shapes += _drum(start + 1.35 * r * axis, axis, r, length=1.5 * r)
     elif link.joint.angular:
@@ -325,7 +323,7 @@ def _base_shapes(robot: Robot, plan: _Plan) -> list[Shape]:
             shapes += _casting(np.zeros(3), np.array([0.0, 0.0, 1.0]), 1.1 * r, foot, axis, r)
         upright = np.array([0.0, 0.0, 1.0])
         # A column is above the base frame; a joint at the origin of the frame needs a foot below it.
-        bottom = 0.0 if plan.stands_up(link) else -1.16 * r
+        bottom = 0.0 if plan.is_column(link) else -1.16 * r
         shapes += [
             Housing(
                 start=(1.45 * r, 1.45 * r),
@@ -350,7 +348,7 @@ def _rail(link: Link, plan: _Plan) -> Shape:
     """The rail of a prismatic joint over its whole range, in the frame of the body that carries the joint."""
     r = plan.radius[link.name]
     low, high = link.joint.limits.position or (0.0, 0.3 * plan.reach)
-    # The rail begins at the joint, whatever the range, so that it is connected to the body.
+    # The rail includes the joint itself for every range, so that the rail is connected to the body.
     low, high = min(low + link.joint.offset, 0.0) - 1.2 * r, high + link.joint.offset + 1.2 * r
     axis = link.before.R @ np.array(link.joint.axis)
     centre = np.array(link.before.translation) + axis * (low + high) / 2

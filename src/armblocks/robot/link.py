@@ -23,8 +23,8 @@ class Motor:
     """A motor and its gear, all numbers at the motor's side of the gear.
 
     ``inertia`` Jm of the rotor, kg m2; ``gear_ratio`` G, motor turns per joint turn (motor rad per m of a
-    prismatic joint), negative where the motor turns the other way; ``viscous_friction`` B, N m s/rad;
-    ``coulomb_friction`` (Tc+, Tc-), N m, Tc- negative. A single number t means (t, -t).
+    prismatic joint), negative if motor and joint turn in opposite directions; ``viscous_friction`` B, N m
+    s/rad; ``coulomb_friction`` (Tc+, Tc-), N m, Tc- negative. A single number t means (t, -t).
     """
 
     inertia: float = 0.0
@@ -58,12 +58,12 @@ class Motor:
 
 @dataclass(frozen=True, kw_only=True)
 class Link:
-    """A rigid body, and the joint that connects it to ``parent`` (a link's name; ``None`` is the robot's
-    base).
+    """A rigid body, and the joint that connects it to ``parent``.
 
-    Pose in the parent's frame: ``T_parent_link = before joint.motion(q + offset) after``. ``dh`` is the
-    Denavit-Hartenberg row from which ``before``, ``joint`` and ``after`` were computed, if there is one, and
-    must agree with them (:func:`armblocks.robot.dh.standard_dh` builds all four).
+    ``parent`` is the name of a link; ``None`` is the robot's base. Pose in the parent's frame:
+    ``T_parent_link = before joint.motion(q + offset) after``. ``dh`` is the Denavit-Hartenberg row from which
+    ``before``, ``joint`` and ``after`` were computed, if there is one, and must agree with them
+    (:func:`armblocks.robot.dh.standard_dh` builds all four).
 
     ``mass`` kg; ``centre_of_mass`` m in the link's frame; ``inertia`` kg m2 about the centre of mass in the
     link's axes: a (3, 3) array, or Ixx Iyy Izz, or Ixx Iyy Izz Ixy Iyz Ixz. These are the matrix entries, so
@@ -134,7 +134,7 @@ def inertia_matrix(value: ArrayLike, *, link: str = "") -> Matrix3:
                 "the matrix is not symmetric",
                 where=where,
                 allowed="Ixy = Iyx, Iyz = Izy, Ixz = Izx",
-                fix="make both halves the same",
+                fix="make the matrix symmetric",
             )
         return matrix3((entries + entries.T) / 2, where=where)
     flat = [float(entry) + 0.0 for entry in entries.ravel()]

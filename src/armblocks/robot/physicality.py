@@ -17,8 +17,7 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class InertiaFinding:
-    """One reason why a link's inertia is impossible for a body; ``moments`` are its principal moments, kg
-    m2."""
+    """A reason why no rigid body has the inertia of a link; ``moments``: principal moments, kg m2."""
 
     robot: str
     link: str
@@ -34,7 +33,7 @@ class InertiaFinding:
 
 
 def inertia_findings(robot: Robot) -> tuple[InertiaFinding, ...]:
-    """Every link whose inertia about its centre of mass is impossible, with the reason.
+    """A finding for every link whose inertia about the centre of mass is impossible.
 
     A body's principal moments are not negative, none exceeds the sum of the other two, and a body without
     mass has none. Source: Wensing, Kim, Slotine, *Linear matrix inequalities for physically-consistent
@@ -43,14 +42,14 @@ def inertia_findings(robot: Robot) -> tuple[InertiaFinding, ...]:
     findings: list[InertiaFinding] = []
     for link in robot.links:
         low, middle, high = (float(moment) + 0.0 for moment in np.linalg.eigvalsh(link.I))
-        slack = TOLERANCE * max(abs(low), abs(high))
+        tolerance = TOLERANCE * max(abs(low), abs(high))
         reason = ""
-        if low < -slack:
+        if low < -tolerance:
             reason = "a principal moment of inertia is negative"
-        elif link.mass == 0 and high > slack:
-            reason = "it has inertia but no mass"
-        elif high > low + middle + slack:
-            reason = "its greatest principal moment of inertia exceeds the sum of the other two"
+        elif link.mass == 0 and high > tolerance:
+            reason = "the link has inertia but no mass"
+        elif high > low + middle + tolerance:
+            reason = "the greatest principal moment of inertia exceeds the sum of the other two"
         if reason:
             findings.append(
                 InertiaFinding(robot=robot.name, link=link.name, moments=(low, middle, high), reason=reason)

@@ -14,21 +14,22 @@ from armblocks.errors import ArmblocksWarning
 from armblocks.robot.link import Link
 from armblocks.robot.robot import Robot
 
-WHOLE_TURN = 2 * math.pi * (1 + 1e-6)
-"""A whole turn, rad, with a tolerance for limits that are written with six digits."""
-LARGEST_ANGLE = 4 * math.pi
+FULL_TURN = 2 * math.pi * (1 + 1e-6)
+"""A full turn, rad, with a tolerance for limits that are written with six digits."""
+MAX_MOTION_ANGLE = 4 * math.pi
 """Start or end angles of a motion above this value (rad) are probably in degrees."""
-LONGEST_REACH = 20.0
+MAX_REACH = 20.0
 """Maximum plausible reach, m; the largest industrial arms reach 5 m."""
-LARGEST_GYRATION = 3.0
-"""Maximum plausible radius of gyration of a link relative to the robot's reach; it is below the link's
-size."""
+MAX_GYRATION_RATIO = 3.0
+"""Maximum plausible ratio of a link's radius of gyration, which is below its size, to the robot's reach."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlausibilityFinding:
-    """A plausibility warning: ``what`` was found at a ``link`` (``""`` for the whole robot), and a question
-    about its cause."""
+    """A plausibility warning at a ``link`` (``""``: the whole robot).
+
+    ``what`` describes the value, and ``question`` suggests a cause.
+    """
 
     robot: str
     link: str = ""
@@ -43,21 +44,20 @@ class PlausibilityFinding:
 def plausibility_findings(robot: Robot) -> tuple[PlausibilityFinding, ...]:
     """Values that probably have a wrong unit or sign; they are warnings, not errors.
 
-    Findings are: limits of revolute joints beyond a whole turn (degrees?), a reach beyond 20 m and inertias
+    Findings are: limits of revolute joints beyond a full turn (degrees?), a reach beyond 20 m and inertias
     that are far too large for the robot's size (millimetres?), gravity that points upwards.
     """
     return tuple(_findings(robot))
 
 
 def warn_of_degrees(angles: ArrayLike, where: str) -> None:
-    """Issue an ArmblocksWarning if an angle, which should be in rad, is so large that it is probably in
-    degrees."""
+    """Issue an ArmblocksWarning if an angle (rad) is so large that it is probably in degrees."""
     values = np.abs(np.asarray(angles, dtype=np.float64)).ravel()
-    beyond = values[np.isfinite(values) & (values > LARGEST_ANGLE)]
+    beyond = values[np.isfinite(values) & (values > MAX_MOTION_ANGLE)]
     if beyond.size:
         warnings.warn(
-            f"{where}: an angle of {beyond[0]:g} rad is more than two whole turns. Is this in degrees? "
-            "It is used as given; np.radians makes rad of degrees.",
+            f"{where}: an angle of {beyond[0]:g} rad is more than two full turns. Is this in degrees? "
+            "It is used as given; np.radians converts degrees to rad.",
             ArmblocksWarning,
             stacklevel=3,
         )
@@ -72,23 +72,23 @@ def warn_of_implausible_values(robot: Robot) -> None:
 def _findings(robot: Robot) -> Iterator[PlausibilityFinding]:
     for link in robot.links:
         low, high = link.joint.limits.position or (0.0, 0.0)
-        if link.joint.angular and not link.joint.linear and max(abs(low), abs(high)) > WHOLE_TURN:
+        if link.joint.angular and not link.joint.linear and max(abs(low), abs(high)) > FULL_TURN:
             yield PlausibilityFinding(
                 robot=robot.name,
                 link=link.name,
-                what=f"the joint turns from {low:g} to {high:g} rad, more than a whole turn",
+                what=f"the joint turns from {low:g} to {high:g} rad, more than a full turn",
                 question="Is this in degrees? It is used as given.",
             )
     reach = max(_reaches(robot).values())
-    if reach > LONGEST_REACH:
+    if reach > MAX_REACH:
         yield PlausibilityFinding(
             robot=robot.name,
-            what=f"it reaches {reach:g} m",
+            what=f"the reach is {reach:g} m",
             question="Are its lengths in millimetres? They are used as given.",
         )
     for link in robot.links:
         moment = float(np.abs(np.linalg.eigvalsh(link.I)).max())
-        if link.mass > 0 and reach > 0 and moment > link.mass * (LARGEST_GYRATION * reach) ** 2:
+        if link.mass > 0 and reach > 0 and moment > link.mass * (MAX_GYRATION_RATIO * reach) ** 2:
             yield PlausibilityFinding(
                 robot=robot.name,
                 link=link.name,
@@ -100,8 +100,8 @@ def _findings(robot: Robot) -> Iterator[PlausibilityFinding]:
         yield PlausibilityFinding(
             robot=robot.name,
             what=f"gravity is {list(robot.gravity)} m/s2, so that bodies fall upwards",
-            question="Is its sign that of the toolbox? Here it is the acceleration of a falling body, "
-            "[0, 0, -9.81].",
+            question="Does it have the sign of the Robotics Toolbox? Here gravity is the acceleration of a "
+            "falling body, [0, 0, -9.81].",
         )
 
 

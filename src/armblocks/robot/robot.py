@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.errors import UnknownNameError, check_arguments
-from armblocks.lazy_exports import shown_by
+from armblocks.lazy_exports import display_method
 from armblocks.robot.checks import check_robot
 from armblocks.robot.fields import pose
 from armblocks.robot.friction_model import FrictionModel
@@ -67,7 +67,7 @@ class Robot:
             self.gravity,
         )
 
-    _repr_html_ = shown_by("armblocks.face.notebook_views", "robot_view")
+    _repr_html_ = display_method("armblocks.face.notebook_views", "robot_view")
 
     @cached_property
     def moving_links(self) -> tuple[Link, ...]:
@@ -101,7 +101,7 @@ class Robot:
 
     @property
     def joint_letters(self) -> str:
-        """R and P in the order of q, as in ``RRRRRR``."""
+        """The letters R (revolute) and P (prismatic) in the order of q, as in ``RRRRRR``."""
         return "".join(joint.letter for joint in self.joints)
 
     @property
@@ -126,15 +126,14 @@ class Robot:
         return np.array([motor.gear_ratio if motor else 1.0 for motor in self.motors])
 
     def link(self, name: str) -> Link:
-        """The link of that name; raises UnknownNameError."""
+        """The link of this name. Raises UnknownNameError for an unknown name."""
         for link in self.links:
             if link.name == name:
                 return link
         raise UnknownNameError("link", name, [link.name for link in self.links], where=f"robot '{self.name}'")
 
     def with_link(self, name: str, **changes: object) -> Robot:
-        """A copy with changed fields of the named link; the fields are arguments of
-        ``dataclasses.replace``."""
+        """A copy with changed fields of the named link, given by name as for ``dataclasses.replace``."""
         changed = replace(self.link(name), **changes)  # pyright: ignore[reportArgumentType] - fields by name
         return replace(self, links=tuple(changed if link.name == name else link for link in self.links))
 

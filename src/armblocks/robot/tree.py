@@ -161,6 +161,6 @@ def _axis_to_z(axis: Vector3) -> tuple[Transform, float]:
     if x == z == 0:
         return Transform(rotation=rotation_x(-np.pi / 2)), 1.0 if y > 0 else -1.0
     k = np.array(axis)
-    across = np.cross(k, np.eye(3)[int(np.argmin(np.abs(k)))])
-    across /= hypot(*across.tolist())
-    return Transform(rotation=np.column_stack((across, np.cross(k, across), k))), 1.0
+    normal = np.cross(k, np.eye(3)[int(np.argmin(np.abs(k)))])
+    normal /= hypot(*normal.tolist())
+    return Transform(rotation=np.column_stack((normal, np.cross(k, normal), k))), 1.0

@@ -57,8 +57,7 @@ _Surface = tuple[NDArray[np.float64], NDArray[np.float64]]
 def _quads(
     a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Two triangles for each quadrilateral a b c d (K, 3), without degenerate triangles (a point occurs
-    twice)."""
+    """Two triangles (2 K, 3 corners, 3 coordinates) for each quadrilateral; a b c d: the corners (K, 3)."""
     return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
@@ -69,9 +68,9 @@ def _ring_surface(
     upper_normals: NDArray[np.float64],
 ) -> _Surface:
     """The strip between two closed rings (S, 3), both anticlockwise seen from the upper ring."""
-    follow = np.roll(np.arange(len(lower)), -1)
-    corners = _quads(lower, lower[follow], upper[follow], upper)
-    normals = _quads(lower_normals, lower_normals[follow], upper_normals[follow], upper_normals)
+    next_index = np.roll(np.arange(len(lower)), -1)
+    corners = _quads(lower, lower[next_index], upper[next_index], upper)
+    normals = _quads(lower_normals, lower_normals[next_index], upper_normals[next_index], upper_normals)
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     solid = area > 1e-12 * max(float(np.abs(corners).max()), 1e-9) ** 2
     return corners[solid], normals[solid]
@@ -83,8 +82,10 @@ def _circle(radius: float, z: float) -> NDArray[np.float64]:
 
 
 def _lathe(profile: list[tuple[float, float]]) -> _Surface:
-    """The surface of revolution of a profile of (radius, z) about z, listed upwards on the outside; every
-    segment is one face."""
+    """The surface of revolution about z of a profile of points (radius, z).
+
+    The points are in upward order on the outside. Every segment of the profile is one face.
+    """
     parts: list[_Surface] = []
     for (r0, z0), (r1, z1) in pairwise(profile):
         length = math.hypot(r1 - r0, z1 - z0)
@@ -114,7 +115,7 @@ def _cylinder_profile(shape: Cylinder) -> list[tuple[float, float]]:
 
 
 def _housing(shape: Housing) -> _Surface:
-    # Superellipse |x/a|^p + |y/b|^p = 1 with p = 2 / roundness; for a roundness near 0 all points would be
+    # The superellipse |x/a|^p + |y/b|^p = 1 has p = 2 / roundness. For a roundness near 0 all points would be
     # near the corners.
     power = max(shape.roundness, 0.08)
     angle = (np.arange(SIDES) + 0.5) * (2 * math.pi / SIDES)
@@ -131,10 +132,10 @@ def _housing(shape: Housing) -> _Surface:
 
 
 def _ring_normals(lower: NDArray[np.float64], upper: NDArray[np.float64]) -> NDArray[np.float64]:
-    along = (np.roll(lower, -1, axis=0) - np.roll(lower, 1, axis=0)) + (
+    tangent = (np.roll(lower, -1, axis=0) - np.roll(lower, 1, axis=0)) + (
         np.roll(upper, -1, axis=0) - np.roll(upper, 1, axis=0)
     )
-    normal = np.cross(along, upper - lower)
+    normal = np.cross(tangent, upper - lower)
     return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
 
 

@@ -17,7 +17,7 @@ def square_root(a: NumberT) -> NumberT:
 
 
 def fma(a: NumberT | float, b: NumberT | float, c: NumberT | float) -> NumberT:
-    """``a b + c``, rounded once; at least one of them is a value of a routine."""
+    """``a b + c``, rounded once; at least one argument is a value of a routine."""
     number = next(value for value in (a, b, c) if not isinstance(value, float | int))
     return number.compute(Operation.FMA, a, b, c)
 

@@ -62,6 +62,6 @@ class FullMatrix(Generic[NumberT]):
         """
         for i in r.range(0, self.size):
             y[i] = self.less_products(r, y[i], i, y, 0, i)
-        for turn in r.range(0, self.size):
-            i = self.size - 1 - turn
+        for k in r.range(0, self.size):
+            i = self.size - 1 - k
             y[i] = by_pivot(self.less_products(r, y[i], i, y, i + 1, self.size), i)

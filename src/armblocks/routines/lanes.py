@@ -1,7 +1,7 @@
 """Values in lanes: the same operation on several doubles at a time, in one vector register.
 
-The number of lanes is that of the program; with one lane they are single doubles. Integers, conditions and
-therefore the control flow are common to all lanes. A :class:`Mask` selects values per lane.
+The program determines the number of lanes; with one lane, the values are single doubles. Integers, conditions
+and therefore the control flow are common to all lanes. A :class:`Mask` selects values per lane.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ class Mask(Condition):
 
     @property
     def any(self) -> Boolean:
-        """Whether it holds in any lane."""
+        """Whether the condition holds in any lane."""
         return Boolean(self.writer, self.writer.compute(Kind.BOOLEAN, Operation.ANY, self.operand))
 
 
 class Lanes(Number[Mask]):
-    """A double in each lane. A Python number is the same in all of them."""
+    """A double in each lane. A Python number is the same in all lanes."""
 
     __slots__ = ()
     kind, condition = Kind.LANES, Mask

@@ -183,7 +183,7 @@ class _FunctionText:
         return types if len(kinds) == 1 else f"{{ {types} }}" if kinds else "void"
 
     def _typed(self, operand: Operand) -> str:
-        """The type of an operand; a variable or a table stands for its address."""
+        """The type of an operand; for a variable or a table, the type of its address."""
         return "ptr" if isinstance(operand, Local | Table) else self._type(operand.kind)
 
     def _constant(self, constant: Constant) -> str:
@@ -207,12 +207,12 @@ class _FunctionText:
             self._slots.append(f"  {name} = alloca {kind}")
         return name
 
-    def _new(self, temporary: Temporary, text: str) -> str:
+    def _assign(self, temporary: Temporary, text: str) -> str:
         """Append the line that computes a temporary; return its name."""
-        name = self._names[temporary] = self._name(text)
+        name = self._names[temporary] = self._append_value(text)
         return name
 
-    def _name(self, text: str) -> str:
+    def _append_value(self, text: str) -> str:
         """Append a line that computes a value; return its name."""
         self._count += 1
         self._lines.append(f"  %v{self._count} = {text}")
@@ -221,111 +221,113 @@ class _FunctionText:
     def _label(self, mark: Mark) -> str:
         label = self._labels.get(mark)
         if label is None:
-            label = self._labels[mark] = self._fresh(mark.name)
+            label = self._labels[mark] = self._new_label(mark.name)
         return label
 
-    def _fresh(self, name: str) -> str:
+    def _new_label(self, name: str) -> str:
         self._count += 1
         return f"{name.replace(' ', '.')}{self._count}"
 
     # Blocks.
 
-    def _place(self, label: str) -> None:
+    def _begin_block(self, label: str) -> None:
         """Begin a basic block; the previous block branches to it, unless that block has ended."""
         if not self._ended:
             self._lines.append(f"  br label %{label}")
         self._lines.append(f"{label}:")
         self._ended = False
 
-    def _end(self, line: str) -> None:
+    def _end_block(self, line: str) -> None:
         self._lines.append(f"  {line}")
         self._ended = True
 
     def _part(self, statements: Sequence[Statement]) -> None:
-        for statement, following in zip(statements, [*statements[1:], None]):
+        for statement, next_statement in zip(statements, [*statements[1:], None]):
             if not self._ended or isinstance(statement, Stage):  # unreachable statements are omitted
-                self._statement(statement, following)
+                self._statement(statement, next_statement)
 
-    def _statement(self, statement: Statement, following: Statement | None) -> None:
+    def _statement(self, statement: Statement, next_statement: Statement | None) -> None:
         match statement:
             case Jump(mark):
-                self._end(f"br label %{self._label(mark)}")
+                self._end_block(f"br label %{self._label(mark)}")
             case Return(values):
                 self._return(values)
             case Stage(mark):
-                self._place(self._label(mark))
+                self._begin_block(self._label(mark))
             case Region():
                 self._region(statement)
             case When():
-                self._when(statement, following)
+                self._when(statement, next_statement)
             case _:
-                self._plain(statement)
+                self._simple_statement(statement)
 
     def _return(self, values: Sequence[Operand]) -> None:
         if not values:
-            return self._end("ret void")
+            return self._end_block("ret void")
         text, result = self._operand(values[0]), self._result(self._results)
         if len(values) > 1:
             text = "poison"
             for k, value in enumerate(values):
                 part = f"{self._typed(value)} {self._operand(value)}"
-                text = self._name(f"insertvalue {result} {text}, {part}, {k}")
-        return self._end(f"ret {result} {text}")
+                text = self._append_value(f"insertvalue {result} {text}, {part}, {k}")
+        return self._end_block(f"ret {result} {text}")
 
     def _region(self, region: Region) -> None:
         if region.start.used:
-            self._place(self._label(region.start))
+            self._begin_block(self._label(region.start))
         self._part(region.body)
         if region.end.used:
-            self._place(self._label(region.end))
+            self._begin_block(self._label(region.end))
 
-    def _when(self, when: When, following: Statement | None) -> None:
-        """A conditional branch. If a part, or the statement after it, is only a jump, the branch goes to its
-        target."""
+    def _when(self, when: When, next_statement: Statement | None) -> None:
+        """A conditional branch. If a part, or the statement after it, is only a jump, the branch goes to the
+        target of the jump."""
         condition = self._operand(when.condition)
         if when.rarely:
             self._declare("i1", "llvm.expect.i1", "i1", "i1")
-            condition = self._name(f"call i1 @llvm.expect.i1(i1 {condition}, i1 false)")
+            condition = self._append_value(f"call i1 @llvm.expect.i1(i1 {condition}, i1 false)")
         jumps = [self._only_jump(when.yes), self._only_jump(when.no)]
-        leads_on = isinstance(following, Jump)
-        after = self._label(following.mark) if isinstance(following, Jump) else self._fresh("after")
+        jump_follows = isinstance(next_statement, Jump)
+        after = (
+            self._label(next_statement.mark) if isinstance(next_statement, Jump) else self._new_label("after")
+        )
         parts: list[tuple[str, list[Statement]]] = []
         for k, (name, part) in enumerate((("when", when.yes), ("otherwise", when.no))):
             if not part:
                 jumps[k] = after
             elif not jumps[k]:
-                jumps[k] = self._fresh(name)
+                jumps[k] = self._new_label(name)
                 parts.append((jumps[k], part))
-        self._end(f"br i1 {condition}, label %{jumps[0]}, label %{jumps[1]}")
+        self._end_block(f"br i1 {condition}, label %{jumps[0]}, label %{jumps[1]}")
         joined = after in jumps
         for label, part in parts:
-            self._place(label)
+            self._begin_block(label)
             self._part(part)
             if not self._ended:
                 joined = True
-                self._end(f"br label %{after}")
-        if joined and not leads_on:
-            self._place(after)
+                self._end_block(f"br label %{after}")
+        if joined and not jump_follows:
+            self._begin_block(after)
 
     def _only_jump(self, part: Sequence[Statement]) -> str:
         return self._label(part[0].mark) if part and isinstance(part[0], Jump) else ""
 
     # Statements.
 
-    def _plain(self, statement: Statement) -> None:
+    def _simple_statement(self, statement: Statement) -> None:
         match statement:
             case Compute(result, operation, operands):
-                self._new(result, self._operation(operation, operands))
+                self._assign(result, self._operation(operation, operands))
             case Locate(result, base, index, element):
                 text = f"getelementptr inbounds {self._type(element)}, ptr {self._operand(base)}"
-                self._new(result, f"{text}, i64 {self._operand(index)}")
+                self._assign(result, f"{text}, i64 {self._operand(index)}")
             case Load(result, address, acquiring):
                 kind = self._type(result.kind)
                 atomic, order = (" atomic", " acquire, align 8") if acquiring else ("", "")
-                self._new(result, f"load{atomic} {kind}, ptr {self._operand(address)}{order}")
+                self._assign(result, f"load{atomic} {kind}, ptr {self._operand(address)}{order}")
             case FetchAdd(result, address, value):
                 pointer = self._operand(address)
-                self._new(result, f"atomicrmw add ptr {pointer}, i64 {self._operand(value)} acq_rel")
+                self._assign(result, f"atomicrmw add ptr {pointer}, i64 {self._operand(value)} acq_rel")
             case Store(value, address):
                 self._line(f"store {self._typed(value)} {self._operand(value)}, ptr {self._operand(address)}")
             case Copy(source, target, size):
@@ -348,11 +350,11 @@ class _FunctionText:
         if not call.results:
             self._line(text)
         elif len(call.results) == 1:
-            self._new(call.results[0], text)
+            self._assign(call.results[0], text)
         else:
-            together = self._name(text)
+            together = self._append_value(text)
             for k, part in enumerate(call.results):
-                self._new(part, f"extractvalue {result} {together}, {k}")
+                self._assign(part, f"extractvalue {result} {together}, {k}")
 
     def _line(self, text: str) -> None:
         self._lines.append(f"  {text}")
@@ -384,13 +386,13 @@ class _FunctionText:
         if self.lanes == 1:
             return f"bitcast double {number} to double"
         lanes = self._type(Kind.LANES)
-        first = self._name(f"insertelement {lanes} poison, double {number}, i64 0")
+        first = self._append_value(f"insertelement {lanes} poison, double {number}, i64 0")
         return f"shufflevector {lanes} {first}, {lanes} poison, <{self.lanes} x i32> zeroinitializer"
 
     def _any(self, mask: str) -> str:
         if self.lanes == 1:
             return f"or i1 {mask}, false"
-        bits = self._name(f"bitcast {self._type(Kind.MASK)} {mask} to i{self.lanes}")
+        bits = self._append_value(f"bitcast {self._type(Kind.MASK)} {mask} to i{self.lanes}")
         return f"icmp ne i{self.lanes} {bits}, 0"
 
     def _fma(self, kind: Kind, operands: Sequence[str]) -> str:
@@ -400,7 +402,7 @@ class _FunctionText:
         # For -(a b + c) LLVM selects ARM64's FNMADD, which computes (-a) b + (-c). If the sum is exactly zero
         # that gives +0 instead of -0. The barrier keeps the two operations apart. Vectors have no such
         # instruction.
-        return self._intrinsic("arithmetic.fence", kind, self._name(call))
+        return self._intrinsic("arithmetic.fence", kind, self._append_value(call))
 
     def _intrinsic(self, name: str, kind: Kind, *operands: str) -> str:
         number = self._type(kind)

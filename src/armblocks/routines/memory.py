@@ -23,7 +23,7 @@ from armblocks.routines.values import (
 
 
 class Address(Value):
-    """An address, such as that of a structure, whose fields are read by their offsets in bytes."""
+    """An address, for example of a structure, whose fields are read by their offsets in bytes."""
 
     __slots__ = ()
     kind = Kind.ADDRESS
@@ -41,7 +41,7 @@ class Address(Value):
 
     @property
     def is_null(self) -> Boolean:
-        """Whether it is the null address."""
+        """Whether the address is null."""
         return self == Address(self.writer, Constant(Kind.ADDRESS, None))
 
     def after(self, offset: int) -> Address:
@@ -59,12 +59,12 @@ class Address(Value):
 
     @property
     def reals(self) -> Reals:
-        """Doubles from here on."""
+        """The doubles from this address on."""
         return Reals(self.writer, self.operand)
 
     @property
     def integers(self) -> Integers:
-        """Integers from here on."""
+        """The integers from this address on."""
         return Integers(self.writer, self.operand)
 
     def _field(self, offset: int, kind: Kind) -> Temporary:

@@ -1,7 +1,7 @@
 """The routine language: functions with variables, memory and structured control flow, written in Python.
 
 A function of a program is a Python function whose first parameter is the :class:`Routine` that it writes
-into; the annotations of the others are its signature::
+into; the annotations of all other parameters are its signature::
 
     def norm(r: Routine, x: Reals, n: Integer) -> Real:
         total = r.real(0.0)
@@ -70,7 +70,7 @@ _BY_NAME: dict[str, type[Value]] = {kind.__name__: kind for kind in _TYPES}
 
 @dataclass(frozen=True, slots=True)
 class Function(Generic[P, R]):
-    """A function that routines call; the type parameters are those of the Python function that wrote it."""
+    """A function that routines call, with the type parameters of the Python function that records it."""
 
     symbol: str
     write: Callable[Concatenate[Routine, P], R]
@@ -78,7 +78,7 @@ class Function(Generic[P, R]):
     address: Operand | None = None
 
     def at(self, address: Address) -> Function[P, R]:
-        """The function at an address, with this one's parameters and results."""
+        """The function at an address, with the parameters and results of this function."""
         return replace(self, address=address.operand)
 
 
@@ -107,9 +107,9 @@ class Program:
         """The function that ``write`` records, with its name unless a ``symbol`` is given.
 
         ``public``: the function is called from outside the program. ``inlined``: whether it is inlined into
-        its callers; ``None`` leaves that to the back end. ``distinct``: arrays that are passed to it do not
-        overlap. ``rest`` names the parameters that Python's ``*`` stands for, all of one type. If the symbol
-        is already defined, the existing definition stays.
+        its callers; ``None`` leaves the decision to the back end. ``distinct``: the arrays that are passed to
+        the function do not overlap. ``rest`` names the parameters that Python's ``*`` collects; all have one
+        type. If the symbol is already defined, the existing definition stays.
         """
         symbol = symbol or write.__name__
         if symbol not in self.parts:
@@ -226,16 +226,16 @@ class Routine(Writer):
         variable.value = initial
         return variable
 
-    def integer_room(self, count: int) -> Integers:
+    def local_integers(self, count: int) -> Integers:
         """Memory for contiguous integers during the function call."""
         return Integers(self, Local(Kind.INTEGER, count))
 
     def constant(self, value: float) -> Real:
-        """A constant double, for places that do not accept a Python number."""
+        """A constant double, for functions that do not accept a Python number."""
         return Real(self, real_operand(value))
 
     def constant_integer(self, value: int) -> Integer:
-        """A constant integer, for places that do not accept a Python number."""
+        """A constant integer, for functions that do not accept a Python number."""
         return Integer(self, integer_operand(value))
 
     def constant_boolean(self, value: bool) -> Boolean:
@@ -260,7 +260,7 @@ class Routine(Writer):
         return Address(self, Constant(Kind.ADDRESS, None))
 
     @property
-    def nowhere(self) -> Reals:
+    def null_array(self) -> Reals:
         """An array without an address, for functions that do not read it."""
         return Reals(self, Constant(Kind.ADDRESS, None))
 
@@ -268,7 +268,7 @@ class Routine(Writer):
 
     @contextmanager
     def when(self, condition: Boolean, *, rarely: bool = False) -> Generator[None]:
-        """Run the block if the condition holds; ``rarely``: a hint that it seldom does."""
+        """Run the block if the condition holds; ``rarely``: a hint that the condition seldom holds."""
         statement = tree.When(condition.operand, [], [], rarely)
         self.statements.append(statement)
         with self._inside(statement.yes):
@@ -287,7 +287,9 @@ class Routine(Writer):
         """The block that runs if the condition of the :meth:`when` directly before it fails."""
         statement = self.statements[-1] if self.statements else None
         if not isinstance(statement, tree.When) or statement.no:
-            raise SyntaxError("'otherwise' has no 'when' directly before it. Fix: put it after one.")
+            raise SyntaxError(
+                "'otherwise' has no 'when' directly before it. Fix: put it directly after a 'when'."
+            )
         with self._inside(statement.no):
             yield
 
@@ -317,12 +319,12 @@ class Routine(Writer):
             yield from range(count)
             return
         index = self.integer(0)
-        with self.part() as turn:
+        with self.part() as iteration:
             i = index.value
             yield i
-            following = i + 1
-            index.value = following
-            turn.again_when(following < count)
+            next_index = i + 1
+            index.value = next_index
+            iteration.again_when(next_index < count)
 
     def range(self, start: Integer | int, stop: Integer | int, step: int = 1) -> Generator[Integer]:
         """``for i in r.range(a, b)``: run the block for ``i = a … b-1``, as a loop.
@@ -330,9 +332,9 @@ class Routine(Writer):
         With a ``step`` above 1, ``i = a, a + step …`` below ``b``.
         """
         index = self.integer(start)
-        with self.loop() as turn:
+        with self.loop() as iteration:
             i = index.value
-            turn.leave_unless(i < stop)
+            iteration.leave_unless(i < stop)
             yield i
             index.value = i + step
 
@@ -389,7 +391,7 @@ class Routine(Writer):
 class Stages:
     """Stages of a routine, such as those of a run: ``with stages:`` around all of them.
 
-    Code before the first stage selects one by :meth:`go`. A stage continues with the next one, or ends with
+    Code before the first stage selects one by :meth:`go`. A stage continues with the next stage, or ends with
     :meth:`go`.
     """
 

@@ -68,7 +68,7 @@ class Operation(Enum):
     SPREAD = "spread"
     """A double in all lanes."""
     SELECT = "select"
-    """The second operand where the first holds, else the third; a mask chooses in each lane."""
+    """The second operand where the first holds, else the third; a mask selects in each lane."""
     TO_REAL = "to real"
     """An integer as a double."""
     TO_INTEGER = "to integer"
@@ -99,7 +99,7 @@ class Local:
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """A number, the same in all lanes; an address only as ``None``, the null address."""
+    """A number, the same in all lanes. The only constant address is ``None``, the null address."""
 
     kind: Kind
     value: float | int | bool | None
@@ -228,8 +228,7 @@ class When:
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """Statements with marks at their start and end. After the end of the body, execution continues after the
-    region."""
+    """Statements with marks at their start and end. Execution continues after the region."""
 
     body: list[Statement]
     start: Mark
@@ -251,8 +250,8 @@ Statement = Compute | Locate | Load | Store | FetchAdd | Copy | Call | Return | 
 class Function:
     """One function.
 
-    ``public``: it is called from outside. ``inlined``: whether it is inlined into its callers;
-    ``None`` leaves that to the back end. ``distinct``: its addresses never point to the same numbers.
+    ``public``: whether it is called from outside. ``inlined``: whether it is inlined into its callers;
+    ``None`` leaves the decision to the back end. ``distinct``: whether its addresses never overlap.
     """
 
     symbol: str

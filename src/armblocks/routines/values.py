@@ -105,7 +105,7 @@ class Boolean(Condition):
     kind = Kind.BOOLEAN
 
     def count(self) -> Integer:
-        """1 where it holds, else 0."""
+        """1 where the condition holds, else 0."""
         return Integer(self.writer, self.writer.compute(Kind.INTEGER, Operation.TO_INTEGER, self.operand))
 
 
@@ -172,12 +172,12 @@ class Number(Value, Generic[ConditionT]):
 
     @property
     def ordered(self) -> ConditionT:
-        """Whether it is not NaN."""
+        """Whether the number is not NaN."""
         return self._compare(Operation.ORDERED, self)
 
     @property
     def finite(self) -> ConditionT:
-        """Whether it is neither infinite nor NaN: ``0 a`` is zero."""
+        """Whether the number is neither infinite nor NaN: ``0 a`` is zero."""
         return self * 0.0 == 0.0
 
     def compute(self, operation: Operation, *operands: Self | float) -> Self:
@@ -188,7 +188,7 @@ class Number(Value, Generic[ConditionT]):
 
     @classmethod
     def constant(cls, writer: Writer, value: float) -> Self:
-        """A constant, where a Python number is not possible."""
+        """A constant, for functions that do not accept a Python number."""
         return cls(writer, Constant(cls.kind, float(value)))
 
     @classmethod
@@ -288,7 +288,7 @@ class Integer(Value):
     __hash__ = object.__hash__
 
     def to_real(self) -> Real:
-        """As a double, to nearest."""
+        """The integer as a double, rounded to nearest."""
         return Real(self.writer, self.writer.compute(Kind.REAL, Operation.TO_REAL, self.operand))
 
     def to_int32(self) -> Int32:
@@ -315,7 +315,7 @@ class Int32(Value):
     kind = Kind.INT32
 
     def to_integer(self) -> Integer:
-        """As 64 bits."""
+        """The integer with 64 bits."""
         return Integer(self.writer, self.writer.compute(Kind.INTEGER, Operation.TO_INTEGER, self.operand))
 
 

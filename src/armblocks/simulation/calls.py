@@ -19,6 +19,7 @@ from armblocks.simulation.run_part import Consumer, RunPart
 
 Array = NDArray[np.float64]
 SAME_INSTANT = 1.0 + 2.0**-50
+"""Two times within this factor are equal, as in the native loop."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,8 +41,8 @@ class Calls:
     """The functions of one run, in dependency order within a tick.
 
     The native loop returns just before a tick. The tick is evaluated on a copy to get the inputs of a
-    function, the function is called, and the loop continues with its results and processes the tick. All
-    blocks that tick at that time therefore read the new values, as if equations computed them.
+    function, and the function is called. The loop then continues with its results and processes the tick. All
+    blocks that tick at that time therefore read the new values.
     """
 
     def __init__(self, compiled: CompiledSystem, functions: Sequence[CalledFunction]) -> None:
@@ -67,7 +68,7 @@ class Calls:
             integration.pause_before_ticks_at(self._next_tick(integration))
             part.advance(max(0, end - part.steps_taken), pause, consume)
             if part.status is not Status.PAUSED or not (
-                integration.instant_pending and self._due(integration)
+                integration.instant_pending and self._due_clocks(integration)
             ):
                 return
 
@@ -89,7 +90,7 @@ class Calls:
     def _is_called(self, integration: Integration, clock: int) -> bool:
         return self._called_at.get(clock) == integration.next_tick(clock)
 
-    def _due(self, integration: Integration) -> list[int]:
+    def _due_clocks(self, integration: Integration) -> list[int]:
         """The clocks that tick now and whose functions have not been called."""
         now = integration.time * SAME_INSTANT
         return [
@@ -99,7 +100,7 @@ class Calls:
         ]
 
     def _call_due_functions(self, integration: Integration, p: Array) -> None:
-        due = self._due(integration)
+        due = self._due_clocks(integration)
         if not due:
             return
         time, now = integration.time, integration.time * SAME_INSTANT

@@ -1,7 +1,7 @@
 """Rows of a CSV file in plain Python, for installations without pyarrow. The text is the same as pyarrow's.
 
-pyarrow writes the shortest digits that read back to the same double: as ``0.000012`` from 1e-6 up to 1e10,
-and as ``1.2e-7`` or ``1.2e+10`` elsewhere.
+pyarrow writes the shortest digits that read back to the same double. Magnitudes from 1e-6 to 1e10 have the
+form ``0.000012``, all others the form ``1.2e-7`` or ``1.2e+10``.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def number_text(number: float) -> str:
 
 
 def _digits(text: str) -> tuple[str, int]:
-    """The significant digits of a positive number, and the power of ten of the first of them."""
+    """The significant digits of a positive number, and the power of ten of the first digit."""
     mantissa, _, power = text.partition("e")
     whole, _, fraction = mantissa.partition(".")
     digits = whole + fraction

@@ -12,8 +12,8 @@ from armblocks.equations import Signature
 from armblocks.errors import SimulationError
 from armblocks.integration.guard_functions import (
     CLOSE_DISTANCE,
-    MOST_CLOSE_EVENTS,
-    MOST_RAPID_EVENTS,
+    MAX_CLOSE_EVENTS,
+    MAX_RAPID_EVENTS,
     RAPID_DISTANCE,
 )
 from armblocks.integration.native_integrator import Integration
@@ -25,8 +25,8 @@ from armblocks.simulation.tableaux import STIFF
 
 Array = NDArray[np.float64]
 
-MANY_STEPS = 20_000
-"""Number of steps below which stiffness is not reported: the run took milliseconds."""
+MIN_REPORTED_STEPS = 20_000
+"""Minimum number of steps for a remark about stiffness; a shorter run takes milliseconds."""
 
 
 def element_name(layout: Signature, place: int) -> str:
@@ -142,13 +142,13 @@ def _endless_events(system: CompiledSystem, run: Integration) -> SimulationError
     verb = "causes" if len(blocks) == 1 else "cause"
     return SimulationError(
         f"{_listed(blocks)} {verb} events without end at {run.time:.15g} s, after {run.events} events in "
-        "all: they occur at ever shorter distances, or at one instant (Zeno behaviour or "
+        "all: they occur at decreasing intervals, or at one instant (Zeno behaviour or "
         "chattering)",
         where=system.name,
-        allowed=f"{MOST_CLOSE_EVENTS} events in a row at distances of {CLOSE_DISTANCE:g} t, "
-        f"{MOST_RAPID_EVENTS} of {RAPID_DISTANCE:g} t",
+        allowed=f"{MAX_CLOSE_EVENTS} consecutive events within {CLOSE_DISTANCE:g} t of each other, "
+        f"{MAX_RAPID_EVENTS} within {RAPID_DISTANCE:g} t",
         fix=f"give '{blocks[0]}' a hysteresis, a dead band or a state of rest (no bounce below some speed), "
-        "or stop the run before",
+        "or stop the run earlier",
     )
 
 
@@ -170,7 +170,7 @@ def _inconsistent_blocks(system: CompiledSystem, run: Integration) -> list[str]:
 
 
 def _listed(blocks: list[str]) -> str:
-    """The first three block names as text, with the number of the others."""
+    """The first three block names as text, with the number of further blocks."""
     shown = ", ".join(f"'{block}'" for block in blocks[:3])
     more = f" and {len(blocks) - 3} more" if len(blocks) > 3 else ""
     return f"{'block' if len(blocks) == 1 else 'the blocks'} {shown}{more}"
@@ -205,7 +205,7 @@ def _minimum_step(system: CompiledSystem, run: Integration) -> SimulationError:
     stiff = "" if needs_jacobian else f"; if it is stiff, solver='{STIFF.name}'"
     return SimulationError(
         f"the run takes extremely short steps at {run.time:.6g} s: {run.last_step:.2g} s. It would need "
-        f"{left:.0e} more of them, mainly because of state '{name}'",
+        f"{left:.0e} further steps, mainly because of state '{name}'",
         where=system.name,
         allowed="equations that jump at events only",
         fix=f"check the input of '{name}' for a jump that depends on the state, such as dry friction or a "
@@ -221,7 +221,7 @@ def stiffness_hint(system: CompiledSystem, run: Integration, p: Array) -> str:
     derivative.
     """
     tried, tableau = run.accepted + run.rejected, run.integrator.tableau
-    if tried < MANY_STEPS or run.time <= 0.0 or tableau.needs_jacobian:
+    if tried < MIN_REPORTED_STEPS or run.time <= 0.0 or tableau.needs_jacobian:
         return ""
     point = run.point
     x, t, rest = point.x, point.time, (point.z, point.w, p)

@@ -13,7 +13,7 @@ A row is a sample, or one side of a jump: at the time of a jump there are two ro
 the left limits, then the values. A file without these rows has the samples alone.
 
 Parquet needs pyarrow, MAT needs SciPy: the extra ``data``. CSV files have the same bytes with and without
-pyarrow, which only writes them faster. Files are written atomically
+pyarrow, which is only faster. Files are written atomically
 (:func:`armblocks.files.write_atomically`).
 """
 
@@ -50,7 +50,10 @@ Array = NDArray[np.float64]
 
 
 def to_dataframe(result: RunData, *, jumps: bool) -> pd.DataFrame:
-    """Index ``time`` in s, one column for each scalar; ``attrs`` has the description of the run."""
+    """A data frame with the index ``time`` in s and a column for each scalar.
+
+    ``attrs`` has the description of the run.
+    """
     with from_extra("data", "data frames"):
         import pandas as pd
 
@@ -73,7 +76,7 @@ def save(result: RunData, path: str | PathLike[str], *, jumps: bool) -> None:
 
 def check_format(path: Path) -> None:
     """Raise ``MissingLibraryError`` if the format of this suffix needs a library that is not installed."""
-    library, use = _NEEDS.get(path.suffix.lower(), ("", ""))
+    library, use = _LIBRARIES.get(path.suffix.lower(), ("", ""))
     if library and not installed(library):
         raise MissingLibraryError(library, "data", use, where=str(path))
 
@@ -123,7 +126,7 @@ def _parquet(result: RunData) -> bytes:
 
 
 def _table(result: RunData) -> pa.Table:
-    """A column ``time`` and one for each scalar; the metadata have the description of the run."""
+    """A column ``time`` and a column for each scalar; the metadata contain the description of the run."""
     import pyarrow as pa
 
     names = ["time", *result.columns()]
@@ -133,8 +136,10 @@ def _table(result: RunData) -> pa.Table:
 
 
 def _column(values: Array) -> pa.Array:
-    """A column that reads the numbers in place. (``pyarrow.array`` would import pandas to check for its
-    types.)"""
+    """A column that shares the memory of the numbers.
+
+    ``pyarrow.array`` would import pandas in order to check for its types.
+    """
     import pyarrow as pa
 
     buffer = pa.py_buffer(np.ascontiguousarray(values))
@@ -142,7 +147,7 @@ def _column(values: Array) -> pa.Array:
 
 
 def _npz(result: RunData) -> bytes:
-    """The bytes of ``numpy.savez_compressed``, whose own parameters exclude some names of arrays."""
+    """The bytes of ``numpy.savez_compressed``, which itself rejects arrays named like its parameters."""
     arrays = {slot.title or slot.name: result[slot.name] for slot in result.signals_layout}
     arrays |= {"time": result.time, "run": np.array(json.dumps(description_of(result)))}
     buffer = io.BytesIO()
@@ -199,7 +204,7 @@ _WRITERS: dict[str, Callable[[RunData], bytes]] = {
     ".npz": _npz,
     ".mat": _mat,
 }
-_NEEDS = {".parquet": ("pyarrow", "Parquet files"), ".mat": ("scipy", "MAT files")}
+_LIBRARIES = {".parquet": ("pyarrow", "Parquet files"), ".mat": ("scipy", "MAT files")}
 """The library that each format requires, and the name of the format in messages."""
 
 # Files that are written during a run.
@@ -233,6 +238,8 @@ class LogFile(ABC):
 
 
 class _CsvLog(LogFile):
+    """A CSV file that grows during a run."""
+
     def __init__(self, path: Path, columns: Sequence[str]) -> None:
         super().__init__(path, columns)
         self._file.stream.write(_csv_head(self.columns))
@@ -245,6 +252,8 @@ class _CsvLog(LogFile):
 
 
 class _ParquetLog(LogFile):
+    """A Parquet file with a row group for each part."""
+
     def __init__(self, path: Path, columns: Sequence[str]) -> None:
         import pyarrow as pa
         import pyarrow.parquet as pq

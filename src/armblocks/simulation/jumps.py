@@ -1,7 +1,7 @@
-"""Jumps of signals: the left limit and the value at every instant at which some signal jumps.
+"""Jumps of signals: the left limit and the value at every instant at which a signal jumps.
 
 The native loop records states and discrete variables on both sides of each instant (tick, event, breakpoint,
-delayed jump). The signals are evaluated from them at first use, because most runs need only the samples.
+delayed jump). The signals are computed from these at first use, because most runs need only the samples.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ Places = NDArray[np.intp]
 
 MAX_NUMBERS = 20_000_000
 """Maximum number of doubles for the states and signals on both sides of the recorded instants, 160 MB."""
-SMALLEST_JUMP = 1e-9
+MIN_JUMP = 1e-9
 """A change is a jump if it exceeds this fraction of the largest absolute value of the signal so far. Rounding
 and the location of events cause smaller changes."""
 
 
-def most_sides(compiled: CompiledSystem) -> int:
+def max_sides(compiled: CompiledSystem) -> int:
     """Maximum number of recorded sides of instants."""
     return max(64, MAX_NUMBERS // (row_width(compiled.sizes) + compiled.signals_layout.size))
 
@@ -49,7 +49,7 @@ class Side:
 
 @dataclass(frozen=True, kw_only=True)
 class JumpTable:
-    """M instants: ``time (M,)`` s, left limits, values, and which signals jump, ``jumping (ny, M)``."""
+    """M instants: ``time (M,)`` s, left limits, values, and the signals that jump, ``jumping (ny, M)``."""
 
     time: Array
     before: Side
@@ -64,7 +64,7 @@ class JumpTable:
         return JumpTable(time=np.empty(0), before=nothing, after=nothing, jumping=jumping)
 
     def selected(self, rows: Places | slice, begin: float, end: float) -> JumpTable:
-        """The instants after ``begin`` up to ``end`` (s) at which one of some signals jumps."""
+        """The instants after ``begin`` up to ``end`` (s) at which a signal of ``rows`` jumps."""
         jumping: Booleans = self.jumping[rows]
         instants: Booleans = jumping.any(axis=0) & (self.time > begin) & (self.time <= end)
         return JumpTable(
@@ -99,7 +99,7 @@ class Jumps:
 
     @property
     def time(self) -> Array:
-        """Times at which some signal jumps, ``(M,)`` s."""
+        """Times at which at least one signal jumps, ``(M,)`` s."""
         return self.table.time
 
     def __len__(self) -> int:
@@ -123,9 +123,9 @@ class Jumps:
 class InstantRows:
     """Both sides of M instants of one part of a run, before the signals are evaluated.
 
-    ``rows (M, 2, 2 + nx + nz + nw)`` are those of the native loop; ``sample (M, 2)`` is the number of samples
-    of the run before each side. ``change``: the first instant is a change of parameters; the point and the
-    parameters before it.
+    ``rows (M, 2, 2 + nx + nz + nw)`` are the rows that the native loop records; ``sample (M, 2)`` is the
+    number of samples of the run before each side. ``change``: the point and the parameters before a change of
+    parameters, if the first instant is such a change.
     """
 
     rows: Array
@@ -167,7 +167,7 @@ class JumpSearch:
         ``signals (ny, N)``.
 
         ``previous`` is the time of the sample before them, s. An instant with a signal that is not finite is
-        left out.
+        omitted.
         """
         parts = [part for part in parts if len(part.rows)]
         if not parts:
@@ -183,7 +183,7 @@ class JumpSearch:
         )
         sample = np.concatenate([part.sample for part in parts]) - begin
         rows = np.concatenate([part.rows for part in parts])
-        jumping = self._jumping(signals, sample[:, 0], before.signals, after.signals)
+        jumping = self._jumping_signals(signals, sample[:, 0], before.signals, after.signals)
         instants = np.asarray(jumping.any(axis=0))
         return JumpTable(
             time=_times(rows[:, 1, 0], sample, time, previous)[instants],
@@ -192,8 +192,10 @@ class JumpSearch:
             jumping=jumping[:, instants],
         )
 
-    def _jumping(self, signals: Array, sample: NDArray[np.int64], before: Array, after: Array) -> Booleans:
-        """Which signals jump at the instants, ``(ny, M)``."""
+    def _jumping_signals(
+        self, signals: Array, sample: NDArray[np.int64], before: Array, after: Array
+    ) -> Booleans:
+        """Whether each signal jumps at each instant, ``(ny, M)``."""
         finite = (np.isfinite(before) & np.isfinite(after)).all(axis=0)
         jumping = (before != after) & finite
         for row in np.flatnonzero(jumping.any(axis=1)):
@@ -202,7 +204,7 @@ class JumpSearch:
             sides = np.maximum(np.abs(before[row]), np.abs(after[row]))
             sides = np.maximum.accumulate(np.where(finite, sides, 0.0))
             largest = np.maximum(np.maximum(largest, sides), self._largest[row])
-            jumping[row] &= np.abs(after[row] - before[row]) > SMALLEST_JUMP * largest
+            jumping[row] &= np.abs(after[row] - before[row]) > MIN_JUMP * largest
         self._update_largest(signals)
         return jumping
 
@@ -212,7 +214,7 @@ class JumpSearch:
 
 
 def _times(instants: Array, sample: NDArray[np.int64], time: Array, previous: float) -> Array:
-    """The times of jumps, s: that of the sample at the instant, else that of the instant.
+    """The times of jumps, s: the time of the sample at the instant, else the time of the instant.
 
     A sample just before a change of parameters has the time of the change and the old values. The jump is
     then at the next double, so that the sample belongs to the time before it.
@@ -226,8 +228,8 @@ def _times(instants: Array, sample: NDArray[np.int64], time: Array, previous: fl
 def merged(time: Array, signals: Array, jumps: JumpTable) -> tuple[Array, Array]:
     """Times ``(R,)`` and signals ``(ny, R)`` of samples and jumps.
 
-    A jump has two rows with the same time: the left limits, then the values. The second one is the sample at
-    that time if there is one.
+    A jump has two rows with the same time: the left limits, then the values. The second row is the sample at
+    that time, if there is one.
     """
     order = _TimeOrder(time, jumps.time)
     return order.times, order.merged(signals, jumps.before.signals, jumps.after.signals)

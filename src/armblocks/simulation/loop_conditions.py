@@ -13,17 +13,18 @@ from armblocks.simulation.run_part import Rows
 Array = NDArray[np.float64]
 
 CHECKED_SAMPLES = 32
-"""Number of samples of each part of a run at which conditions are computed, including the first and the
-last."""
-HALF_OF_THE_DIGITS = 1e8
-"""Condition above which fewer than half of a double's 16 digits are correct."""
+"""Number of samples of each part of a run at which condition numbers are computed, including the first
+and the last."""
+MAX_CONDITION = 1e8
+"""Condition number above which fewer than half of a double's 16 digits are correct."""
 ITERATIONS = 12
 """Iterations of the power method; its two bounds then differ by a few per cent for most matrices."""
 MAX_NAMES = 3
+"""Maximum number of signals that a warning names."""
 
 
 def warnings_of_loops(system: CompiledSystem, parts: Sequence[Rows]) -> list[str]:
-    """A warning for each linear loop with fewer than half of the digits correct, with its worst time."""
+    """A warning for each linear loop with a condition number above ``MAX_CONDITION``, with the worst time."""
     worst = [(0.0, 0.0)] * len(system.loops)
     for rows in parts if system.loops else ():
         chosen = np.unique(np.linspace(0, rows.time.size - 1, CHECKED_SAMPLES).astype(np.intp))
@@ -36,16 +37,16 @@ def warnings_of_loops(system: CompiledSystem, parts: Sequence[Rows]) -> list[str
         f"the loop of {_listed(names)} has the condition number {condition:.2g} at {time:.9g} s, so that its "
         f"signals have about {max(0.0, 16.0 - np.log10(condition)):.0f} correct digits"
         for names, (condition, time) in zip(system.loops, worst)
-        if condition > HALF_OF_THE_DIGITS
+        if condition > MAX_CONDITION
     ]
 
 
 def loop_conditions(matrices: Array) -> Array:
-    """Conditions (k,) of loops ``x = M x + c``, whose ``matrices (k, n, n)`` are ``M - 1``; 0 where singular.
+    """Condition numbers (k,) of loops ``x = M x + c``; 0 where singular. ``matrices``: ``M - 1`` (k, n, n).
 
-    The condition is the spectral radius of ``|(1 - M)^-1| (1 + |M|)``. It bounds the error of a signal, as a
-    multiple of the rounding errors of all terms, for the best choice of the signals' units (Bauer, *Numer.
-    Math.* 5 (1963) 73-87).
+    The condition number is the spectral radius of ``|(1 - M)^-1| (1 + |M|)``. It bounds the error of a
+    signal, as a multiple of the rounding errors of all terms, for the best choice of the signals' units
+    (Bauer, *Numer. Math.* 5 (1963) 73-87).
     """
     n = matrices.shape[-1]
     found = np.zeros(len(matrices))

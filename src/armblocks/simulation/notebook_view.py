@@ -21,10 +21,15 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 TRACES = ("#1f83c0", "#e06a12", "#0f9d74", "#c06d9f", "#b98300", "#5aa9dd", "#8a8f98", "#a39a10")
+"""The colours of the traces, in order."""
 MAX_PANELS = 30
+"""Maximum number of drawn signals."""
 MAX_TRACES = 8
+"""Maximum number of traces of one panel."""
 WIDTH, HEIGHT = 264, 132
+"""Size of a panel, px."""
 LEFT, RIGHT, TOP, BOTTOM = 54, 10, 8, 20
+"""Margins of a panel, px."""
 
 STYLE = """
 .ab-result{font:13px/1.45 system-ui,-apple-system,"Segoe UI",Roboto,sans-serif;color:inherit;max-width:1120px}
@@ -78,12 +83,12 @@ def _panel(time: Array, values: Array, slot: Slot) -> str:
     unit = slot.unit.replace("rad", "deg", 1) if angle else slot.unit
     shown = columns[:, drawn] * (180.0 / np.pi if angle else 1.0)
     low, high = (float(shown.min()), float(shown.max())) if shown.size else (0.0, 0.0)
-    what = " · ".join(part for part in (unit, "×".join(map(str, slot.shape))) if part)
+    details = " · ".join(part for part in (unit, "×".join(map(str, slot.shape))) if part)
     if len(drawn) < slot.size:
-        what += f" · {len(drawn)} of {slot.size} drawn"
+        details += f" · {len(drawn)} of {slot.size} drawn"
     title = slot.title or slot.name
     label = f"{title}{f' in {unit}' if unit else ''}: from {_tick(low)} to {_tick(high)}"
-    caption = f"<figcaption>{escape(title)} <span>{escape(what)}</span>{_legend(slot, drawn)}</figcaption>"
+    caption = f"<figcaption>{escape(title)} <span>{escape(details)}</span>{_legend(slot, drawn)}</figcaption>"
     return f"<figure>{caption}{_svg(time, shown, low, high, label)}</figure>"
 
 
@@ -100,7 +105,7 @@ def _legend(slot: Slot, drawn: list[int]) -> str:
 
 
 def _drawn_components(columns: Array) -> list[int]:
-    """The components to draw: all of them, or only those that change, at most the first ``MAX_TRACES``."""
+    """The components to draw: all, or only those that change, and at most ``MAX_TRACES``."""
     count = columns.shape[1]
     if count <= MAX_TRACES or columns.shape[0] == 0:
         return list(range(min(count, MAX_TRACES)))

@@ -26,13 +26,13 @@ MAX_STEPS = 1e11
 """Maximum number of fixed steps, or of ticks of a clock, in a run."""
 MAX_NUMBERS = 500_000_000
 """Maximum number of recorded doubles of one run in memory, 4 GB."""
-SMALLEST_RTOL = 1e-13
-"""Smallest relative tolerance. Below it rounding errors dominate those of the method."""
+MIN_RTOL = 1e-13
+"""Minimum relative tolerance. Below it, rounding errors exceed the errors of the method."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LogRequest:
-    """Request to write a run to ``path`` (``.parquet`` or ``.csv``) during the run: ``signals``, or all."""
+    """Request to write ``signals`` (all if empty) to ``path`` (``.parquet`` or ``.csv``) during a run."""
 
     path: Path
     signals: tuple[str, ...] = ()
@@ -40,10 +40,11 @@ class LogRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class SampleTimes:
-    """The sample times of a run: ``start``, ``k sample_time`` for all integers ``k`` between, and ``stop``.
+    """The sample times of a run: ``start``, ``k sample_time`` for integers ``k`` in between, and ``stop``.
 
     Each time is computed as a product, so no error accumulates. A time within a billionth of a sample time of
-    the stop time, or of a start other than 0, is replaced by it. The times are computed in parts on request.
+    the stop time, or of a start other than 0, is replaced by that time. The times are computed in parts on
+    request.
     """
 
     start: float
@@ -136,9 +137,9 @@ def make_plan(
 def check_options(options: SimulationOptions, where: str) -> None:
     """Raise ``InputError`` for options that are invalid for every system.
 
-    Of a ``solver`` only the name is checked. Whether it suits the system is checked by :func:`make_plan`.
+    Only the name of the ``solver`` is checked; :func:`make_plan` checks whether it suits the system.
     """
-    stop = _number("stop_time", options.stop_time, where, "a finite time in s, 0 or more", least=0.0)
+    stop = _number("stop_time", options.stop_time, where, "a finite time in s, 0 or more", minimum=0.0)
     step = options.step
     if step is not None:
         step = _number("step", step, where, "a time in s above 0, at most the stop time", above=0.0)
@@ -155,12 +156,12 @@ def check_options(options: SimulationOptions, where: str) -> None:
     if options.sample_time is not None:
         _number("sample_time", options.sample_time, where, "a time in s above 0", above=0.0)
     rtol = _finite(options.rtol)
-    if rtol is None or not SMALLEST_RTOL <= rtol <= 1.0:
+    if rtol is None or not MIN_RTOL <= rtol <= 1.0:
         raise InputError(
             f"rtol is {options.rtol!r}",
             where=where,
-            allowed=f"{SMALLEST_RTOL:g} to 1: a double has 16 digits",
-            fix="1e-6 is a good start, 1e-10 is tight",
+            allowed=f"{MIN_RTOL:g} to 1: a double has 16 digits",
+            fix="use 1e-6 at first, and 1e-10 for high accuracy",
         )
     _number("atol", options.atol, where, "a number above 0, in the units of the states", above=0.0)
     if not isinstance(options.record_jumps, bool):  # pyright: ignore[reportUnnecessaryIsInstance]
@@ -183,13 +184,13 @@ def _check_solver(name: object, where: str) -> None:
 
 
 def _check_resolution(name: str, step: float, stop: float, where: str) -> None:
-    """Raise ``InputError`` for a step that is too small for the resolution of times near the end."""
-    least = 4.0 * math.ulp(stop)
-    if step < least:
+    """Raise ``InputError`` for a step below the resolution of times near the end of the run."""
+    minimum = 4.0 * math.ulp(stop)
+    if step < minimum:
         raise InputError(
             f"{name} is {step:g} s, and times near {stop:g} s are {math.ulp(stop):.2g} s apart",
             where=where,
-            allowed=f"at least {least:.2g} s here",
+            allowed=f"at least {minimum:.2g} s here",
             fix="choose a larger step, or count the time from another origin",
         )
 
@@ -201,12 +202,12 @@ def _check_step_count(name: str, step: float, stop: float, where: str) -> None:
             f"{name} is {step:g} s, and the stop time {stop:g} s: {stop / step:.0e} steps",
             where=where,
             allowed=f"at most {MAX_STEPS:.0e}, which take hours",
-            fix="check that it is in seconds; choose a longer one, or an earlier stop time",
+            fix=f"check that {name} is in seconds, increase it, or choose an earlier stop time",
         )
 
 
 def _finite(value: object) -> float | None:
-    """The value as a number; ``None`` for anything else, also for Booleans, texts and non-finite numbers."""
+    """The value as a float; ``None`` for Booleans, non-finite numbers and other types."""
     if isinstance(value, bool) or not isinstance(value, Real):
         return None
     number = float(value)
@@ -214,10 +215,10 @@ def _finite(value: object) -> float | None:
 
 
 def _number(
-    name: str, value: object, where: str, allowed: str, least: float = -math.inf, above: float = -math.inf
+    name: str, value: object, where: str, allowed: str, minimum: float = -math.inf, above: float = -math.inf
 ) -> float:
     number = _finite(value)
-    if number is not None and number >= least and number > above:
+    if number is not None and number >= minimum and number > above:
         return number
     raise InputError(f"{name} is {value!r}", where=where, allowed=allowed, fix=f"give another {name}")
 
@@ -314,11 +315,11 @@ def changed_parameters(system: CompiledSystem, p: Array, given: Mapping[str, Arr
     return _require_finite(system, p, np.isnan(p))
 
 
-def _require_finite(system: CompiledSystem, p: Array, bad: NDArray[np.bool_]) -> Array:
+def _require_finite(system: CompiledSystem, p: Array, invalid: NDArray[np.bool_]) -> Array:
     """Return ``p``. Raises ``InputError`` that names the first parameter with an invalid number."""
-    if bad.any():
+    if invalid.any():
         layout = system.parameters
-        name = next(slot.name for slot in layout if bad[layout.ranges[slot.name]].any())
+        name = next(slot.name for slot in layout if invalid[layout.ranges[slot.name]].any())
         raise InputError(
             f"parameter '{name}' is {p[layout.ranges[name]].tolist()}",
             where=system.name,

@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 class Samples:
     """Recorded samples of a run in progress: ``time (N,)`` s and ``signals (ny, N)``.
 
-    ``begin`` is the number of the first sample, ``end`` that of the next sample after them.
+    ``begin`` is the number of the first sample, ``end`` the number of the sample after the last.
     ``samples["block/port"]`` is ``(N, *shape)``.
     """
 
@@ -41,11 +41,11 @@ class Samples:
     layout: Signature
     aliases: Mapping[str, str]
     jumps: Jumps
-    """The jumps between the sample before these and the last of them."""
+    """The jumps after the preceding sample, up to the last of these samples."""
 
     @property
     def end(self) -> int:
-        """Number of the next sample after these."""
+        """Number of the sample after the last."""
         return self.begin + self.time.size
 
     def __getitem__(self, name: str) -> Array:
@@ -58,8 +58,8 @@ class Samples:
 class Recorded:
     """Samples with finite signals: ``time (N,)`` s, ``states (N, nx)`` and ``signals (ny, N)``.
 
-    ``jumps`` are both sides of the jumps between them. ``failure`` is the error for the next sample if one of
-    its signals is not finite.
+    ``jumps`` are both sides of the jumps between the samples. ``failure`` is the error for the next sample if
+    one of its signals is not finite.
     """
 
     time: Array
@@ -75,11 +75,11 @@ class Recording:
     def __init__(
         self, compiled: CompiledSystem, sample_times: SampleTimes, log: LogRequest | None, layout: Signature
     ) -> None:
-        """Raises the errors of opening a log."""
+        """Raises the errors of :func:`~armblocks.simulation.export.open_log`."""
         self._compiled = compiled
         self._layout = layout
         self._search = JumpSearch(compiled)
-        """The search of a logged run, from window to window."""
+        """The search of a logged run; it continues from window to window."""
         self.parts: list[RunPart] = []
         self.window: int | None = None
         """Number of samples in memory of a logged run."""
@@ -126,8 +126,8 @@ class Recording:
         """Signals of the samples from number ``begin`` on that are in memory."""
         parts, compiled = self._rows(begin), self._compiled
         nothing = np.empty((compiled.signals_layout.size, 0))
-        time = _joined([rows.time for rows in parts] or [np.empty(0)])
-        signals = _joined([rows.signals(compiled) for rows in parts] or [nothing], axis=1)
+        time = _concatenated([rows.time for rows in parts] or [np.empty(0)])
+        signals = _concatenated([rows.signals(compiled) for rows in parts] or [nothing], axis=1)
         return Samples(
             begin=parts[0].begin if parts else min(begin, self.recorded),
             time=time,
@@ -144,17 +144,19 @@ class Recording:
             time, states, signals = self._log.view(compiled.signals_layout.size)
             return Recorded(time=time, states=states, signals=signals, jumps=self._jumps([], time, signals))
         parts = self._rows(0) or [self.parts[-1].rows()]
-        time = _joined([rows.time for rows in parts])
-        states = _joined([rows.states for rows in parts])
-        signals = _joined([rows.signals(compiled) for rows in parts], axis=1)
-        error = first_invalid_signal(compiled, time, signals, _joined([rows.algebraic for rows in parts]))
+        time = _concatenated([rows.time for rows in parts])
+        states = _concatenated([rows.states for rows in parts])
+        signals = _concatenated([rows.signals(compiled) for rows in parts], axis=1)
+        error = first_invalid_signal(
+            compiled, time, signals, _concatenated([rows.algebraic for rows in parts])
+        )
         failure, count = (None, time.size) if error is None else error
         time, states, signals = time[:count], states[:count], signals[:, :count]
         jumps = self._jumps(parts, time, signals)
         return Recorded(time=time, states=states, signals=signals, jumps=jumps, failure=failure)
 
     def _jumps(self, parts: list[Rows], time: Array, signals: Array) -> Jumps:
-        """The jumps between samples, which are evaluated at their first use."""
+        """The jumps between samples; they are evaluated at their first use."""
         compiled = self._compiled
 
         def table() -> JumpTable:
@@ -167,7 +169,7 @@ class Recording:
         return Jumps(self._layout, compiled.aliases, table)
 
     def _instants(self, begin: int, count: int) -> list[InstantRows]:
-        """The instants of ``count`` samples. Those just before a change of parameters belong to the first
+        """The instants of ``count`` samples. Instants just before a change of parameters belong to the first
         sample of the next part."""
         return [part.instants(begin, begin + count) for part in self.parts]
 
@@ -202,6 +204,6 @@ class Recording:
             raise error[0]
 
 
-def _joined(parts: Sequence[Array], axis: int = 0) -> Array:
+def _concatenated(parts: Sequence[Array], axis: int = 0) -> Array:
     """The concatenated parts; a single part is not copied."""
     return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=axis)

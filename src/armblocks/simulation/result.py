@@ -17,26 +17,25 @@ if TYPE_CHECKING:
 class SimulationResult(RunData):
     """Signals of one run. ``result["block/port"]`` is ``(N, *shape)``, a view.
 
-    ``time`` ``(N,)`` s; ``signals_layout`` the names, shapes and units of the ``ny`` rows of ``signals``
-    ``(ny, N)``; ``states`` ``(N, nx)`` by ``states_layout``; ``parameters`` the values that the run used, at
-    its end where there were ``parameter_changes``; ``final_state`` the state from which another run
-    continues, ``None`` for a failed run. ``jumps`` has both sides of each jump between the samples. For a run
-    with a log file, the result has a selection of the file's rows with all extremes of the logged signals;
-    ``log`` has the path of the file.
+    ``time (N,)`` s. ``signals (ny, N)``: ``signals_layout`` has the names, shapes and units of its rows.
+    ``states (N, nx)``: ``states_layout`` has the names of its columns. ``parameters``: the values at the end
+    of the run, after ``parameter_changes``. ``final_state``: the state from which another run continues;
+    ``None`` for a failed run. ``jumps``: both sides of each jump between the samples. ``log``: the log
+    file, if any. The result then has a selection of the file's rows with all extremes of the logged signals.
     """
 
     def to_dataframe(self, *, jumps: bool = False) -> pd.DataFrame:
         """A pandas table: index ``time`` in s, one column for each scalar, named as in :meth:`columns`.
 
-        With ``jumps`` the rows are those of :meth:`with_jumps`: the index is not unique then.
+        With ``jumps``, the rows are those of :meth:`with_jumps`, and the index is not unique.
         """
         return to_dataframe(self, jumps=jumps)
 
     def save(self, path: str | PathLike[str], *, jumps: bool = True) -> None:
-        """Write a file by its suffix: ``.csv``, ``.parquet``, ``.npz`` or ``.mat``; atomically.
+        """Write a file atomically; its suffix is ``.csv``, ``.parquet``, ``.npz`` or ``.mat``.
 
-        The rows are those of :meth:`with_jumps`: two with the same time for each jump. Without ``jumps`` the
-        file has the samples alone.
+        The rows are those of :meth:`with_jumps`, two rows with the same time for each jump. Without ``jumps``
+        the file has the samples only.
 
         Raises ``UnknownNameError`` for another suffix and ``FormatError`` if the file cannot be written.
         """

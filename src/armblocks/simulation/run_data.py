@@ -25,12 +25,13 @@ Array = NDArray[np.float64]
 class RunReport:
     """The statistics of a run.
 
-    ``solver`` the integrator's name, ``"none"`` without integration; ``reason`` of its choice. ``steps``
-    accepted, ``rejected`` steps, ``evaluations`` of the derivative. ``ticks``: instants at which a clock
-    ticked; ``events``: guards that fired. ``calls`` of Python functions at their ticks, and the ``call_time``
-    s spent in them. ``preparation_time`` s for the native code to be compiled or loaded; ``wall_time`` s of
-    the run itself; ``real_time_factor`` simulated seconds per second of it. ``complete``: whether the stop
-    time was reached; ``message``: remarks for the user (reason of the end, stiffness), else empty.
+    ``solver``: name of the integrator, ``"none"`` without integration. ``reason``: reason for its choice.
+    ``steps``, ``rejected``: numbers of accepted and rejected steps. ``evaluations``: number of evaluations of
+    the derivative. ``ticks``: number of instants at which a clock ticked. ``events``: number of guards that
+    fired. ``calls``: number of calls of Python functions at ticks. ``call_time``: time in these calls, s.
+    ``preparation_time``: time to compile or load the native code, s. ``wall_time``: time of the run itself,
+    s. ``real_time_factor``: simulated time over ``wall_time``. ``complete``: whether the stop time was
+    reached. ``message``: remarks for the user (reason of the end, stiffness), else empty.
     """
 
     solver: str
@@ -59,7 +60,7 @@ class ParameterChange:
 
 @dataclass(frozen=True, kw_only=True)
 class LoggedFile:
-    """The log file with all ``rows`` of a run, of which the result has a selection."""
+    """A log file with all ``rows`` of a run; the result has a selection of these rows."""
 
     path: Path
     rows: int
@@ -69,12 +70,12 @@ class LoggedFile:
 class RunData:
     """Signals of one run. ``result["block/port"]`` is ``(N, *shape)``, a view.
 
-    ``time`` ``(N,)`` s; ``signals_layout`` the names, shapes and units of the ``ny`` rows of ``signals``
-    ``(ny, N)``; ``states`` ``(N, nx)`` by ``states_layout``; ``parameters`` the values that the run used, at
-    its end where there were ``parameter_changes``; ``final_state`` the state from which another run
-    continues, ``None`` for a failed run. ``given_jumps``: both sides of each jump between the samples. For a
-    run with a log file, the result has a selection of the file's rows with all extremes of the logged
-    signals; ``log`` has the path of the file.
+    ``time (N,)`` s. ``signals (ny, N)``: ``signals_layout`` has the names, shapes and units of its rows.
+    ``states (N, nx)``: ``states_layout`` has the names of its columns. ``parameters``: the values at the end
+    of the run, after ``parameter_changes``. ``final_state``: the state from which another run continues;
+    ``None`` for a failed run. ``given_jumps``: both sides of each jump between the samples. ``log``:
+    the log file, if any. The result then has a selection of the file's rows with all extremes of the logged
+    signals.
     """
 
     name: str
@@ -103,8 +104,8 @@ class RunData:
     def with_jumps(self) -> Self:
         """The result with two more rows for each jump: at the same time, the left limits, then the values.
 
-        A sample at the time of a jump is the second row. Files and figures have these rows. Times are then
-        ascending, but not strictly.
+        A sample at the time of a jump is the second row. Files and figures have these rows. The times ascend,
+        but not strictly.
         """
         jumps = self.jumps.table
         time, signals = merged(self.time, self.signals, jumps)
@@ -142,7 +143,7 @@ class RunData:
         return name in self.signals_layout.ranges or name in self.aliases
 
     def only(self, names: Mapping[str, str], rows: slice = slice(None)) -> Self:
-        """The result with only some signals, ``{new name: path}``, and only some samples.
+        """The result with selected signals, ``{new name: path}``, and selected samples.
 
         Raises ``UnknownNameError`` for a path that does not exist.
         """

@@ -1,8 +1,8 @@
 """The log of a run: its file, which is written during the run, and a view in memory.
 
-The size of the memory does not depend on the duration. The memory contains one window of samples, the data
-being written, and the view. Figures of the view look like figures of all rows. The view has complete rows: of
-each interval the first row, and the rows in which some signal has its minimum or maximum.
+The use of memory does not depend on the duration of the run: one window of samples, the data being written,
+and the view. Figures of the view look like figures of all rows. The view has complete rows: in each interval
+the first row, and the rows in which a signal has its minimum or maximum.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 VIEW_ROWS = 20_000
 """Approximate number of rows of the view: several for each pixel of a figure."""
 MAX_VIEW_ROWS = 4 * VIEW_ROWS
+"""Number of rows above which the intervals of the view are doubled."""
 WINDOW_NUMBERS = 2_000_000
 """Number of doubles of the window, 16 MB."""
 
@@ -49,7 +50,7 @@ class View:
         self._rows_in_interval = 0
 
     def append(self, columns: Array) -> None:
-        """More rows, ``(quantities, N)``."""
+        """Append rows, ``(quantities, N)``."""
         start, count = 0, columns.shape[1]
         while start < count:
             end = min(count, start + self._interval - self._rows_in_interval)
@@ -107,7 +108,7 @@ class RunLog:
 
     def append(self, time: Array, states: Array, signals: Array, *, samples: int) -> None:
         """Add rows: ``time (N,)``, ``states (N, nx)``, ``signals (ny, N)``, of which ``samples`` are samples
-        and the others sides of jumps. The caller must not change them later.
+        and all others are sides of jumps. The caller must not change them later.
 
         Raises ``FormatError`` if earlier samples could not be written.
         """
@@ -119,7 +120,7 @@ class RunLog:
         self._view.append(np.concatenate([time[np.newaxis], states.T, signals]))
 
     def view(self, signals: int) -> tuple[Array, Array, Array]:
-        """Time ``(N,)``, states ``(N, nx)`` and signals ``(ny, N)`` of the rows that are kept in memory."""
+        """Time ``(N,)``, states ``(N, nx)`` and signals ``(ny, N)`` of the rows of the view."""
         rows = self._view.rows() if self.rows else np.empty((1 + self._states + signals, 0))
         first = 1 + self._states
         return rows[0], np.ascontiguousarray(rows[1:first].T), rows[first:]

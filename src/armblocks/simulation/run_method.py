@@ -15,7 +15,7 @@ from armblocks.integration.rosenbrock_tableau import Tableau
 from armblocks.integration.run_point import Checkpoint, RunPoint, fits
 from armblocks.integration.system import CompiledSystem
 from armblocks.simulation.first_guess import first_guess
-from armblocks.simulation.jumps import most_sides
+from armblocks.simulation.jumps import max_sides
 from armblocks.simulation.plan import DEFAULT_INTERVALS, Plan
 from armblocks.simulation.run_state import RunState, damaged_state, settings_text
 
@@ -43,7 +43,7 @@ class RunMethod:
         self.solver = plan.solver
         """The name of the method, or the names of all methods of the run."""
         self.settings = ""
-        """Identifies the method and numbers. A run continues from a checkpoint only if they are equal."""
+        """Digest of method, numbers and parameters; it must be equal to continue from a checkpoint."""
         self.checkpoint: Checkpoint | None = None
         """The checkpoint of the loop before a change of the method, which belongs to the same part of the
         run."""
@@ -58,11 +58,10 @@ class RunMethod:
         return self._reason + self._start_reason
 
     def begin(self, p: Array, sample_times: Array, before: Integration | None) -> Integration | None:
-        """A loop for parameters ``p`` that records first at ``sample_times``; None for a system without
-        integration.
+        """A loop that records at ``sample_times``; ``None`` for a system without integration.
 
-        It starts at the present point of the loop ``before``, else from the initial state, else from the
-        initial values. Raises ``SimulationError`` for initial values that are not finite.
+        The loop starts at the present point of the loop ``before``, else from the initial state, else from
+        the initial values. Raises ``SimulationError`` for initial values that are not finite.
         """
         if self._tableau is None:
             return None
@@ -93,18 +92,18 @@ class RunMethod:
             stop=plan.sample_times.stop,
             # Independent of the stop time, so that a shorter run has bitwise the same samples.
             span=DEFAULT_INTERVALS * plan.sample_times.sample_time,
-            jumps=most_sides(compiled) if options.record_jumps else 0,
+            jumps=max_sides(compiled) if options.record_jumps else 0,
         )
 
     def change(self, integration: Integration) -> Integration:
         """Continue the run with the other of the two methods, from the present point."""
         first, stiff = self._plan.tableau, self._plan.stiff
         assert first is not None and stiff is not None
-        following = first if self._tableau is stiff else stiff
-        native = self._integrator(following)
+        next_tableau = first if self._tableau is stiff else stiff
+        native = self._integrator(next_tableau)
         self.checkpoint = integration.checkpoint
         when, step = f"{integration.time:.4g} s", f"{integration.last_step:.2g} s"
-        if following is first:
+        if next_tableau is first:
             self._reason += f"; from {when} {first.title}, because steps of {step} are stable now"
         elif self._changed:
             self._reason += f"; from {when} {stiff.title}"
@@ -113,8 +112,8 @@ class RunMethod:
                 f"auto: {first.title} until {when}, then {stiff.title}, because the system is "
                 f"stiff: stability, not accuracy, limited the explicit steps to {step}"
             )
-        self.solver += f", then {following.name}"
-        self._tableau, self._changed = following, True
+        self.solver += f", then {next_tableau.name}"
+        self._tableau, self._changed = next_tableau, True
         return native.continue_run(integration)
 
     def _continued_from(self, state: RunState) -> tuple[RunPoint, Checkpoint | None]:

@@ -24,9 +24,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Rows:
-    """Recorded samples from number ``begin`` on: ``time (N,)`` s, ``states (N, nx)``, and so on.
+    """Recorded samples from number ``begin`` on.
 
-    ``previous`` is the time of the sample before them, s.
+    ``time (N,)`` s, ``states (N, nx)``, ``discrete (N, nz)``, ``algebraic (N, nw)``, and the parameters ``p
+    (np,)``. ``previous`` is the time of the sample before these, s.
     """
 
     begin: int
@@ -65,9 +66,9 @@ Change = tuple[RunPoint, Array]
 class RunPart:
     """Records the samples of a run from number ``begin`` on; without states there is no integration.
 
-    With a ``window`` only that number of samples is in memory. A consumer receives them before the next ones
-    replace them. The time of a sample determines the step that records it. A chunk of steps with
-    more samples than fit into the window is therefore repeated for the remaining samples.
+    With a ``window``, at most that number of samples is in memory. A consumer receives the samples before the
+    next window replaces them. If a chunk of steps has more samples than fit into the window, the chunk is
+    repeated for the remaining samples.
     """
 
     def __init__(
@@ -80,8 +81,8 @@ class RunPart:
         change: Change | None = None,
         breakpoints: Array = NO_NUMBERS,
     ) -> None:
-        """``change``: the point and the parameters before, if this part begins with a change of parameters.
-        ``breakpoints``: jumps of sources, s; without integration they are recorded here."""
+        """``change``: the point and the parameters before a change of parameters at the begin of this part.
+        ``breakpoints``: times at which sources jump, s; they are recorded here without integration."""
         self.p = p
         self.integration = integration
         self.first = begin
@@ -90,7 +91,7 @@ class RunPart:
         """Number of the first sample in memory."""
         self.window = window
         self._change = change
-        self._breakpoints = _sides_of(breakpoints, sample_times) if integration is None else None
+        self._breakpoints = _breakpoint_sides(breakpoints, sample_times) if integration is None else None
         self._delivered = sample_times.start * SAME_ABOVE if begin == 0 else -np.inf
         """Instants up to this time (s) belong to another run or were received by a consumer."""
         self._sample_times = sample_times
@@ -130,7 +131,7 @@ class RunPart:
 
     @property
     def other_method_faster(self) -> bool:
-        """Whether another method is faster from here on."""
+        """Whether another method is faster from the present time on."""
         return self.integration is not None and self.integration.other_method_faster
 
     def rows(self, begin: int | None = None) -> Rows:
@@ -142,7 +143,7 @@ class RunPart:
         states, discrete, algebraic = (part[start:in_memory] for part in parts)
         return Rows(
             begin=self.begin + start,
-            # The times of the loop, because a block that ends the run adds the time of the end to them.
+            # The loop has the times: a block that ends the run adds the time of the end.
             time=(self._time if run is None else run.inputs[1])[start:in_memory],
             states=states,
             discrete=discrete,
@@ -157,7 +158,7 @@ class RunPart:
 
     def instants(self, begin: int, end: int) -> InstantRows:
         """Both sides of the instants of samples ``begin`` to ``end - 1``, without those that a consumer has
-        received. An instant belongs to the sample at its time, else to the next one."""
+        received. An instant belongs to the sample at its time, else to the next sample."""
         rows, sample = self._sides
         new = bisect_right(rows, self._delivered, key=_time)
         numbers = sample[new:, 0]
@@ -264,7 +265,7 @@ def first_window(sample_times: SampleTimes, begin: int, window: int | None) -> A
     return sample_times.part(begin, min(sample_times.count, begin + (window or sys.maxsize)))
 
 
-def _sides_of(breakpoints: Array, sample_times: SampleTimes) -> tuple[Array, Array]:
+def _breakpoint_sides(breakpoints: Array, sample_times: SampleTimes) -> tuple[Array, Array]:
     """Rows ``(M, 2, 2)`` and numbers of samples ``(M, 2)`` of the breakpoints inside a run."""
     inside = sorted({float(time) for time in breakpoints if sample_times.start < time <= sample_times.stop})
     times = np.array([[math.nextafter(time, -math.inf), time] for time in inside]).reshape(-1, 2)

@@ -1,8 +1,8 @@
 """The state of a run, from which another run continues, in memory or as a file.
 
-A run that ends at a given time must shorten its last step, which a longer run would not do. Besides the
-values at the end, a state therefore contains the arrays of the native loop before that last step. A run that
-continues with the same solver, settings and parameters repeats the step with its natural length, so that its
+A run that ends at a given time shortens its last step; a longer run would not. Besides the values at the end,
+a state therefore contains the arrays of the native loop before the last step. A run that continues with the
+same solver, settings and parameters repeats the step with its natural length, and its
 samples are identical to those of the uninterrupted run. With other settings or parameters, or changed values,
 a run restarts from the values at ``time``.
 """
@@ -30,7 +30,9 @@ from armblocks.integration.workspace import Count, Scalar
 Array = NDArray[np.float64]
 
 FORMAT = "armblocks run state 1"
-LARGEST_FILE = 1 << 30
+"""Name and version of the file format."""
+MAX_FILE_SIZE = 1 << 30
+"""Maximum size of a file, bytes."""
 _PARTS = ("states", "discrete", "algebraic")
 
 
@@ -38,9 +40,9 @@ _PARTS = ("states", "discrete", "algebraic")
 class RunState:
     """State of a run of system ``name`` at ``time`` (s), after the ticks and events of that instant.
 
-    ``states (nx,)``, ``discrete (nz,)`` and ``algebraic (nw,)`` are flat, ``names`` the slots of each.
-    ``settings`` are the method and the numbers with which a run can continue from ``checkpoint``. Both are
-    internal data of the integrator.
+    ``states (nx,)``, ``discrete (nz,)`` and ``algebraic (nw,)`` are flat; ``names`` has the slot names of
+    each. ``settings`` are the method and the numbers with which a run can continue from ``checkpoint``. Both
+    are internal data of the integrator.
     """
 
     name: str
@@ -52,8 +54,8 @@ class RunState:
     settings: str = ""
     checkpoint: Checkpoint | None = None
     past: Array = field(default_factory=lambda: np.empty(0))
-    """The history of delayed signals in the integrator's form. Empty: they had their initial values
-    before."""
+    """The history of delayed signals in the integrator's form. If empty, the signals had their initial values
+    before ``time``."""
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write a file of NumPy's ``.npz`` format, atomically. Raises ``FormatError``."""
@@ -81,7 +83,7 @@ class RunState:
     @classmethod
     def load(cls, path: str | PathLike[str]) -> RunState:
         """Inverse of :meth:`save`, bitwise exact. Raises ``FormatError`` for any other file."""
-        data = read_bounded(Path(path), LARGEST_FILE)
+        data = read_bounded(Path(path), MAX_FILE_SIZE)
         try:
             with np.load(io.BytesIO(data), allow_pickle=False) as stored:
                 arrays: dict[str, NDArray[Any]] = {name: stored[name] for name in stored.files}
@@ -114,7 +116,7 @@ class RunState:
             raise FormatError(
                 "this file contains no run state",
                 where=str(path),
-                allowed="what RunState.save wrote",
+                allowed="a file written by RunState.save",
                 fix="save the state again: result.final_state.save(path)",
             ) from error
 
@@ -153,7 +155,7 @@ def damaged_state(state: RunState, where: str) -> InputError:
     return InputError(
         f"the state of '{state.name}' at {state.time:g} s is damaged: its arrays have other sizes or indices",
         where=where,
-        allowed="the final_state of a result, or what RunState.load read",
+        allowed="the final_state of a result, or a state from RunState.load",
         fix="save the state again: result.final_state.save(path)",
     )
 

@@ -10,7 +10,7 @@ from armblocks.errors import UnknownNameError
 
 
 def element_names(slot: Slot) -> tuple[str, ...]:
-    """A name for each scalar of a quantity; a signal that the user has named has this name."""
+    """A name for each scalar of a quantity; a user's signal name replaces the path."""
     return replace(slot, name=slot.title).elements if slot.title else slot.elements
 
 

@@ -40,12 +40,12 @@ CHUNK_SECONDS = 0.04
 class Simulation:
     """One run in progress, from 0 or an ``initial_state`` to ``options.stop_time``.
 
-    :meth:`advance` continues the run, :meth:`samples` returns the recorded samples, :meth:`set` changes
-    tunable parameters from the present time on without compiling, :meth:`state` is a state from which another
-    run can start, and :meth:`result` ends the run. Results do not depend on the division into calls of
+    :meth:`advance` continues the run. :meth:`samples` returns the recorded samples. :meth:`set` changes
+    tunable parameters from the present time on, without compiling. :meth:`state` returns a state from which
+    another run can start. :meth:`result` ends the run. Results do not depend on the division into calls of
     :meth:`advance`.
 
-    Raises what :func:`~armblocks.simulation.simulate` raises for options and parameters that cannot be run.
+    Raises the errors of :func:`~armblocks.simulation.simulate` for invalid options and parameters.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class Simulation:
         self._plan = make_plan(compiled, options, start, logged=log is not None)
         self._method = RunMethod(compiled, options, self._plan, initial_state)
         self.signals_layout = signals_layout or compiled.signals_layout
-        """The layout of the compiled system, or one like it that also names entries of signals."""
+        """The layout of the compiled system, possibly with names of the entries of signals in addition."""
         self._recording = Recording(compiled, self._plan.sample_times, log, self.signals_layout)
         self._message = ""
         self._stopped = False
@@ -94,7 +94,7 @@ class Simulation:
 
     @property
     def time(self) -> float:
-        """Time that is reached, s: the end of the last step."""
+        """Present time of the run, s: the end of the last step."""
         return self._parts[-1].time if self._parts else self._plan.sample_times.start
 
     @property
@@ -116,7 +116,7 @@ class Simulation:
 
     @property
     def wall_time(self) -> float:
-        """Time that the run has taken so far, without pauses, s."""
+        """Wall time of the run so far, without pauses, s."""
         return self._wall_time
 
     @property
@@ -148,7 +148,7 @@ class Simulation:
         if self.finished:
             return
         began, prepared = perf_counter(), self._method.preparation_time
-        part = self._current()
+        part = self._current_part()
         pause = np.inf if until is None else float(until)
         if exactly and part.integration is not None and self.time < pause < self.stop_time:
             part.integration.end_step_at(pause)
@@ -232,7 +232,7 @@ class Simulation:
             self._changes += (ParameterChange(time=self.time, values=values),)
 
     def stop(self, message: str) -> None:
-        """End the run at the present time; ``message`` is the reason for its report."""
+        """End the run at the present time; ``message`` states the reason in the report."""
         if not self.finished:
             self._stopped = True
             self._message = message
@@ -276,7 +276,7 @@ class Simulation:
         if self._failure is not None:
             raise self._failure
         if not self._parts:
-            self._current()
+            self._current_part()
         self._write_remaining()
         result = self._result(None)
         if self._failure is not None:
@@ -289,7 +289,7 @@ class Simulation:
     def _parts(self) -> list[RunPart]:
         return self._recording.parts
 
-    def _current(self) -> RunPart:
+    def _current_part(self) -> RunPart:
         """The present part of the run, created at the start and after a change of parameters."""
         if self._parts and not self._changed:
             return self._parts[-1]
@@ -326,13 +326,13 @@ class Simulation:
             self._fail(failure)
 
     def _fail(self, failure: SimulationError) -> NoReturn:
-        """Raise the error with the valid samples; an earlier non-finite signal is the first cause."""
+        """Raise the error with the valid samples. An earlier non-finite signal is raised instead."""
         self._result(failure)
         assert self._failure is not None
         raise self._failure
 
     def _result(self, failure: SimulationError | None) -> SimulationResult:
-        """The present result; ``_failure`` is the error, with the result as its ``partial``."""
+        """The present result. Sets ``_failure`` to the error of the run, with the result as ``partial``."""
         began = perf_counter()
         samples, compiled = self._recording.valid_samples(), self.compiled
         integrations = self._recording.integrations

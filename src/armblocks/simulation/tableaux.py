@@ -1,7 +1,7 @@
 """All integrators: the tables in the modules of ``simulation/methods``.
 
-A new integrator is one file there. Names are matched without regard to case; Simulink's and SciPy's names are
-accepted as aliases.
+To add an integrator, add a file there. Names are matched without regard to case; Simulink's and SciPy's names
+are accepted as aliases.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from armblocks.simulation.methods.runge_kutta import RK45
 
 
 def _sort_key(tableau: Tableau) -> tuple[bool, bool, int]:
-    """Sort key: explicit methods first, fixed-step before adaptive ones, then by ascending order."""
+    """Sort key: explicit before implicit, fixed-step before adaptive methods, then ascending order."""
     return isinstance(tableau, RosenbrockTableau), tableau.adaptive, tableau.order
 
 
 TABLEAUX: tuple[Tableau, ...] = tuple(
     sorted(values_in("armblocks.simulation.methods", (ButcherTableau, RosenbrockTableau)), key=_sort_key)
 )
-"""All integrators: the explicit ones, then those for stiff systems."""
+"""All integrators: explicit methods, then methods for stiff systems."""
 
 DEFAULT = RK45
 """The method with which ``auto`` begins for a system with states."""
@@ -34,7 +34,7 @@ _BY_NAME = {name.casefold(): tableau for tableau in TABLEAUX for name in (tablea
 
 
 def find_tableau(name: str, where: str = "") -> Tableau:
-    """The integrator of this name or alias, in any case. ``where``: the system that is to be run.
+    """The integrator of this name or alias, regardless of case. ``where``: the name of the system.
 
     Raises ``UnknownNameError`` with the nearest name.
     """

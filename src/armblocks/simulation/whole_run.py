@@ -17,6 +17,7 @@ Progress = Callable[[float, float, float], None]
 """Called with the simulated time (s), the fraction of the whole (0 to 1) and the real-time factor."""
 
 PROGRESS_SECONDS = 0.06
+"""Approximate wall time between two calls of ``progress``, s."""
 
 
 def simulate(
@@ -30,9 +31,9 @@ def simulate(
     """Run ``compiled`` from 0 to ``options.stop_time`` and record its signals.
 
     With an ``initial_state`` (the ``final_state`` of another run) the run continues from there to
-    ``stop_time``. If solver, settings and parameters are the same, the result is bitwise that of one
-    uninterrupted run, else the integration restarts from the values of the state. ``run.reason`` says which
-    of the two happened.
+    ``stop_time``. If solver, settings and parameters are the same, the result is bitwise equal to that
+    of an uninterrupted run. Otherwise the integration restarts from the values of the state. ``run.reason``
+    states which case applies.
 
     ``parameters`` changes tunable parameters: a mapping from ``block.parameter``, or the flat vector
     ``(np,)``. ``progress(time, fraction, real_time_factor)`` is called at most about 16 times a second, and

@@ -92,7 +92,7 @@ def from_quaternion(quaternion: SX) -> SX:
 def to_quaternion(R: SX) -> SX:
     """The unit quaternion (4, 1) with s >= 0, by Shepperd's method, which divides by the largest element.
 
-    A half turn (s = 0) has two such quaternions; the quaternion jumps when the rotation passes a half turn.
+    A rotation by pi (s = 0) has two such quaternions. The quaternion jumps when the angle passes pi.
     """
     trace = R[0, 0] + R[1, 1] + R[2, 2]
     antisymmetric = (R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1])
@@ -124,19 +124,18 @@ def to_angle_axis(R: SX) -> tuple[SX, SX]:
     return 2.0 * atan2(length, quaternion[0]), axis
 
 
-def part_of_turn(quaternion: SX, s: SX) -> SX:
-    """The quaternion (4, 1) of the rotation by ``s`` times the angle of a unit quaternion, about the same
-    axis.
+def fraction_of_rotation(quaternion: SX, s: SX) -> SX:
+    """The quaternion (4, 1) of a rotation about the axis of a unit quaternion, by ``s`` times its angle.
 
-    The result is smooth also at the identity, which has no axis: the vector part is multiplied by ``s``
-    there.
+    The result is also smooth at the identity, which has no axis: there the vector part is multiplied by
+    ``s``.
     """
     vector = quaternion[1:]
     square = dot(vector, vector)
-    none = square < 1e-16
-    length = sqrt(if_else(none, 1.0, square))
+    is_identity = square < 1e-16
+    length = sqrt(if_else(is_identity, 1.0, square))
     half = s * atan2(length, quaternion[0])
-    return vertcat(if_else(none, 1.0, cos(half)), if_else(none, s, sin(half) / length) * vector)
+    return vertcat(if_else(is_identity, 1.0, cos(half)), if_else(is_identity, s, sin(half) / length) * vector)
 
 
 def quaternion_product(left: SX, right: SX) -> SX:

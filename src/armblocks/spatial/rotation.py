@@ -1,7 +1,7 @@
 """Three-vectors and rotation matrices as tuples of floats, so that descriptions can be compared and hashed.
 
-Quarter turns are exact: ``cos(pi/2)`` is 0 and not 6e-17. The matrices of an arm with perpendicular axes then
-have exact zeros, and the traced equations omit the terms that these multiply.
+Rotations by multiples of 90 degrees are exact: ``cos(pi/2)`` is 0 and not 6e-17. The matrices of an arm with
+perpendicular axes then have exact zeros, and the traced equations omit the terms that these multiply.
 """
 
 from __future__ import annotations
@@ -23,8 +23,10 @@ Matrix3: TypeAlias = tuple[Vector3, Vector3, Vector3]
 IDENTITY3: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 SINGULAR = 2.2e-15
-"""If the cosine of the middle one of three angles is below this value (ten roundings), only the sum or the
-difference of the other two is determined."""
+"""Maximum cosine of the middle one of three angles at which the orientation is singular: ten roundings.
+
+Only the sum or the difference of the other two angles is then determined.
+"""
 
 
 def vector3(value: ArrayLike, *, where: str = "") -> Vector3:
@@ -64,22 +66,19 @@ def _numbers(value: ArrayLike, where: str) -> NDArray[np.float64]:
 
 
 def cos_exact(angle: float) -> float:
-    """cos of an angle in rad; exactly 1, 0 or -1 if the angle is, up to rounding, a multiple of a quarter
-    turn."""
+    """cos of an angle (rad); exactly 1, 0 or -1 for multiples of pi/2, up to rounding of the angle."""
     quarter = _quarter_turn(angle)
     return cos(angle) if quarter is None else (1.0, 0.0, -1.0, 0.0)[quarter]
 
 
 def sin_exact(angle: float) -> float:
-    """sin of an angle in rad; exactly 1, 0 or -1 if the angle is, up to rounding, a multiple of a quarter
-    turn."""
+    """sin of an angle (rad); exactly 1, 0 or -1 for multiples of pi/2, up to rounding of the angle."""
     quarter = _quarter_turn(angle)
     return sin(angle) if quarter is None else (0.0, 1.0, 0.0, -1.0)[quarter]
 
 
 def _quarter_turn(angle: float) -> int | None:
-    """The number of quarter turns (modulo four) of ``angle``, within four roundings; None for other
-    angles."""
+    """``angle / (pi/2)`` modulo four for multiples of pi/2, within four roundings; None for other angles."""
     if not math.isfinite(angle):
         return None
     turns = round(angle / (math.pi / 2))
@@ -106,8 +105,7 @@ def rotation_z(angle: float) -> Matrix3:
 
 
 def rotation_about(axis: Vector3, angle: float) -> Matrix3:
-    """Rotation by ``angle`` rad about the unit vector ``axis``: ``c I + s [k] + (1 - c) k k'``
-    (Rodrigues)."""
+    """Rotation by ``angle`` rad about the unit vector ``axis`` k: ``c I + s [k] + (1 - c) k k'``."""
     x, y, z = axis
     c, s = cos_exact(angle), sin_exact(angle)
     v = 1.0 - c

@@ -23,16 +23,16 @@ from armblocks.spatial.rotation import (
 )
 
 ORTHONORMALITY = 1e-8
-"""Maximum deviation of ``R' R`` from the identity: matrices with eight printed digits pass, with four do
-not."""
+"""Maximum deviation of ``R' R`` from the identity. Matrices with eight digits are accepted, with four not."""
 
 
 @dataclass(frozen=True, init=False)
 class Transform:
     """The pose of frame b in frame a: ``p_a = rotation p_b + translation`` (m).
 
-    A value, equal and hashable by its content. ``T_ac = T_ab @ T_bc``. Raises InputError if ``rotation`` is
-    not a rotation matrix. NaN is accepted, because the check of the robot can name the link.
+    Transforms are values: they are equal if their numbers are equal. ``T_ac = T_ab @ T_bc``. Raises
+    InputError if ``rotation`` is not a rotation matrix. NaN is accepted here; the robot rejects it with an
+    error that names the link.
     """
 
     rotation: Matrix3
@@ -59,7 +59,7 @@ class Transform:
 
     @classmethod
     def from_matrix(cls, matrix: ArrayLike) -> Transform:
-        """From a homogeneous (4, 4) matrix; raises InputError if its last row is not 0 0 0 1."""
+        """The transform of a homogeneous (4, 4) matrix. Raises InputError if the last row is not 0 0 0 1."""
         T = np.asarray(matrix, dtype=np.float64)
         if T.shape != (4, 4):
             raise InputError(
@@ -122,7 +122,7 @@ class Transform:
         return Transform(rotation=rotation, translation=self.apply(other.translation))
 
     def apply(self, point: Vector3) -> Vector3:
-        """A point (m) of frame b in frame a."""
+        """The coordinates in frame a of a point (m) in frame b."""
         x, y, z = (_dot(row, point) + offset for row, offset in zip(self.rotation, self.translation))
         return x, y, z
 
@@ -165,15 +165,15 @@ def _check_rotation(rotation: Matrix3) -> None:
     error = float(np.abs(R.T @ R - np.eye(3)).max())
     if error > ORTHONORMALITY:
         raise InputError(
-            f"a matrix that should be a rotation is not: R'R differs from the identity by {error:.3g}",
+            f"the rotation matrix is not orthonormal: R'R differs from the identity by {error:.3g}",
             allowed=f"at most {ORTHONORMALITY:g}",
-            fix="give its numbers with more digits, or build it from angles with trotx, troty, trotz",
+            fix="give the matrix with more digits, or build it from angles with trotx, troty, trotz",
             where="rotation of a transform",
         )
     if np.linalg.det(R) < 0:
         raise InputError(
-            "a matrix that should be a rotation is a mirror (its determinant is -1)",
+            "the rotation matrix is a reflection (its determinant is -1)",
             allowed="determinant +1",
-            fix="check the sign of one of its axes",
+            fix="check the signs of the axes",
             where="rotation of a transform",
         )

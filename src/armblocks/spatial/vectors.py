@@ -1,7 +1,8 @@
 """Three-vectors and 3x3 matrices of scalars that may be numbers or symbols.
 
-The algorithms use these types for both. Terms with a known zero factor are omitted during tracing (CasADi
-folds ``0 * x``, ``1 * x`` and ``0 + x``), so arms with many zeros in their tables have short equations.
+The same algorithms therefore evaluate numbers and trace symbols. Terms with a known zero factor are omitted
+during tracing (CasADi folds ``0 * x``, ``1 * x`` and ``0 + x``), so arms with many zeros in their tables have
+short equations.
 """
 
 from __future__ import annotations
@@ -31,52 +32,52 @@ class Symmetric(NamedTuple):
 
 
 def add(a: Vector, b: Vector) -> Vector:
-    """a + b."""
+    """The sum a + b."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 def subtract(a: Vector, b: Vector) -> Vector:
-    """a - b."""
+    """The difference a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 def scale(k: Scalar, a: Vector) -> Vector:
-    """k a."""
+    """The vector a times the scalar k."""
     return k * a[0], k * a[1], k * a[2]
 
 
 def dot(a: Vector, b: Vector) -> Scalar:
-    """a' b."""
+    """The dot product a' b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """a x b."""
+    """The cross product a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def rotate(R: Matrix, a: Vector) -> Vector:
-    """R a."""
+    """The product R a."""
     return dot(R[0], a), dot(R[1], a), dot(R[2], a)
 
 
 def rotate_back(R: Matrix, a: Vector) -> Vector:
-    """R' a."""
+    """The product R' a."""
     return rotate(transpose(R), a)
 
 
 def transpose(R: Matrix) -> Matrix:
-    """R'."""
+    """The transpose R'."""
     return (R[0][0], R[1][0], R[2][0]), (R[0][1], R[1][1], R[2][1]), (R[0][2], R[1][2], R[2][2])
 
 
 def multiply(A: Matrix, B: Matrix) -> Matrix:
-    """A B."""
+    """The product A B."""
     return transpose((rotate(A, _column(B, 0)), rotate(A, _column(B, 1)), rotate(A, _column(B, 2))))
 
 
 def multiply_symmetric(S: Symmetric, a: Vector) -> Vector:
-    """S a."""
+    """The product S a."""
     return (
         S.xx * a[0] + S.xy * a[1] + S.xz * a[2],
         S.xy * a[0] + S.yy * a[1] + S.yz * a[2],
@@ -85,7 +86,7 @@ def multiply_symmetric(S: Symmetric, a: Vector) -> Vector:
 
 
 def rotate_symmetric(R: Matrix, S: Symmetric) -> Symmetric:
-    """R S R'."""
+    """The product R S R'."""
     SRt = tuple(multiply_symmetric(S, row) for row in R)
     return Symmetric(
         xx=dot(R[0], SRt[0]),
@@ -98,7 +99,7 @@ def rotate_symmetric(R: Matrix, S: Symmetric) -> Symmetric:
 
 
 def add_symmetric(A: Symmetric, B: Symmetric) -> Symmetric:
-    """A + B."""
+    """The sum A + B."""
     return Symmetric(*(a + b for a, b in zip(A, B)))
 
 
@@ -109,15 +110,15 @@ class RotationZ(NamedTuple):
     s: Scalar
 
     def rotate(self, a: Vector) -> Vector:
-        """Rz a."""
+        """The product Rz a."""
         return self.c * a[0] - self.s * a[1], self.s * a[0] + self.c * a[1], a[2]
 
     def rotate_back(self, a: Vector) -> Vector:
-        """Rz' a."""
+        """The product Rz' a."""
         return self.c * a[0] + self.s * a[1], self.c * a[1] - self.s * a[0], a[2]
 
     def rotate_symmetric(self, S: Symmetric) -> Symmetric:
-        """Rz S Rz', with six products for the 2x2 block, which rotates by twice the angle."""
+        """The product Rz S Rz', with six products for the 2x2 block, which rotates by twice the angle."""
         c, s = self
         difference = S.yy - S.xx
         doubled = S.xy + S.xy

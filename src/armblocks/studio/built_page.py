@@ -12,12 +12,12 @@ from pathlib import Path
 
 from armblocks.errors import FormatError
 
-WEB = Path(__file__).parent / "web"
-BUILD = Path(__file__).parents[3] / "frontend" / "build_page.py"
+PAGE_FOLDER = Path(__file__).parent / "web"
+BUILD_SCRIPT = Path(__file__).parents[3] / "frontend" / "build_page.py"
 """The script that builds the page; it exists only in a checkout."""
 
 
-def built_page(folder: Path = WEB, script: Path = BUILD) -> Path:
+def built_page(folder: Path = PAGE_FOLDER, script: Path = BUILD_SCRIPT) -> Path:
     """Return the folder of the built page; raise ``FormatError`` with the remedy if the page is missing."""
     if not (folder / "index.html").is_file():
         raise FormatError(
@@ -29,7 +29,9 @@ def built_page(folder: Path = WEB, script: Path = BUILD) -> Path:
     return folder
 
 
-def build_in_checkout(notify: Callable[[str], None], folder: Path = WEB, script: Path = BUILD) -> None:
+def build_in_checkout(
+    notify: Callable[[str], None], folder: Path = PAGE_FOLDER, script: Path = BUILD_SCRIPT
+) -> None:
     """Build the page if it is missing and its sources are present; call ``notify`` with one line first.
 
     The build writes its progress to standard error. Raises ``FormatError`` if the build fails.

@@ -31,10 +31,12 @@ if TYPE_CHECKING:
     from anywidget import AnyWidget
 
 HEIGHT = 460
+"""Default height of a widget, px."""
 PARTS = ("scopes", "robot")
 DISPLAYED_KINDS = (ViewKind.TRACES, ViewKind.PATH, ViewKind.ROBOT)
 SCRIPT = Path(__file__).parent / "notebook_widget.js"
 DRAWING_SIZE = (480, 360)
+"""Width and height of the static drawing of an arm, px."""
 
 
 def run_widget(
@@ -74,18 +76,18 @@ def robot_widget(robot: Arm | Robot, q: ArrayLike | None = None, *, height: int 
     Raises ``InputError`` for a wrong number of coordinates, ``MissingLibraryError`` if anywidget is not
     installed.
     """
-    described = robot.robot if isinstance(robot, Arm) else robot
-    shown = {"key": described.name, "run": None, "scopes": False, "arm": _arm("", described, q)}
-    return _widget(f"Robot {described.name}", height, shown, b"")
+    described_robot = robot.robot if isinstance(robot, Arm) else robot
+    shown = {"key": described_robot.name, "run": None, "scopes": False, "arm": _arm("", described_robot, q)}
+    return _widget(f"Robot {described_robot.name}", height, shown, b"")
 
 
 def _arm(path: str, robot: Robot, q: ArrayLike | None = None) -> dict[str, Any]:
-    at = [0.0] * len(robot.moving_links) if q is None else np.asarray(q, dtype=np.float64).tolist()
+    q_list = [0.0] * len(robot.moving_links) if q is None else np.asarray(q, dtype=np.float64).tolist()
     return {
         "path": path,
         "scene": asdict(scene_of(robot)),
-        "rest": link_frames_of(robot, at),
-        "drawing": arm_picture_svg(robot, at, DRAWING_SIZE),
+        "rest": link_frames_of(robot, q_list),
+        "drawing": arm_picture_svg(robot, q_list, DRAWING_SIZE),
     }
 
 
@@ -132,7 +134,7 @@ def _widget(title: str, height: int, shown: dict[str, Any], frame: bytes) -> Any
 
 @cache
 def _page() -> str:
-    """The HTML document inside the frame, with its script and styles inline."""
+    """Return the HTML document of the iframe, with its script and styles inline."""
     folder = built_page() / "notebook"
     script = (folder / "frame.js").read_text(encoding="utf-8").replace("</script", "<\\/script")
     styles = (folder / "frame.css").read_text(encoding="utf-8").replace("</style", "<\\/style")
@@ -149,7 +151,7 @@ def _widget_class() -> type[AnyWidget]:
         import traitlets
 
     class StudioWidget(anywidget.AnyWidget):
-        """One frame with views of the studio."""
+        """An iframe with views of the studio."""
 
         _esm = SCRIPT
         _page = traitlets.Unicode().tag(sync=True)

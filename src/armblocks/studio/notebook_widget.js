@@ -1,5 +1,5 @@
-// The page's views in a notebook, by the protocol of anywidget (https://anywidget.dev). They live in a frame, so that
-// neither the notebook's styles reach them nor theirs the notebook; all that they need comes with the widget.
+// The studio's views in a notebook, as a widget of anywidget (https://anywidget.dev). An iframe separates the
+// styles of the views from those of the notebook. The widget contains all scripts and styles of the iframe.
 
 const isDark = () => {
   const { classList, dataset } = document.body
@@ -14,35 +14,36 @@ function render({ model, el }) {
   const frame = document.createElement('iframe')
   frame.title = model.get('title')
   frame.style.cssText = `display: block; width: 100%; height: ${model.get('height')}px; border: 0`
-  const say = (message) => frame.contentWindow?.postMessage(message, '*')
-  const show = () => say({ ...model.get('_shown'), kind: 'show', dark: isDark(), frame: bytes(model.get('_frame')) })
-  const dress = () => say({ kind: 'theme', dark: isDark() })
-  const move = () => say({ kind: 'time', time: model.get('time') })
-  const hear = ({ source, data }) => {
+  const send = (message) => frame.contentWindow?.postMessage(message, '*')
+  const sendContent = () =>
+    send({ ...model.get('_shown'), kind: 'show', dark: isDark(), frame: bytes(model.get('_frame')) })
+  const sendTheme = () => send({ kind: 'theme', dark: isDark() })
+  const sendTime = () => send({ kind: 'time', time: model.get('time') })
+  const receive = ({ source, data }) => {
     if (source !== frame.contentWindow) return
     if (data.kind === 'ready') {
-      show()
-      if (model.get('time') !== null) move()
+      sendContent()
+      if (model.get('time') !== null) sendTime()
     } else if (data.kind === 'time') {
       model.set('time', data.time)
       model.save_changes()
     }
   }
-  const system = matchMedia('(prefers-color-scheme: dark)')
-  const notebook = new MutationObserver(dress)
-  addEventListener('message', hear)
-  system.addEventListener('change', dress)
-  notebook.observe(document.body, { attributeFilter: ['class', 'data-jp-theme-light'] })
-  model.on('change:_shown', show)
-  model.on('change:time', move)
+  const systemTheme = matchMedia('(prefers-color-scheme: dark)')
+  const themeObserver = new MutationObserver(sendTheme)
+  addEventListener('message', receive)
+  systemTheme.addEventListener('change', sendTheme)
+  themeObserver.observe(document.body, { attributeFilter: ['class', 'data-jp-theme-light'] })
+  model.on('change:_shown', sendContent)
+  model.on('change:time', sendTime)
   frame.srcdoc = model.get('_page')
   el.append(frame)
   return () => {
-    removeEventListener('message', hear)
-    system.removeEventListener('change', dress)
-    notebook.disconnect()
-    model.off('change:_shown', show)
-    model.off('change:time', move)
+    removeEventListener('message', receive)
+    systemTheme.removeEventListener('change', sendTheme)
+    themeObserver.disconnect()
+    model.off('change:_shown', sendContent)
+    model.off('change:time', sendTime)
   }
 }
 

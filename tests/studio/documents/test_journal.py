@@ -1,4 +1,4 @@
-"""Reading a journal returns all complete records, whatever the damage at its end."""
+"""Reading a journal with a damaged end returns all complete records."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from armblocks.studio.documents.project_folder import ProjectFolder
 TRIALS = int(os.environ.get("ARMBLOCKS_KILLED_SAVES", "12"))
 """Number of interrupted saves; 500 in the long version."""
 SIZE = 4 * 2**20
-SAVE_WITHOUT_END = """
+SAVE_LOOP = """
 import sys
 from armblocks.studio.documents.project_folder import ProjectFolder
 folder = ProjectFolder(sys.argv[1])
@@ -35,20 +35,20 @@ def test_a_killed_save_leaves_a_complete_file_no_older_than_acknowledged(tmp_pat
     path = tmp_path / "a.json"
     number = 0
     for _ in range(TRIALS):
-        command = [sys.executable, "-c", SAVE_WITHOUT_END, str(tmp_path), str(number), str(SIZE)]
+        command = [sys.executable, "-c", SAVE_LOOP, str(tmp_path), str(number), str(SIZE)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
             acknowledged = int(process.stdout.readline())
             sleep(random_.uniform(0, 0.15))
             process.kill()
             acknowledged = max([acknowledged, *map(int, process.stdout.read().split())])
-        held = json.loads(path.read_text())
-        assert len(held["text"]) == SIZE
-        assert held["number"] in (acknowledged, acknowledged + 1)
-        number = held["number"]
-    for left in tmp_path.glob(".*"):
-        os.utime(left, (0, 0))
-    ProjectFolder(tmp_path).sweep(["a.json"])
+        saved = json.loads(path.read_text())
+        assert len(saved["text"]) == SIZE
+        assert saved["number"] in (acknowledged, acknowledged + 1)
+        number = saved["number"]
+    for stray_file in tmp_path.glob(".*"):
+        os.utime(stray_file, (0, 0))
+    ProjectFolder(tmp_path).remove_stray_files(["a.json"])
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.json"]
 
 

@@ -85,7 +85,7 @@ def test_partly_written_files_of_a_killed_save_are_removed(folder: ProjectFolder
         path.write_bytes(b"")
     os.utime(old, (0, 0))
     os.utime(mine, (0, 0))
-    folder.sweep(["arms/a.json", "../elsewhere.json"])
+    folder.remove_stray_files(["arms/a.json", "../elsewhere.json"])
     assert [path.exists() for path in (old, fresh, mine)] == [False, True, True]
 
 

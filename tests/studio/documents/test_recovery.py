@@ -136,9 +136,11 @@ def test_a_journal_cut_anywhere_recovers_the_complete_edits_before_the_cut(
                 waiting = other.documents()
                 applied = record - 2 if cut >= ends[record] else record - 3
                 if applied < 0:
-                    assert [entry.missing != "" for entry in waiting.recoverable.offers()] == [True]
+                    assert [entry.missing != "" for entry in waiting.recoverable.descriptions()] == [True]
                     continue
-                assert [entry.edits for entry in waiting.recoverable.offers()] == [applied] * (applied > 0)
+                assert [entry.edits for entry in waiting.recoverable.descriptions()] == [applied] * (
+                    applied > 0
+                )
                 if applied > 0:
                     recovered = await waiting.recover(
                         document_messages.Recover(document=open_file.key, action="open")
@@ -168,7 +170,7 @@ def test_a_page_finds_its_document_after_a_server_restart(disk: Disk) -> None:
         first = disk.documents()
         new = first.new()
         await first.save(new, "a.json", overwrite=False)
-        first.end()
+        first.close_all()
         documents = disk.documents()
         key = "0123456789abcdef"
         open_file = documents.attach(key, path="a.json")
@@ -197,7 +199,7 @@ def test_a_file_newer_than_the_journal_is_kept_beside_the_recovered_file(disk: D
         theirs.write_bytes(theirs.read_bytes().replace(b'"gain"', b'"other"'))
         newer = theirs.read_bytes()
         after = after_crash.documents()
-        (recovery,) = after.recoverable.offers()
+        (recovery,) = after.recoverable.descriptions()
         assert (recovery.path, recovery.disk, recovery.edits) == ("a.json", "changed", 1)
         recovered = await after.recover(document_messages.Recover(document=open_file.key, action="keep_both"))
         assert recovered is not None
@@ -206,7 +208,7 @@ def test_a_file_newer_than_the_journal_is_kept_beside_the_recovered_file(disk: D
         assert theirs.read_bytes() == newer
         assert sorted(recovered.document.diagram.blocks) == ["gain", "mine"]
         assert not recovered.document.dirty
-        assert after.recoverable.offers() == []
+        assert after.recoverable.descriptions() == []
 
     run_async(scenario)
 
@@ -235,15 +237,15 @@ def test_a_recovery_is_discarded_only_on_request(disk: Disk, tmp_path: Path) -> 
         open_file = documents.new()
         documents.perform(open_file, change("1", add("gain")))
         second = disk.as_after_a_crash(tmp_path / "second")
-        second.documents().end()
+        second.documents().close_all()
         after = second.documents()
-        assert len(after.recoverable.offers()) == 1
+        assert len(after.recoverable.descriptions()) == 1
         assert (
             await after.recover(document_messages.Recover(document=open_file.key, action="discard")) is None
         )
         with pytest.raises(ArmblocksError, match="there is no diagram to recover named"):
             await after.recover(document_messages.Recover(document=open_file.key, action="open"))
-        assert second.documents().recoverable.offers() == []
+        assert second.documents().recoverable.descriptions() == []
 
     run_async(scenario)
 
@@ -257,7 +259,7 @@ def test_saved_diagrams_leave_no_journal(disk: Disk) -> None:
         with pytest.raises(InputError, match="'untitled' has unsaved edits"):
             documents.close(open_file, discard=False)
         await documents.save(open_file, "a.json", overwrite=False)
-        documents.end()
+        documents.close_all()
         assert list(disk.state_folder.journals.iterdir()) == []
 
     run_async(scenario)
@@ -280,7 +282,7 @@ def test_a_missing_robot_file_is_reported_and_the_journal_remains(disk: Disk, tm
         documents.perform(open_file, change("2", AddBlocks(blocks=[block])))
         second = disk.as_after_a_crash(tmp_path / "second")
         after = OpenDocuments(second.project, second.state_folder, lambda name: load_robot("no " + name))
-        (recovery,) = after.recoverable.offers()
+        (recovery,) = after.recoverable.descriptions()
         assert recovery.missing.startswith("the last 1 edits could not be repeated")
         recovered = await after.recover(document_messages.Recover(document=open_file.key, action="open"))
         assert recovered is not None
@@ -385,7 +387,7 @@ def test_an_unreadable_journal_is_not_overwritten(disk: Disk) -> None:
         with pytest.raises(FormatError, match="the journal contains no complete record"):
             documents.attach(key)
         assert journal.read_bytes() == b"nothing that is a journal"
-        assert [offer.document for offer in documents.recoverable.offers()] == [key]
+        assert [offer.document for offer in documents.recoverable.descriptions()] == [key]
 
     run_async(scenario)
 
@@ -408,7 +410,7 @@ def test_a_defect_during_replay_keeps_the_edits_before_it(
 
         monkeypatch.setattr(Document, "outcome", defect)
         after = second.documents()
-        (offer,) = after.recoverable.offers()
+        (offer,) = after.recoverable.descriptions()
         assert offer.missing == "the last 2 edits could not be repeated: armblocks has a defect (KeyError)"
         assert sorted(after.attach(open_file.key).document.diagram.blocks) == ["b0", "b1"]
 
@@ -437,7 +439,7 @@ def test_a_deleted_or_renamed_file_is_reported_and_its_content_remains(
             assert await events.get() == "gone"
             assert open_file.document.dirty
             crashed = disk.as_after_a_crash(tmp_path / "second").documents()
-            assert [(offer.path, offer.disk) for offer in crashed.recoverable.offers()] == [
+            assert [(offer.path, offer.disk) for offer in crashed.recoverable.descriptions()] == [
                 ("a.json", "gone")
             ]
             place.with_name("b.json").rename(place)

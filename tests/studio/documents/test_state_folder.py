@@ -44,7 +44,7 @@ def test_a_damaged_file_is_ignored(studio_state: StateFolder, content: str) -> N
 
 def test_recent_files_are_unique_and_latest_first(studio_state: StateFolder) -> None:
     for name in ("a.json", "b.json", "a.json", *(f"{k}.json" for k in range(20))):
-        studio_state.use(name)
+        studio_state.add_recent(name)
     assert studio_state.recent()[:2] == ["19.json", "18.json"]
     assert len(studio_state.recent()) == state_folder.MAX_RECENT_FILES
 

@@ -12,23 +12,23 @@ from conftest import TIMEOUT_MS
 
 DIALOG = "[role=dialog]"
 """The open dialog: searching a role inside it is faster than in the whole page."""
-FRAMES_REQUESTED = """async () => {
+REQUESTED_FRAMES = """async () => {
     // Number of animation frames that the page requests during ten frames.
     const request = window.requestAnimationFrame
     let count = 0
-    window.requestAnimationFrame = (called) => (count++, request.call(window, called))
-    for (let k = 0; k < 10; k++) await new Promise((passed) => request.call(window, passed))
+    window.requestAnimationFrame = (callback) => (count++, request.call(window, callback))
+    for (let k = 0; k < 10; k++) await new Promise((resolve) => request.call(window, resolve))
     window.requestAnimationFrame = request
     return count
 }"""
-VIEW_RESTS = """async () => {
+VIEW_IS_STILL = """async () => {
     // Whether the view of the sheet is unchanged during three frames.
     const view = () => document.querySelector('.react-flow__viewport')?.style.transform
     const before = view()
-    for (let k = 0; k < 3; k++) await new Promise((passed) => requestAnimationFrame(passed))
+    for (let k = 0; k < 3; k++) await new Promise((resolve) => requestAnimationFrame(resolve))
     return view() === before
 }"""
-UPPERMOST = """(element) => {
+IS_UPPERMOST = """(element) => {
     const { x, y, width, height } = element.getBoundingClientRect()
     return document.elementFromPoint(x + width / 2, y + height / 2) === element
 }"""
@@ -48,12 +48,12 @@ def middle(element: Locator) -> tuple[float, float]:
     """The centre of an element after it is drawn; wires are drawn after their blocks."""
     box = None
 
-    def drawn() -> bool:
+    def is_drawn() -> bool:
         nonlocal box
         box = element.bounding_box()
         return box is not None
 
-    wait_until(element.page, drawn)
+    wait_until(element.page, is_drawn)
     assert box is not None
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
@@ -64,7 +64,7 @@ def keep_view(page: Page) -> None:
     A fit that has begun ends first, so that positions can be measured one after the other.
     """
     page.locator(".canvas").dispatch_event("wheel")
-    wait_until(page, lambda: page.evaluate(VIEW_RESTS))
+    wait_until(page, lambda: page.evaluate(VIEW_IS_STILL))
 
 
 def choose_in_menu(page: Page, entry: str | re.Pattern[str]) -> None:
@@ -118,7 +118,7 @@ def wire(page: Page, source: str, target: str) -> None:
 
     def is_free(port: str) -> bool:
         """Whether the mouse can reach the handle: it is on the sheet and not covered."""
-        return handle(port).evaluate(UPPERMOST)
+        return handle(port).evaluate(IS_UPPERMOST)
 
     if not (is_free(source) and is_free(target)):  # the sheet has panned while earlier wires were drawn
         page.get_by_role("button", name="Fit View").click()
@@ -138,11 +138,11 @@ def wire(page: Page, source: str, target: str) -> None:
     page.mouse.up()
 
 
-def wait_until(page: Page, true: Callable[[], bool]) -> None:
+def wait_until(page: Page, condition: Callable[[], bool]) -> None:
     """Wait for a condition that no locator expresses: a state of the test, or a relation of two numbers."""
     step = 50
     for _ in range(TIMEOUT_MS // step):
-        if true():
+        if condition():
             return
         page.wait_for_timeout(step)  # the events of the browser are handled meanwhile
     raise AssertionError("the condition did not become true")
@@ -168,12 +168,12 @@ def copied_names(page: Page, copy: Callable[[], None]) -> list[str]:
     copy()
     text = ""
 
-    def is_there() -> bool:
+    def is_copied() -> bool:
         nonlocal text
         text = page.evaluate("navigator.clipboard.readText()")
         return bool(text)
 
-    wait_until(page, is_there)
+    wait_until(page, is_copied)
     return list(json.loads(text)["blocks"])
 
 
@@ -185,7 +185,7 @@ def open_fresh_example(page: Page) -> None:
     for _ in range(2):  # closes the list and the dialog that a failed test may have left open
         page.keyboard.press("Escape")
     before = page.evaluate("sessionStorage.getItem('armblocks-shown')")
-    choose_in_menu(page, re.compile("^van_der_pol_pid a van der Pol"))
+    choose_in_menu(page, re.compile("^van_der_pol_pid PID control"))
     page.wait_for_function("before => sessionStorage.getItem('armblocks-shown') !== before", arg=before)
     expect(page.locator(".title")).to_have_text("van_der_pol_pid")
     expect(block(page, "PID")).to_be_visible()
@@ -199,7 +199,7 @@ def expect_focus_inside(element: Locator) -> None:
 
 def expect_no_frames(page: Page) -> None:
     """Wait until the page requests no animation frames: an idle page uses no processor time."""
-    wait_until(page, lambda: page.evaluate(FRAMES_REQUESTED) == 0)
+    wait_until(page, lambda: page.evaluate(REQUESTED_FRAMES) == 0)
 
 
 def expect_no_faults(page: Page) -> None:

@@ -81,28 +81,28 @@ def test_a_file_changed_on_disk_is_reported_and_the_user_chooses_a_version(
     assert "Gain" in names(file)
 
 
-class Line:
+class DelayedWebSocket:
     """The websocket of a page, on which messages of the server can be delayed."""
 
     def __init__(self, page: Page) -> None:
-        self.held = False
+        self.delayed = False
         self.waiting: list[str | bytes] = []
         page.route_web_socket("**/ws", self._connect)
 
-    def _connect(self, line: WebSocketRoute) -> None:
-        self._page = line
-        server = line.connect_to_server()
-        line.on_message(server.send)
+    def _connect(self, socket: WebSocketRoute) -> None:
+        self._page = socket
+        server = socket.connect_to_server()
+        socket.on_message(server.send)
         server.on_message(self._notify)
 
     def _notify(self, message: str | bytes) -> None:
-        if self.held:
+        if self.delayed:
             self.waiting.append(message)
         else:
             self._page.send(message)
 
     def release(self) -> None:
-        self.held = False
+        self.delayed = False
         for message in self.waiting:
             self._page.send(message)
 
@@ -114,17 +114,17 @@ def test_a_conflicting_edit_is_reported_and_both_pages_show_the_same_diagram(
     add(page, "integrator")
     save_as(page, "two.json")
     other = page.context.new_page()
-    line = Line(other)
+    socket = DelayedWebSocket(other)
     other.goto(page.url)
     expect(block(other, "Gain")).to_be_visible()
     block(other, "Gain").click()
-    line.held = True
+    socket.delayed = True
     block(page, "Gain").click()
     page.keyboard.press("ArrowDown")
     expect(page.get_by_role("button", name="Undo move Gain (Ctrl+Z)")).to_be_enabled()
     other.keyboard.press("ArrowRight")  # moves Gain from its former position
-    wait_until(page, lambda: any("change from another page" in str(message) for message in line.waiting))
-    line.release()
+    wait_until(page, lambda: any("change from another page" in str(message) for message in socket.waiting))
+    socket.release()
     expect(other.get_by_text("your change conflicts with a change from another page")).to_be_visible()
     other.locator(".react-flow__pane").click(position={"x": 5, "y": 5})
     add(other, "sum")

@@ -17,7 +17,9 @@ from conftest import Studio, new_context
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="SIGSTOP needs POSIX")
 OUTAGE_MS = 1000 * float(os.environ.get("ARMBLOCKS_LINE_GONE", "0"))
-"""Duration of the outage after the page reports it, s; in the long version 10, and the page reconnects."""
+"""Duration of the outage after the page reports it, ms; the environment variable has seconds.
+
+In the long version it is 10 s, and the page reconnects."""
 
 
 class Session:
@@ -45,7 +47,7 @@ class Session:
         """Suspend the server: the connection stays open, but no message is answered."""
         self.studio.process.send_signal(signal.SIGSTOP)
 
-    def go_on(self) -> None:
+    def resume(self) -> None:
         expect(outage_message(self.page)).to_be_visible()
         self.page.wait_for_timeout(OUTAGE_MS)
         self.studio.process.send_signal(signal.SIGCONT)
@@ -55,7 +57,7 @@ class Session:
         self.studio.kill()
         expect(outage_message(self.page)).to_be_visible()
 
-    def start_again(self) -> None:
+    def restart(self) -> None:
         self.studio = Studio(self.folder, "van_der_pol_pid")
 
     def saved(self, name: str) -> dict[str, list[float]]:
@@ -82,7 +84,7 @@ def place(page: Page, name: str) -> tuple[float, float]:
     return box["x"], box["y"]
 
 
-def take(page: Page, name: str) -> tuple[float, float]:
+def begin_drag(page: Page, name: str) -> tuple[float, float]:
     """Press the mouse on a block and drag it a short distance; return the pointer position."""
     keep_view(page)
     box = block(page, name).bounding_box()
@@ -109,7 +111,7 @@ def test_edits_during_an_outage_are_applied_after_it(session: Session) -> None:
     add(page, "integrator")
     block(page, "Gain").click()
     page.keyboard.press("ArrowDown")
-    session.go_on()
+    session.resume()
     expect(block(page, "Integrator")).to_be_visible()
     places = session.saved("silence.json")
     assert places.keys() == {"Gain", "Integrator"}
@@ -120,10 +122,10 @@ def test_a_drag_across_a_server_restart_ends_where_the_block_is_released(
 ) -> None:
     page = session.begin()
     before = place(page, "Gain")
-    x, y = take(page, "Gain")
+    x, y = begin_drag(page, "Gain")
     session.kill()
     page.mouse.move(x + 60, y + 40, steps=4)
-    session.start_again()
+    session.restart()
     expect(outage_message(page)).to_be_hidden()
     page.mouse.move(x + 160, y + 80, steps=4)
     page.mouse.up()
@@ -143,12 +145,12 @@ def test_a_drag_across_a_server_restart_ends_where_the_block_is_released(
 def test_a_reload_during_a_drag_leaves_the_block_at_its_position(session: Session) -> None:
     page = session.begin()
     start = session.saved("still.json")
-    take(page, "Gain")
+    begin_drag(page, "Gain")
     page.reload()
     expect(block(page, "Gain")).to_be_visible()
     page.mouse.up()
     assert session.saved("reloaded.json") == start
-    x, y = take(page, "Gain")
+    x, y = begin_drag(page, "Gain")
     page.mouse.move(x + 100, y, steps=4)
     page.mouse.up()
     expect(page.locator(".title")).to_have_text("reloaded •")
@@ -162,7 +164,7 @@ def test_queued_edits_survive_a_reload_and_are_applied_once(session: Session) ->
     add(page, "integrator")
     block(page, "Gain").click()
     page.keyboard.press("Delete")
-    session.start_again()
+    session.restart()
     page.reload()
     expect(block(page, "Integrator")).to_be_visible()
     expect(block(page, "Gain")).to_have_count(0)

@@ -1,4 +1,4 @@
-"""Habits of the mouse on a sheet: context menus, copies and branches by the right button."""
+"""Mouse actions on a sheet: context menus, copies and branches by the right button, and guides."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_the_right_button_copies_blocks_and_branches_from_lines(sheet: Page) -> 
     assert abs(left - x - 20) <= 5  # half a step of the grid, at this zoom
     assert abs(top - y - 70) <= 5
     expect(sheet.locator(".drawn-copy")).to_have_count(0)
-    line = middle(edge(sheet, "PID/y -> u/u1").locator(".piece").first)
+    line = middle(edge(sheet, "PID/y -> u/u1").locator(".segment").first)
     right_drag(sheet, line, middle(copy.locator('[data-handleid="u"]')))
     expect(edge(sheet, "PID/y -> PID 2/u")).to_have_count(1)
     sheet.keyboard.press("Control+z")
@@ -79,7 +79,7 @@ def test_context_menus_of_blocks_lines_ports_the_sheet_and_charts(sheet: Page) -
     assert corner is not None
     assert origin is not None
     assert abs(corner["x"] - origin["x"] - 40) <= 6
-    sheet.mouse.click(*middle(edge(sheet, f"{name}/y -> u/u1").locator(".piece").first), button="right")
+    sheet.mouse.click(*middle(edge(sheet, f"{name}/y -> u/u1").locator(".segment").first), button="right")
     entry(sheet, "Log the signal").click()
     expect(sheet.get_by_label(f"{name}/y is logged")).to_be_visible()
     block(sheet, name).locator('[data-handleid="u"]').click(button="right")
@@ -128,12 +128,12 @@ def test_a_dragged_block_snaps_to_a_straight_line_and_alt_turns_it_off(sheet: Pa
             for name, port in (("PID", "y"), ("damping", "u"))
         )  # type: ignore[return-value]
 
-    out, into = levels()
+    output_y, input_y = levels()
     x, y = middle(block(sheet, "damping").locator(".face"))
     sheet.mouse.move(x, y)
     sheet.mouse.down()
     sheet.mouse.move(x, y + 10, steps=2)
-    sheet.mouse.move(x, y + out - into + 3, steps=4)
+    sheet.mouse.move(x, y + output_y - input_y + 3, steps=4)
     expect(sheet.locator(".guides path")).not_to_have_count(0)
     sheet.mouse.up()
     expect(sheet.locator(".guides")).to_have_count(0)
@@ -174,3 +174,40 @@ def test_a_subsystem_shows_a_picture_of_its_sheet_while_the_pointer_rests(sheet:
     sheet.mouse.move(x + 40, y + 40, steps=4)
     sheet.mouse.up()
     expect(sheet.get_by_role("button", name="Undo move Subsystem (Ctrl+Z)")).to_be_enabled()
+
+
+def test_a_subsystem_shows_a_picture_of_its_sheet_while_it_has_the_keyboard_focus(sheet: Page) -> None:
+    select_block(sheet, "PID")
+    sheet.keyboard.press("Control+g")
+    expect(block(sheet, "Subsystem")).to_be_visible()
+    sheet.mouse.move(5, 5)
+    preview = sheet.locator(".subsystem-preview")
+
+    def focus_subsystem() -> None:
+        """Reach the subsystem with Tab, as the focus passes over the other blocks."""
+        sheet.locator(".react-flow__node").first.focus()
+        for _ in range(sheet.locator(".react-flow__node").count()):
+            sheet.keyboard.press("Tab")
+            if block(sheet, "Subsystem").evaluate("(node) => node === document.activeElement"):
+                return
+        raise AssertionError("Tab does not reach the subsystem")
+
+    focus_subsystem()
+    expect(preview).to_have_css("opacity", "1")
+    expect(preview.locator("figcaption")).to_have_text("Subsystem")
+    sheet.keyboard.press("Escape")
+    expect(preview).to_be_hidden()
+    expect(block(sheet, "Subsystem")).to_be_focused()
+    expect(block(sheet, "Subsystem")).to_have_class(re.compile("selected"))
+
+    # Moving on closes the picture; Enter opens the sheet that it shows.
+    sheet.keyboard.press("Shift+Tab")
+    focus_subsystem()
+    expect(preview).to_be_visible()
+    sheet.keyboard.press("Tab")
+    expect(preview).to_be_hidden()
+    focus_subsystem()
+    expect(preview).to_be_visible()
+    sheet.keyboard.press("Enter")
+    expect(block(sheet, "PID")).to_be_visible()
+    expect(preview).to_be_hidden()

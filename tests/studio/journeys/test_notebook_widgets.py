@@ -57,12 +57,12 @@ def notebook(browser: Browser) -> Iterator[Page]:
             faults.append(f"requested {route.request.url}")
             route.abort()
 
-    def hear(message: ConsoleMessage) -> None:
+    def on_console(message: ConsoleMessage) -> None:
         if message.type == "error":
             faults.append(message.text)
 
     page.route("http*://**", answer)
-    page.on("console", hear)
+    page.on("console", on_console)
     page.on("pageerror", lambda error: faults.append(str(error)))
     yield page
     page.close()

@@ -37,7 +37,7 @@ def command(page: Page, typed: str) -> None:
     expect(page.get_by_role("dialog")).to_be_hidden()
 
 
-def way(page: Page, wire: str) -> str | None:
+def route_path(page: Page, wire: str) -> str | None:
     return edge(page, wire).locator("path.line").first.get_attribute("d")
 
 
@@ -54,8 +54,8 @@ AS_RGB = """(colour) => {
 
 def test_a_user_drawn_route_follows_its_block_and_can_be_reset(sheet: Page) -> None:
     wire = "PID/y -> u/u1"
-    before = way(sheet, wire)
-    x, y = middle(edge(sheet, wire).locator(".piece").first)
+    before = route_path(sheet, wire)
+    x, y = middle(edge(sheet, wire).locator(".segment").first)
     sheet.mouse.move(x, y)
     sheet.mouse.down()
     sheet.mouse.move(x, y - 40, steps=4)
@@ -63,15 +63,15 @@ def test_a_user_drawn_route_follows_its_block_and_can_be_reset(sheet: Page) -> N
     expect(sheet.get_by_role("button", name="Undo bend 1 wire (Ctrl+Z)")).to_be_enabled()
     line = edge(sheet, wire).locator("path.line").first
     expect(line).not_to_have_attribute("d", before or "")
-    routed = way(sheet, wire)
+    routed = route_path(sheet, wire)
     block(sheet, "PID").click()
     sheet.keyboard.press("ArrowDown")
     expect(sheet.get_by_role("button", name="Undo move PID (Ctrl+Z)")).to_be_enabled()
     expect(line).not_to_have_attribute("d", routed or "")
-    assert way(sheet, wire) != before
+    assert route_path(sheet, wire) != before
     sheet.keyboard.press("Control+z")
     expect(line).to_have_attribute("d", routed or "")
-    edge(sheet, wire).locator(".piece").nth(2).click(force=True)
+    edge(sheet, wire).locator(".segment").nth(2).click(force=True)
     accent = sheet.evaluate("getComputedStyle(document.documentElement).getPropertyValue('--accent')")
     shown = f"getComputedStyle(document.querySelector('{SELECTED_LINE}')).stroke"
     assert sheet.evaluate(shown) == sheet.evaluate(AS_RGB, accent.strip())
@@ -86,7 +86,7 @@ def test_the_sheet_inside_a_commented_subsystem_is_grey(sheet: Page) -> None:
     sheet.keyboard.press("Control+Shift+X")
     expect(block(sheet, "Subsystem")).to_have_accessible_name(re.compile("commented out$"))
     sheet.keyboard.press("Enter")
-    notice = sheet.get_by_text("this sheet takes no part in the model")
+    notice = sheet.get_by_text("this sheet is not part of the model")
     expect(notice).to_contain_text("Subsystem is commented out")
     outline = block(sheet, "PID").locator(".face .s-ink, .face .s-wire").first
     grey = outline.evaluate("element => getComputedStyle(element).stroke")
@@ -102,7 +102,7 @@ def test_blocks_are_commented_out_and_through_by_key(sheet: Page) -> None:
     expect(block(sheet, "PID").locator(".face")).to_contain_text("%")
     run(sheet)
     expect(sheet.locator('.wire-value[data-path="PID/y"]')).to_have_count(0)
-    edge(sheet, "PID/y -> u/u1").locator(".piece").first.hover(force=True)
+    edge(sheet, "PID/y -> u/u1").locator(".segment").first.hover(force=True)
     expect(sheet.locator('.wire-value[data-path="PID/y"]')).to_have_text("0")
     select_block(sheet, "PID")
     sheet.keyboard.press("Control+Shift+Y")
@@ -113,7 +113,7 @@ def test_blocks_are_commented_out_and_through_by_key(sheet: Page) -> None:
 
 
 def test_a_double_click_on_a_wire_names_its_signal(sheet: Page) -> None:
-    wire = edge(sheet, "x2/y -> x1/u").locator(".piece").first
+    wire = edge(sheet, "x2/y -> x1/u").locator(".segment").first
     wire.dblclick(force=True)
     field = sheet.get_by_role("textbox", name="Name of the signal of x2/y")
     expect(field).to_be_focused()
@@ -138,7 +138,7 @@ def test_a_double_click_on_a_wire_names_its_signal(sheet: Page) -> None:
 
 
 def test_unconnected_ports_are_grounded_and_terminated_in_one_step(sheet: Page) -> None:
-    edge(sheet, "x2/y -> x1/u").locator(".piece").first.click(force=True)
+    edge(sheet, "x2/y -> x1/u").locator(".segment").first.click(force=True)
     sheet.keyboard.press("Delete")
     expect(block(sheet, "x1").locator(".port.unconnected")).to_have_count(1)
     command(sheet, "Ground and terminate unconnected ports")
@@ -152,8 +152,8 @@ def test_a_block_dropped_on_a_wire_is_inserted_into_it(sheet: Page) -> None:
     wires = sheet.locator(".react-flow__edge")
     count = wires.count()
     sheet.get_by_role("textbox", name="Search the library").fill("Saturation")
-    piece = edge(sheet, "x2/y -> x1/u").locator(".piece").first
-    x, y = middle(piece)
+    segment = edge(sheet, "x2/y -> x1/u").locator(".segment").first
+    x, y = middle(segment)
     pane = sheet.locator(".canvas").bounding_box()
     assert pane is not None
     sheet.locator('.kind[data-type="Saturation"]').drag_to(
@@ -189,7 +189,7 @@ def test_a_block_is_disconnected_from_a_wire_and_inserted_into_another(sheet: Pa
     expect(sheet.get_by_role("button", name="Undo disconnect damping (Ctrl+Z)")).to_be_enabled()
     expect(edge(sheet, "x2/y -> u/u2")).to_have_count(1)
     expect(wires).to_have_count(count - 1)
-    drag(sheet, "damping", *middle(edge(sheet, "x2/y -> x1/u").locator(".piece").first))
+    drag(sheet, "damping", *middle(edge(sheet, "x2/y -> x1/u").locator(".segment").first))
     expect(sheet.get_by_role("button", name="Undo insert damping (Ctrl+Z)")).to_be_enabled()
     expect(edge(sheet, "x2/y -> damping/u")).to_have_count(1)
     expect(edge(sheet, "damping/y -> x1/u")).to_have_count(1)
@@ -234,7 +234,7 @@ def test_blocks_are_duplicated_resized_and_connected_by_drags(sheet: Page) -> No
 
 
 def test_copies_keep_routes_and_the_contents_of_subsystems(sheet: Page) -> None:
-    x, y = middle(edge(sheet, "PID/y -> u/u1").locator(".piece").first)
+    x, y = middle(edge(sheet, "PID/y -> u/u1").locator(".segment").first)
     sheet.mouse.move(x, y)
     sheet.mouse.down()
     sheet.mouse.move(x, y - 40, steps=4)
@@ -245,7 +245,7 @@ def test_copies_keep_routes_and_the_contents_of_subsystems(sheet: Page) -> None:
     sheet.keyboard.press("Control+d")
     expect(block(sheet, "PID 2")).to_have_class(re.compile("selected"))
     # The copied route would run under the block "u": the wire is drawn straight until the copies are moved.
-    edge(sheet, "PID 2/y -> u 2/u1").locator(".piece").first.click(force=True)
+    edge(sheet, "PID 2/y -> u 2/u1").locator(".segment").first.click(force=True)
     expect(sheet.get_by_role("button", name="Reset the route")).to_be_visible()
     sheet.keyboard.press("Escape")
     block(sheet, "PID 2").click()
@@ -534,7 +534,7 @@ OPENINGS = """async () => {
     const firstWords = (element) => document.createTreeWalker(element, NodeFilter.SHOW_TEXT).nextNode().data
     const node = (name) => document.querySelector(`.react-flow__node[data-id="${CSS.escape(name)}"]`)
     const names = [...document.querySelectorAll('.react-flow__node')].map((node) => node.dataset.id)
-    const asked = {}
+    const labels = {}
     for (const name of names) {
         node(name).dispatchEvent(new MouseEvent('dblclick', { bubbles: true }))
         const shown = await until(() => dialog(name) ?? path[0])
@@ -543,11 +543,11 @@ OPENINGS = """async () => {
             await until(() => node(name))
             continue
         }
-        asked[name] = [...shown.querySelectorAll('label')].map(firstWords)
+        labels[name] = [...shown.querySelectorAll('label')].map(firstWords)
         ;[...shown.querySelectorAll('button')].find((button) => button.textContent === 'Cancel').click()
         await until(() => !over('[role=dialog]'))
     }
-    return asked
+    return labels
 }"""
 
 

@@ -198,16 +198,16 @@ def test_blocks_are_copied_as_text(page: Page) -> None:
 
 def test_axe_finds_no_violations_in_light_and_dark_themes(page: Page) -> None:
     dialog = page.locator("[role=dialog]")
-    for opens in ("", "Control+k", "?", "Enter"):
-        if opens:
+    for key in ("", "Control+k", "?", "Enter"):
+        if key:
             block(page, "PID").focus()
-            page.keyboard.press(opens)
+            page.keyboard.press(key)
             expect(dialog).to_be_visible()
         axe(page)
         show_theme(page, "dark")
         axe(page, tags=COLOURS)
         show_theme(page, "light")
-        if opens:
+        if key:
             page.keyboard.press("Escape")
             expect(dialog).to_be_hidden()
             expect(block(page, "PID")).to_be_focused()  # the focus returns to the block

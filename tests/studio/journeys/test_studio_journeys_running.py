@@ -126,9 +126,9 @@ def test_two_runs_are_compared(opened: Opened) -> None:
     field.press("Enter")
     run(page)
     tab(page, "Signals")
-    expect(page.locator(".kept-run")).to_have_count(2)
-    expect(page.locator(".kept-run").first).to_contain_text("lag.time_constant = 0.5")
-    expect(page.locator(".kept-run").last).not_to_contain_text("time_constant")
+    expect(page.locator(".stored-run")).to_have_count(2)
+    expect(page.locator(".stored-run").first).to_contain_text("lag.time_constant = 0.5")
+    expect(page.locator(".stored-run").last).not_to_contain_text("time_constant")
     page.get_by_role("combobox", name="View").select_option("Side by side")
     charts = page.locator(".signal-inspector .chart")
     expect(charts).to_have_count(2)
@@ -138,23 +138,23 @@ def test_two_runs_are_compared(opened: Opened) -> None:
     page.get_by_role("combobox", name="View").select_option("Difference")
     model = lag_model("compared")
     one, other = ab.simulate(model), ab.simulate(model, parameters={"lag.time_constant": 0.5})
-    apart = np.abs(other["lag/y"] - one["lag/y"])
+    deviation = np.abs(other["lag/y"] - one["lag/y"])
     row = page.locator(".signals label", has_text="lag")
-    message = row.locator(".apart")
+    message = row.locator(".deviation")
     expect(message).to_contain_text("✗")
     numbers = re.findall(r"[\d.]+", message.inner_text())
-    np.testing.assert_allclose(float(numbers[0]), apart.max(), rtol=5e-3)
-    np.testing.assert_allclose(float(numbers[1]), one.time[apart.argmax()], rtol=5e-3)
-    expect(page.locator(".signals label", has_text="gain").locator(".apart")).to_contain_text("✓ 0")
+    np.testing.assert_allclose(float(numbers[0]), deviation.max(), rtol=5e-3)
+    np.testing.assert_allclose(float(numbers[1]), one.time[deviation.argmax()], rtol=5e-3)
+    expect(page.locator(".signals label", has_text="gain").locator(".deviation")).to_contain_text("✓ 0")
     page.get_by_role("textbox", name="Tolerance").fill("1")
     expect(message).to_contain_text("✓")
     page.get_by_role("textbox", name="Search the signals").fill("LAG")
     expect(page.locator(".signals label")).to_have_count(1)
-    name = page.locator(".kept-run").last.get_by_role("textbox", name="Name of Run")
+    name = page.locator(".stored-run").last.get_by_role("textbox", name="Name of Run")
     name.fill("slow")
     name.press("Enter")
-    page.get_by_role("button", name="Forget slow").click()
-    expect(page.locator(".kept-run")).to_have_count(1)
+    page.get_by_role("button", name="Delete slow").click()
+    expect(page.locator(".stored-run")).to_have_count(1)
 
 
 def test_parameter_sets_are_saved_applied_and_compared(opened: Opened, studio: Studio) -> None:
@@ -207,10 +207,67 @@ def test_parameter_sets_are_saved_applied_and_compared(opened: Opened, studio: S
     expect(page.get_by_role("button", name="Undo apply the parameter set fast (Ctrl+Z)")).to_be_visible()
     file = studio.folder / "varied.json"
     wait_until(page, lambda: "parameter_sets" in file.read_text(encoding="utf-8"))
-    kept = ab.load_diagram(file)
-    assert dict(kept.parameter_sets["fast"]) == {"gain.gain": 2.0, "lag.time_constant": 0.1}
-    assert dict(kept.parameter_sets["large"]) == {"gain.gain": 6.0}
-    assert kept.blocks["lag"].parameter_value("time_constant") == 0.1
+    saved_diagram = ab.load_diagram(file)
+    assert dict(saved_diagram.parameter_sets["fast"]) == {"gain.gain": 2.0, "lag.time_constant": 0.1}
+    assert dict(saved_diagram.parameter_sets["large"]) == {"gain.gain": 6.0}
+    assert saved_diagram.blocks["lag"].parameter_value("time_constant") == 0.1
+
+
+def test_parameter_sets_are_updated_renamed_and_removed_in_their_dialog(opened: Opened) -> None:
+    page = opened(lag_model("edited sets"))
+    tab(page, "Tune")
+    select(page, "gain")
+    field = page.get_by_role("textbox", name="gain.gain", exact=True)
+    dialog = page.locator(DIALOG)
+
+    def show_sets(*, tried: str = "") -> None:
+        if tried:
+            field.fill(tried)
+            field.press("Enter")
+        page.keyboard.press("Control+k")
+        page.get_by_role("textbox", name="Command").fill("parameter sets")
+        page.keyboard.press("Enter")
+        expect(dialog.get_by_role("textbox", name="Name of a new set")).to_be_visible()
+
+    def command(name: str, entry: str) -> None:
+        dialog.get_by_role("button", name=f"Commands for {name}", exact=True).click()
+        page.get_by_role("menuitem", name=entry).click()
+
+    show_sets(tried="6")
+    dialog.get_by_role("textbox", name="Name of a new set").fill("large")
+    page.keyboard.press("Enter")
+    row = dialog.get_by_role("row", name="gain.gain")
+    expect(row.get_by_role("cell")).to_have_text(["2", "6", ""])
+    page.keyboard.press("Escape")
+    expect(dialog).to_have_count(0)
+
+    show_sets(tried="7")
+    command("large", "Update with the tried values")
+    expect(row.get_by_role("cell")).to_have_text(["2", "7", ""])
+    expect(dialog.get_by_role("button", name="Try large")).to_have_attribute("aria-pressed", "true")
+
+    # A name that is not valid leaves the field open; Escape closes the field, not the dialog.
+    command("large", "Rename")
+    name = dialog.get_by_role("textbox", name="New name of large")
+    expect(name).to_be_focused()
+    name.fill("other")
+    page.keyboard.press("Escape")
+    expect(name).to_have_count(0)
+    expect(dialog.get_by_role("button", name="Try large")).to_be_visible()
+    command("large", "Rename")
+    name.fill("very large")
+    page.keyboard.press("Enter")
+    expect(dialog.get_by_role("button", name="Try very large")).to_have_attribute("aria-pressed", "true")
+
+    command("very large", "Remove")
+    expect(dialog.get_by_role("table")).to_have_count(0)
+    page.keyboard.press("Escape")
+    expect(dialog).to_have_count(0)
+    page.keyboard.press("Control+z")
+    show_sets()
+    expect(row.get_by_role("cell")).to_have_text(["2", "7", ""])
+    page.keyboard.press("Escape")
+    expect(dialog).to_have_count(0)
 
 
 def saved_picture(page: Page, chart: Locator) -> list[str]:
@@ -289,6 +346,44 @@ def test_a_triggered_scope_shows_the_window_about_each_crossing(opened: Opened) 
     expect(bar.locator(".shown-trigger")).to_contain_text(f"Trigger at {1.003 - math.log(0.7):.4f}"[:-1])
     bar.get_by_role("textbox", name="Window").fill("0")
     assert bar.get_by_role("textbox", name="Window").get_attribute("aria-invalid") == "true"
+    page.get_by_role("button", name="Trigger", exact=True).click()
+    expect(bar).to_have_count(0)
+
+
+def test_each_document_has_its_trigger_also_after_a_reload(opened: Opened) -> None:
+    page = opened(lag_model("untriggered"))
+    page = opened(lag_model("with trigger"))
+    run(page)
+    page.get_by_role("button", name="Trigger", exact=True).click()
+    bar = page.get_by_role("group", name="Trigger")
+    bar.get_by_role("combobox", name="Trigger on").select_option(label="lag")
+    for field, text in (("Level", "0.5"), ("Window", "0.25"), ("Trigger at", "25"), ("Hold-off", "2")):
+        bar.get_by_role("textbox", name=field).fill(text)
+    bar.get_by_role("combobox", name="Edge").select_option("either")
+    bar.get_by_role("combobox", name="Mode").select_option("auto")
+    at = f"1 of 1 at {1 - math.log(0.75):.5f}"[:-2]  # the lag reaches a quarter of its final value
+    expect(bar.locator(".shown-trigger")).to_contain_text(at)
+
+    # Beside the library and the inspector the settings are in one row.
+    tops = bar.locator("input, select").evaluate_all("all => all.map((one) => one.getBoundingClientRect().y)")
+    assert len(tops) == 7
+    assert max(tops) - min(tops) < 1
+
+    strip = page.get_by_role("tablist", name="Open documents")
+    strip.get_by_role("tab", name="untriggered").click()
+    expect(page.locator(".title")).to_have_text("untriggered")
+    expect(bar).to_have_count(0)
+    strip.get_by_role("tab", name="with trigger").click()
+    expect(bar.get_by_role("textbox", name="Level")).to_have_value("0.5")
+
+    page.reload()
+    page.locator(".react-flow__node").first.wait_for()
+    tab(page, "Scopes")
+    for field, text in (("Level", "0.5"), ("Window", "0.25"), ("Trigger at", "25"), ("Hold-off", "2")):
+        expect(bar.get_by_role("textbox", name=field)).to_have_value(text)
+    expect(bar.get_by_role("combobox", name="Edge")).to_have_value("either")
+    expect(bar.get_by_role("combobox", name="Mode")).to_have_value("auto")
+    expect(bar.locator(".shown-trigger")).to_contain_text(at)
     page.get_by_role("button", name="Trigger", exact=True).click()
     expect(bar).to_have_count(0)
 

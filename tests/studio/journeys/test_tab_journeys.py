@@ -7,7 +7,7 @@ import re
 import pytest
 from accessibility import axe
 from building import (
-    VIEW_RESTS,
+    VIEW_IS_STILL,
     add,
     block,
     new_diagram,
@@ -18,6 +18,7 @@ from building import (
 from document_files import names
 from playwright.sync_api import Locator, Page, expect
 
+from armblocks.formats import load_robot, write_robot
 from conftest import Studio
 
 VIEW = "document.querySelector('.react-flow__viewport').style.transform"
@@ -45,7 +46,7 @@ def test_a_document_returns_with_its_view_selection_and_run(two: Page) -> None:
     run(two)
     select_block(two, "PID")
     two.keyboard.press("+")
-    wait_until(two, lambda: two.evaluate(VIEW_RESTS))
+    wait_until(two, lambda: two.evaluate(VIEW_IS_STILL))
     before = two.evaluate(VIEW)
     two.keyboard.press("Alt+PageDown")
     expect(two.locator(".title")).to_have_text("untitled")
@@ -58,7 +59,7 @@ def test_a_document_returns_with_its_view_selection_and_run(two: Page) -> None:
     axe(two, ".document-tabs")
 
 
-def test_the_keyboard_walks_through_the_tabs_and_closes_them(two: Page) -> None:
+def test_the_keyboard_moves_through_the_tabs_and_closes_them(two: Page) -> None:
     tab_in_front(two).focus()
     two.keyboard.press("ArrowLeft")
     expect(two.locator(".title")).to_have_text("van_der_pol_pid")
@@ -129,3 +130,25 @@ def test_search_finds_the_blocks_of_all_documents(two: Page) -> None:
     group.get_by_role("option").first.click()
     expect(two.locator(".title")).to_have_text("van_der_pol_pid")
     expect(block(two, "PID")).to_have_class(re.compile("selected"))
+
+
+def test_search_finds_open_robots(two: Page, studio: Studio) -> None:
+    file = studio.folder / "found arm.json"
+    file.write_bytes(write_robot(load_robot("puma560")))
+    two.keyboard.press("Control+o")
+    dialog = two.get_by_role("dialog")
+    dialog.get_by_role("textbox", name="Search the files").fill("found arm")
+    dialog.get_by_text("found arm.json", exact=True).first.click()
+    editor = two.locator(".robot-editor")
+    expect(editor).to_be_visible()
+    tabs(two).filter(has_text="untitled").last.click()
+    expect(editor).to_have_count(0)
+    two.keyboard.press("Control+f")
+    two.get_by_role("textbox", name="Find").fill("found puma")
+    expect(two.get_by_role("option", name="Puma 560 Robot")).to_be_visible()
+    two.keyboard.press("Enter")
+    expect(editor).to_be_visible()
+    expect(tab_in_front(two)).to_contain_text("Puma 560")
+    two.keyboard.press("Alt+w")
+    expect(editor).to_have_count(0)
+    file.unlink()

@@ -25,17 +25,17 @@ def listed() -> list[tuple[list[str], list[str]]]:
     text = (SOURCE / "key_list.ts").read_text(encoding="utf-8")
     places = re.findall(r"sources: \[(.*?)\],\s*keys: \[(.*?)\n    \],", text, re.DOTALL)
     assert len(places) == text.count("    title: '")
-    ways = re.compile(r"^ *\['(.+?)', '", re.MULTILINE)
+    first_texts = re.compile(r"^ *\['(.+?)', '", re.MULTILINE)
     return [
         (
             re.findall(r"'(.+?)'", sources),
-            [way for line in ways.findall(keys) for way in line.split(", ")],
+            [shortcut for line in first_texts.findall(keys) for shortcut in line.split(", ")],
         )
         for sources, keys in places
     ]
 
 
-def listeners() -> dict[str, set[str]]:
+def handled_keys() -> dict[str, set[str]]:
     """The keys that each source file compares with the pressed key."""
     keys_in_file: dict[str, set[str]] = {}
     for path in sorted(SOURCE.rglob("*.ts*")):
@@ -50,34 +50,36 @@ def listeners() -> dict[str, set[str]]:
     return keys_in_file
 
 
-def names(key: str, ways: list[str]) -> bool:
+def includes_key(key: str, shortcuts: list[str]) -> bool:
     """Whether one of the shortcuts consists of this key, alone or with Ctrl or Shift."""
     if key.startswith("Arrow"):
         arrow = {"Up": "↑", "Down": "↓", "Left": "←", "Right": "→"}[key.removeprefix("Arrow")]
-        return "arrows" in ways or arrow in ways
+        return "arrows" in shortcuts or arrow in shortcuts
     written = SHORT_NAMES.get(key.lower(), key.lower())
-    return any(way.lower() == written or way.lower().endswith(f"+{written}") for way in ways)
+    return any(
+        shortcut.lower() == written or shortcut.lower().endswith(f"+{written}") for shortcut in shortcuts
+    )
 
 
 def test_the_sources_are_read() -> None:
-    received = listeners()
+    received = handled_keys()
     assert {"Enter", "Delete", "?", " ", "Escape"} <= received["canvas/sheet_keys.ts"]
     assert {"ArrowUp", "ArrowDown", "Enter"} <= received["robot/editor/table.tsx"]
     assert {"s", "z", "y", "?"} <= received["robot/editor/robot_editor.tsx"]
-    assert names("z", ["Ctrl+Z"])
-    assert not names("z", ["Ctrl+Y"])
+    assert includes_key("z", ["Ctrl+Z"])
+    assert not includes_key("z", ["Ctrl+Y"])
 
 
-@pytest.mark.parametrize("source", listeners())
+@pytest.mark.parametrize("source", handled_keys())
 def test_every_key_is_in_the_list_of_keys(source: str) -> None:
     assert source not in COMMANDS, "the key of a command is declared only in commands.ts"
     places = [keys for sources, keys in listed() if source in sources]
     assert places, f"key_list.ts names no place for the keys of {source}"
-    missing = {key for key in listeners()[source] if not any(names(key, keys) for keys in places)}
+    missing = {key for key in handled_keys()[source] if not any(includes_key(key, keys) for keys in places)}
     assert not missing, f"key_list.ts does not list {missing} of {source}"
 
 
 def test_the_list_names_existing_source_files() -> None:
-    received = listeners()
+    received = handled_keys()
     for sources, _ in listed():
         assert set(sources) <= set(received)

@@ -19,30 +19,30 @@ ENTRY = re.compile(r"^-{80}\n(?P<name>\S+) [^ \n]+ \([^\n]+\)\n-{80}\n\n", re.MU
 
 
 def test_every_package_of_the_page_is_listed_with_its_licence() -> None:
-    text = (WEB / notices.FILE).read_text(encoding="utf-8")
+    text = (WEB / notices.NOTICES_FILE).read_text(encoding="utf-8")
     entries = list(ENTRY.finditer(text))
     ends = [entry.start() for entry in entries[1:]] + [len(text)]
-    noted = {entry["name"]: text[entry.end() : end] for entry, end in zip(entries, ends, strict=True)}
+    licences = {entry["name"]: text[entry.end() : end] for entry, end in zip(entries, ends, strict=True)}
     dependencies = json.loads((ROOT / "frontend" / "package.json").read_text(encoding="utf-8"))[
         "dependencies"
     ]
-    assert noted.keys() >= dependencies.keys()
+    assert licences.keys() >= dependencies.keys()
     # Dependencies of the imported packages.
-    assert noted.keys() >= {
+    assert licences.keys() >= {
         "@xyflow/system",
         "d3-zoom",
         "dockview-core",
         "scheduler",
         "react-remove-scroll-bar",
     }
-    for name, licence in noted.items():
+    for name, licence in licences.items():
         assert len(licence) > 400, name
     lock = json.loads((ROOT / "frontend" / "package-lock.json").read_text(encoding="utf-8"))["packages"]
     tools = {path.rpartition("node_modules/")[2] for path, entry in lock.items() if entry.get("dev")}
-    assert not tools & noted.keys()
+    assert not tools & licences.keys()
     for font in ("@fontsource-variable/inter", "@fontsource/jetbrains-mono"):
-        assert "SIL OPEN FONT LICENSE" in noted[font].upper()
-    assert not list(WEB.rglob(notices.LIST))
+        assert "SIL OPEN FONT LICENSE" in licences[font].upper()
+    assert not list(WEB.rglob(notices.PACKAGE_LIST))
 
 
 def test_a_package_without_a_licence_text_stops_the_build(tmp_path: Path) -> None:

@@ -57,11 +57,11 @@ class Pipe:
         return False
 
 
-@pytest.mark.parametrize("most", [10**9, 4000])
+@pytest.mark.parametrize("max_numbers", [10**9, 4000])
 def test_a_long_run_sends_extremes_and_a_short_run_all_samples(
-    most: int, monkeypatch: pytest.MonkeyPatch
+    max_numbers: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(run_worker, "MAX_NUMBERS", most)
+    monkeypatch.setattr(run_worker, "MAX_NUMBERS", max_numbers)
     diagram = load_diagram("van_der_pol_pid", BLOCKS)
     pipe = Pipe()
     source = diagram_to_bytes(diagram, load_robot).decode()
@@ -84,13 +84,13 @@ def test_a_long_run_sends_extremes_and_a_short_run_all_samples(
     time = np.concatenate([frame[1] for frame in frames])
     signals = np.concatenate([frame[2] for frame in frames], axis=1)
     whole = CompiledDiagram(diagram).simulate()
-    if most == 10**9:
+    if max_numbers == 10**9:
         assert events[0]["stride"] == 1
         np.testing.assert_array_equal(time, whole.time)
         np.testing.assert_array_equal(signals, whole.signals)
         return
     assert events[0]["stride"] > 1
-    assert time.size * (1 + signals.shape[0]) < 1.1 * most
+    assert time.size * (1 + signals.shape[0]) < 1.1 * max_numbers
     assert time[-1] == whole.time[-1]
     np.testing.assert_array_equal(signals.max(axis=1), whole.signals.max(axis=1))
     np.testing.assert_array_equal(signals.min(axis=1), whole.signals.min(axis=1))

@@ -61,6 +61,7 @@ HOSTILE: tuple[Any, ...] = (
 )
 
 
+PART = {"x": 1.0, "y": 1.0, "width": 100.0, "height": 50.0}
 ROWS = b"time,x\n0,1\n1,2\n"
 LAW = b"def law(u):\n    return u\n"
 
@@ -92,11 +93,14 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
         },
         {"kind": "paste", "text": diagram_to_bytes(Diagram(name="d", blocks={}), load_robot).decode()},
         {"kind": "settings", "values": {"stop_time": 1.0}},
-        {"kind": "save_parameter_set", "name": "stiff", "values": {"PID.P": "2*pi"}, "of_others": True},
+        {"kind": "save_parameter_set", "name": "stiff", "values": {"PID.P": "2*pi"}, "all_parameters": True},
         {"kind": "rename_parameter_set", "name": "soft", "to": "stiff"},
         {"kind": "apply_parameter_set", "name": "soft"},
         {"kind": "remove_set_parameter", "path": "PID.P"},
         {"kind": "remove_parameter_set", "name": "soft"},
+        {"kind": "add_bookmark", "name": "left", "part": PART, "replace": True},
+        {"kind": "rename_bookmark", "name": "left", "to": "right"},
+        {"kind": "remove_bookmark", "name": "left"},
         {"kind": "arrange"},
     ]
     common = {"document": document, "base": None, "author": "me"}
@@ -140,6 +144,7 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
         {"kind": "files"},
         {"kind": "outline", "document": document},
         {"kind": "parameter_sets", "document": document},
+        {"kind": "bookmarks", "document": document},
         {"kind": "find", "document": document, "text": "PID"},
         {"kind": "copy", "document": document, "inside": [], "blocks": ["PID"], "notes": []},
         {"kind": "ask_mask", "document": document, "inside": [], "block": ""},
@@ -222,18 +227,18 @@ def test_every_kind_of_message_answers_hostile_values_with_an_error(folder: Path
     events: list[dict[str, Any]] = []
     defects: list[str] = []
 
-    async def hear(text: str) -> None:
+    async def receive(text: str) -> None:
         event = json.loads(text)
         if event["kind"] == "reply":
             events.append(event)
         assert "SECRET" not in text
 
-    async def hear_bytes(data: bytes) -> None:
+    async def receive_bytes(data: bytes) -> None:
         raise AssertionError("samples arrived without a run")
 
     async def main() -> None:
         hub = Hub(ProjectFolder(folder))
-        page = Page(hear, hear_bytes)
+        page = Page(receive, receive_bytes)
         await hub.welcome(page)
         number = 0
 
@@ -254,6 +259,8 @@ def test_every_kind_of_message_answers_hostile_values_with_an_error(folder: Path
             request = requests(document, robot)[index]
             values = {"kind": "save_parameter_set", "name": "soft", "values": {"PID.P": 1.0}}
             await send({"kind": "change", "document": document, "edit": values})
+            marked = {"kind": "add_bookmark", "name": "left", "part": PART}
+            await send({"kind": "change", "document": document, "edit": marked})
             await send({"kind": "save", "document": document, "path": f"{index}.json"})
             fault = (await send(request))["fault"]
             nothing_to = ("scene", "pose", "robot_of_block", "undo", "redo")

@@ -20,8 +20,8 @@ def test_every_request_has_a_handler_of_its_reply_type(tmp_path: Path) -> None:
     handlers = Hub(ProjectFolder(tmp_path)).answers.handlers
     assert set(handlers) == set(messages_of(Request).values())
     replies = {request: get_type_hints(handler)["return"] for request, handler in handlers.items()}
-    wrong = {request: reply for request, reply in replies.items() if reply != expected(request)}
-    assert wrong == {}
+    different = {request: reply for request, reply in replies.items() if reply != expected(request)}
+    assert different == {}
 
 
 def expected(request: type[Request[Any]]) -> Any:

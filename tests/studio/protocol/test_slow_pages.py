@@ -23,26 +23,28 @@ class Listener:
     """A page at the other end of an outbox, which receives only when permitted."""
 
     def __init__(self) -> None:
-        self.listens = asyncio.Event()
-        self.heard: list[str | bytes] = []
-        self.news = asyncio.Event()
-        self.outbox = Outbox(self._hear, self._hear)
+        self.may_receive = asyncio.Event()
+        self.received: list[str | bytes] = []
+        self.changed = asyncio.Event()
+        self.outbox = Outbox(self._receive, self._receive)
         self.page = Page(self.outbox.put, self.outbox.put, self.outbox)
         self.sending = asyncio.create_task(self.outbox.send_all())
 
-    async def _hear(self, message: str | bytes) -> None:
-        await self.listens.wait()
-        self.heard.append(message)
-        self.news.set()
+    async def _receive(self, message: str | bytes) -> None:
+        await self.may_receive.wait()
+        self.received.append(message)
+        self.changed.set()
 
     async def until(self, kind: str, **members: Any) -> dict[str, Any]:
         async with asyncio.timeout(TIMEOUT_SECONDS):
             while True:
-                self.news.clear()
-                for event in map(json.loads, (message for message in self.heard if isinstance(message, str))):
+                self.changed.clear()
+                for event in map(
+                    json.loads, (message for message in self.received if isinstance(message, str))
+                ):
                     if event["kind"] == kind and members.items() <= event.items():
                         return event
-                await self.news.wait()
+                await self.changed.wait()
 
     async def ask(self, hub: Hub, number: int, kind: str, **values: Any) -> Any:
         await hub.answer(self.page, json.dumps({"number": number, "request": {"kind": kind, **values}}))
@@ -53,15 +55,15 @@ class Listener:
 
 def with_pages(folder: Path, scenario: Callable[[Hub, Listener, Listener], Awaitable[None]]) -> None:
     async def main() -> None:
-        hub, lively, frozen = Hub(ProjectFolder(folder)), Listener(), Listener()
-        lively.listens.set()
-        for listener in (lively, frozen):
+        hub, fast, suspended = Hub(ProjectFolder(folder)), Listener(), Listener()
+        fast.may_receive.set()
+        for listener in (fast, suspended):
             await hub.welcome(listener.page)
         try:
-            await scenario(hub, lively, frozen)
+            await scenario(hub, fast, suspended)
         finally:
-            for listener in (lively, frozen):
-                hub.leave(listener.page)
+            for listener in (fast, suspended):
+                hub.remove_page(listener.page)
                 listener.sending.cancel()
             hub.close()
 
@@ -69,30 +71,32 @@ def with_pages(folder: Path, scenario: Callable[[Hub, Listener, Listener], Await
 
 
 def of_runs(listener: Listener) -> list[str | bytes]:
-    return [message for message in listener.heard if isinstance(message, bytes) or '"kind":"run_' in message]
+    return [
+        message for message in listener.received if isinstance(message, bytes) or '"kind":"run_' in message
+    ]
 
 
-def test_a_page_suspended_during_a_run_delays_nobody_and_gets_all_messages_later(
+def test_a_page_suspended_during_a_run_does_not_delay_others_and_gets_all_messages_later(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(outbox_module, "CONGESTED_BYTES", 20_000)
 
-    async def scenario(hub: Hub, lively: Listener, frozen: Listener) -> None:
-        document = await lively.ask(hub, 1, "open_shipped", document_kind="diagram", name="falling_pendulum")
+    async def scenario(hub: Hub, fast: Listener, suspended: Listener) -> None:
+        document = await fast.ask(hub, 1, "open_shipped", document_kind="diagram", name="falling_pendulum")
         request = {"kind": "attach", "document": document, "document_kind": "diagram"}
         attach = {"number": 1, "request": request}
-        await hub.answer(frozen.page, json.dumps(attach))
-        before = frozen.outbox._size  # pyright: ignore[reportPrivateUsage]
-        run = await lively.ask(hub, 2, "run", document=document)
-        await lively.until("run_progress", run=run, state="done")
+        await hub.answer(suspended.page, json.dumps(attach))
+        before = suspended.outbox._size  # pyright: ignore[reportPrivateUsage]
+        run = await fast.ask(hub, 2, "run", document=document)
+        await fast.until("run_progress", run=run, state="done")
         # The document can be edited as well.
-        await lively.ask(hub, 3, "change", document=document, key="1", edit={"kind": "arrange"})
-        more = frozen.outbox._size - before  # pyright: ignore[reportPrivateUsage]
-        assert sum(map(len, of_runs(lively))) > 200_000
+        await fast.ask(hub, 3, "change", document=document, key="1", edit={"kind": "arrange"})
+        more = suspended.outbox._size - before  # pyright: ignore[reportPrivateUsage]
+        assert sum(map(len, of_runs(fast))) > 200_000
         assert more < 50_000, "messages of the run are stored on disk, not in memory"
-        frozen.listens.set()
-        await frozen.until("run_progress", run=run, state="done")
-        assert of_runs(frozen) == of_runs(lively)
+        suspended.may_receive.set()
+        await suspended.until("run_progress", run=run, state="done")
+        assert of_runs(suspended) == of_runs(fast)
 
     with_pages(tmp_path, scenario)
 
@@ -102,18 +106,18 @@ def test_the_connection_of_an_unresponsive_page_is_closed(
 ) -> None:
     monkeypatch.setattr(outbox_module, "MAX_BYTES", 1_000_000)
 
-    async def scenario(hub: Hub, lively: Listener, frozen: Listener) -> None:
-        document = await lively.ask(hub, 1, "open_shipped", document_kind="diagram", name="kr180model")
+    async def scenario(hub: Hub, fast: Listener, suspended: Listener) -> None:
+        document = await fast.ask(hub, 1, "open_shipped", document_kind="diagram", name="kr180model")
         attach = {"kind": "attach", "document": document, "document_kind": "diagram"}
         for number in range(100):
             await hub.answer(
-                frozen.page,
+                suspended.page,
                 json.dumps({"number": number, "request": attach}),
             )
-            if frozen.outbox.closed:
+            if suspended.outbox.closed:
                 break
-        assert frozen.outbox.closed
-        assert frozen.outbox._size == 0  # pyright: ignore[reportPrivateUsage]
-        await lively.ask(hub, 2, "change", document=document, key="1", edit={"kind": "arrange"})
+        assert suspended.outbox.closed
+        assert suspended.outbox._size == 0  # pyright: ignore[reportPrivateUsage]
+        await fast.ask(hub, 2, "change", document=document, key="1", edit={"kind": "arrange"})
 
     with_pages(tmp_path, scenario)

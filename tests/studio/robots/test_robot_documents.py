@@ -35,13 +35,13 @@ class Client:
         self._number = 0
 
     def new_page(self, received: list[dict[str, Any]]) -> Page:
-        async def hear(text: str) -> None:
+        async def receive(text: str) -> None:
             received.append(json.loads(text))
 
-        async def hear_bytes(data: bytes) -> None:
+        async def receive_bytes(data: bytes) -> None:
             raise AssertionError("samples arrived without a run")
 
-        return Page(hear, hear_bytes)
+        return Page(receive, receive_bytes)
 
     async def reply(self, kind: str, **values: Any) -> dict[str, Any]:
         self._number += 1
@@ -84,12 +84,29 @@ def cell(link: str, column: str, text: str) -> dict[str, str]:
     return {"kind": "cell", "link": link, "column": column, "text": text, "angles": "deg"}
 
 
+def test_a_urdf_file_is_dropped_with_its_findings(tmp_path: Path) -> None:
+    link = '<visual><geometry><mesh filename="arm.dae"/></geometry></visual>'
+    text = f"""<robot name="turntable"><link name="base"/><link name="arm">{link}</link>
+    <joint name="j" type="continuous"><parent link="base"/><child link="arm"/></joint></robot>"""
+
+    async def scenario(client: Client) -> None:
+        await client.ask("drop", name="arm.urdf", content=packed(text.encode()))
+        opened = next(event for event in client.received if event["kind"] == "opened")
+        assert opened["content"]["name"] == "turntable"
+        assert any("the mesh 'arm.dae' is not shown" in note for note in opened["notes"])
+        shown = client.shown()
+        assert [link["name"] for link in shown["links"]] == ["base", "arm"]
+        assert [link["moves"] for link in shown["links"]] == [False, True]
+
+    run_scenario(tmp_path, scenario)
+
+
 def test_the_script_of_the_paper_is_dropped_edited_undone_saved_and_reopened(tmp_path: Path) -> None:
     async def scenario(client: Client) -> None:
         (key,) = await client.ask("drop", name="kr180.m", content=packed(PRINTED.read_bytes()))
         opened = next(event for event in client.received if event["kind"] == "opened")
         assert opened["content"]["name"] == "KR180"
-        assert any("broken as on a printed page" in note for note in opened["notes"])
+        assert any("split as on a printed page" in note for note in opened["notes"])
         shown = client.shown()
         assert (shown["path"], shown["dirty"], shown["convention"]) == (None, True, "standard")
         assert shown["links"][1]["cells"]["mass"] == 150
@@ -184,8 +201,8 @@ def test_two_pages_show_each_other_s_edits(tmp_path: Path) -> None:
     async def scenario(client: Client) -> None:
         key = await client.ask("open_shipped", document_kind="robot", name="puma560")
         assert client.shown()["origin"] == "puma560"
-        other_told: list[dict[str, Any]] = []
-        other = client.new_page(other_told)
+        other_received: list[dict[str, Any]] = []
+        other = client.new_page(other_received)
         await client.hub.welcome(other)
         request = {"number": 1, "request": {"kind": "attach", "document_kind": "robot", "document": key}}
         await client.hub.answer(other, json.dumps(request))
@@ -197,15 +214,15 @@ def test_two_pages_show_each_other_s_edits(tmp_path: Path) -> None:
             )
             pose = await client.ask("pose", document=key, q=[0.0] * 6)
             await client.ask("scene", document=key)
-        assert other_told[-1]["state"]["version"] == 8
+        assert other_received[-1]["state"]["version"] == 8
         arm = ab.Arm(client.hub.documents[key].document.value)
         assert_allclose(pose, arm.link_poses([0.0] * 6), atol=1e-14)
-        client.hub.leave(other)
+        client.hub.remove_page(other)
         late: list[dict[str, Any]] = []
         await client.hub.welcome(client.new_page(late))
         assert [(state["document"], state["version"]) for state in late[0]["documents"]] == [(key, 8)]
         await client.ask("undo", document=key)
-        assert other_told[-1]["state"]["version"] == 8
+        assert other_received[-1]["state"]["version"] == 8
         assert "open document" in await client.refused("undo", document="nobody")
         rename = {"kind": "rename", "block": "a", "name": "b"}
         assert "'rename' is not an edit of a robot" in await client.refused(
@@ -273,5 +290,5 @@ def test_file_kinds_are_recognised_and_file_sizes_are_bounded() -> None:
             kind_of_data(wrong, "model.json")
     with pytest.raises(FormatError, match="is not a suffix of a robot file"):
         read_robots(b"", "arm.step")
-    with pytest.raises(FormatError, match="it has 1048577 bytes"):
+    with pytest.raises(FormatError, match="the file has 1048577 bytes"):
         read_robots(b" " * (2**20 + 1), "arm.m")

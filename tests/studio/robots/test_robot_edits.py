@@ -180,9 +180,9 @@ def test_joints_are_added_removed_moved_and_renamed() -> None:
 def test_a_joint_changed_to_prismatic_loses_its_angular_limits() -> None:
     robot = load_robot("puma560")
     name = robot.links[1].name
-    slid = typed(robot, name, "joint", "prismatic").link(name)
-    assert slid.joint.letter == "P"
-    assert slid.joint.limits == JointLimits()
+    prismatic_link = typed(robot, name, "joint", "prismatic").link(name)
+    assert prismatic_link.joint.letter == "P"
+    assert prismatic_link.joint.limits == JointLimits()
     assert typed(robot, name, "joint", "revolute") == robot
 
 
@@ -201,8 +201,8 @@ def test_non_physical_values_are_marked_at_their_cells() -> None:
     assert set(marked) == {"link1", "link3"}  # as printed in the paper
     assert "Izz" in marked["link1"].columns
     assert "exceeds the sum of the other two" in marked["link3"].what
-    mended = typed(typed(typed(robot, "link1", "Iyy", "0"), "link1", "mass", "1"), "link3", "Izz", "0.03")
-    assert robot_content(mended).findings == []
+    corrected = typed(typed(typed(robot, "link1", "Iyy", "0"), "link1", "mass", "1"), "link3", "Izz", "0.03")
+    assert robot_content(corrected).findings == []
     with pytest.warns(UserWarning, match="friction accelerates"):
         bad = typed(robot, "link2", "Tc-", "0.1")
     findings_shown = robot_content(bad).findings
@@ -220,7 +220,7 @@ def test_every_column_is_sent_to_the_page() -> None:
     assert json.loads(tables.model_dump_json())["robot"][0]["name"] == "name"
 
 
-LETTERS = st.sampled_from(["0", "1", "-2.5", "pi/3", "45 deg", "", "x", "1e400", "revolute", "prismatic"])
+CELL_TEXTS = st.sampled_from(["0", "1", "-2.5", "pi/3", "45 deg", "", "x", "1e400", "revolute", "prismatic"])
 NAMES = st.sampled_from(["link1", "link2", "link3", "link4", "link5", "arm", ""])
 EDITS = st.one_of(
     st.builds(
@@ -233,7 +233,7 @@ EDITS = st.one_of(
         },
         NAMES,
         st.sampled_from([*LINK_COLUMNS, *ROBOT_COLUMNS]),
-        LETTERS,
+        CELL_TEXTS,
         st.sampled_from(["deg", "rad"]),
     ),
     st.builds(lambda name, new: {"kind": "rename_link", "link": name, "name": new}, NAMES, NAMES),
@@ -255,7 +255,7 @@ EDITS = st.one_of(
 @pytest.mark.filterwarnings("ignore:.*friction accelerates")
 def test_undoing_any_sequence_of_edits_restores_the_file(edits: list[dict[str, Any]]) -> None:
     history = History(load_robot("kr180"))
-    before, forms = write_robot(history.value), [write_robot(history.value)]
+    before, files = write_robot(history.value), [write_robot(history.value)]
     for one in edits:
         edit = EDIT.validate_python(one)
         try:
@@ -265,16 +265,16 @@ def test_undoing_any_sequence_of_edits_restores_the_file(edits: list[dict[str, A
             continue
         assert ROBOT_EDITS.title(edit)
         history.replace(ROBOT_EDITS.title(edit), after)
-        forms.append(write_robot(history.value))
+        files.append(write_robot(history.value))
         robot_content(history.value).model_dump_json()
-    for form in forms[-2::-1]:
+    for file in files[-2::-1]:
         history.undo()
-        assert write_robot(history.value) == form
+        assert write_robot(history.value) == file
     assert write_robot(history.value) == before
-    assert not history.dirty or len(forms) == 1
-    for form in forms[1:]:
+    assert not history.dirty or len(files) == 1
+    for file in files[1:]:
         history.redo()
-        assert write_robot(history.value) == form
+        assert write_robot(history.value) == file
 
 
 def test_changes_of_one_gesture_are_one_undo_step() -> None:

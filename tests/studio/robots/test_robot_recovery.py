@@ -59,7 +59,7 @@ def test_journaled_requests_of_version_0_2_0_are_converted(
 
 
 def requests(seed: int, count: int) -> list[Any]:
-    """Letters typed into cells, several to a cell, with undo and redo between them."""
+    """Requests that type texts into cells, several per cell, with undo and redo between them."""
     random_ = random.Random(seed)
     result: list[Any] = []
     while len(result) < count:
@@ -77,9 +77,7 @@ def requests(seed: int, count: int) -> list[Any]:
 def test_recovered_robot_edits_have_their_undo_and_redo_history(
     disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int
 ) -> None:
-    monkeypatch.setattr(
-        open_files, "SNAPSHOT_EVERY", 25
-    )  # some snapshots fall between the letters of one cell
+    monkeypatch.setattr(open_files, "SNAPSHOT_EVERY", 25)  # some snapshots fall between the texts of one cell
 
     async def scenario() -> None:
         robots = disk.robots()
@@ -143,7 +141,7 @@ def test_unsaved_robots_are_offered_and_do_not_overwrite_a_newer_file(disk: Disk
         newer_content = write_robot(load_robot("kr180"))
         second.project.path("arm.json").write_bytes(newer_content)
         after = second.robots()
-        (offer,) = after.recoverable.offers()
+        (offer,) = after.recoverable.descriptions()
         assert (offer.kind, offer.path, offer.disk, offer.edits, offer.parts) == (
             "robot",
             "arm.json",
@@ -151,7 +149,7 @@ def test_unsaved_robots_are_offered_and_do_not_overwrite_a_newer_file(disk: Disk
             1,
             6,
         )
-        assert [offer.kind for offer in second.documents().recoverable.offers()] == ["diagram"]
+        assert [offer.kind for offer in second.documents().recoverable.descriptions()] == ["diagram"]
         recovered = await after.recover(document_messages.Recover(document=open_file.key, action="keep_both"))
         assert recovered is not None
         assert recovered.path is not None
@@ -186,7 +184,7 @@ def test_a_page_finds_its_robot_after_a_server_restart(disk: Disk) -> None:
         first = disk.robots()
         opened = first.new()
         await first.save(opened, "arm.json", overwrite=False)
-        first.end()
+        first.close_all()
         robots = disk.robots()
         open_file = robots.attach("0123456789abcdef", "arm.json")
         assert (open_file.key, open_file.robot) == ("0123456789abcdef", opened.robot)
@@ -201,7 +199,7 @@ def test_a_page_finds_its_robot_after_a_server_restart(disk: Disk) -> None:
 def test_a_dropped_robot_is_journaled_before_its_first_edit(disk: Disk, tmp_path: Path) -> None:
     async def scenario() -> None:
         robots = disk.robots()
-        open_file = robots.bring(load_robot("kr180"))
+        open_file = robots.open_value(load_robot("kr180"))
         assert open_file.document.dirty
         with pytest.raises(InputError, match="has unsaved edits"):
             robots.close(open_file, discard=False)

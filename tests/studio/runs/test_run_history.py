@@ -27,7 +27,7 @@ from armblocks.studio.runs.workers import Worker
 )
 def test_a_run_continued_after_going_back_equals_the_original_run(name: str) -> None:
     model = CompiledDiagram(load_diagram(name, BLOCKS))
-    whole = model.simulate()
+    original = model.simulate()
     history = RunHistory(model)
     history.run.advance(0.3 * history.run.stop_time)
     history.add_snapshot()
@@ -42,8 +42,8 @@ def test_a_run_continued_after_going_back_equals_the_original_run(name: str) -> 
     history.run.advance()
     rest = history.samples(remaining)
     assert rest.begin == remaining
-    np.testing.assert_array_equal(rest.time, whole.time[remaining:])
-    np.testing.assert_array_equal(rest.signals, whole.signals[:, remaining:])
+    np.testing.assert_array_equal(rest.time, original.time[remaining:])
+    np.testing.assert_array_equal(rest.signals, original.signals[:, remaining:])
 
 
 def test_every_instant_is_reachable_with_a_bounded_number_of_checkpoints(
@@ -53,8 +53,8 @@ def test_every_instant_is_reachable_with_a_bounded_number_of_checkpoints(
     history = RunHistory(CompiledDiagram(load_diagram("falling_pendulum", BLOCKS)))
     for _ in range(200):
         history.step()
-    marks = history._snapshots  # pyright: ignore[reportPrivateUsage]
-    assert len(marks) < 100
+    snapshots = history._snapshots  # pyright: ignore[reportPrivateUsage]
+    assert len(snapshots) < 100
     for row in (150, 77, 3):
         history.return_to_sample(row)
         assert row - 5 < history.recorded <= row
@@ -92,7 +92,7 @@ class Listener:
     def __init__(self) -> None:
         self.events: list[Any] = []
         self.times: list[float] = []
-        self.news = asyncio.Event()
+        self.changed = asyncio.Event()
 
     async def notify(self, event: run_messages.Message | bytes) -> None:
         if isinstance(event, bytes):
@@ -103,16 +103,16 @@ class Listener:
             self.events.append(event)
             if isinstance(event, run_messages.RunRewound):
                 del self.times[event.count :]
-        self.news.set()
+        self.changed.set()
 
-    async def until(self, kind: type, fits: Callable[[Any], bool] = lambda _: True) -> Any:
+    async def until(self, kind: type, condition: Callable[[Any], bool] = lambda _: True) -> Any:
         async def waiting() -> Any:
             while True:
                 for event in self.events:
-                    if isinstance(event, kind) and fits(event):
+                    if isinstance(event, kind) and condition(event):
                         return event
-                self.news.clear()
-                await self.news.wait()
+                self.changed.clear()
+                await self.changed.wait()
 
         try:
             return await asyncio.wait_for(waiting(), 120)
@@ -126,34 +126,36 @@ def test_a_run_in_a_process_is_tuned_rewound_and_finished() -> None:
         run = RunProcess("r", "d", Worker(), received.notify)
         source = diagram_to_bytes(load_diagram("van_der_pol_pid", BLOCKS), load_robot).decode()
         run.start({"diagram": source, "folder": ".", "speed": 5.0, "tuned": {"PID.I": "1/2"}})
-        begun = await received.until(run_messages.RunStarted)
-        assert {t.path: t.value for t in begun.tunables}["PID.I"] == 0.5, "trial values apply from the start"
+        started = await received.until(run_messages.RunStarted)
+        assert {t.path: t.value for t in started.tunables}["PID.I"] == 0.5, (
+            "trial values apply from the start"
+        )
         while len(received.times) < 100:
             await asyncio.sleep(0.02)
-        run.obey(run_messages.Control(run="r", action="pause"))
+        run.send_command(run_messages.Control(run="r", action="pause"))
         await received.until(
             run_messages.RunProgress, lambda event: event.state == "paused"
         )  # after the last samples
-        reached = len(received.times)
-        run.obey(run_messages.Tune(run="r", values={"PID.P": "2*3"}))
+        paused_count = len(received.times)
+        run.send_command(run_messages.Tune(run="r", values={"PID.P": "2*3"}))
         assert (await received.until(run_messages.RunTuned)).parameter == "PID.P"
-        run.obey(run_messages.Tune(run="r", values={"PID.P": "six"}))
+        run.send_command(run_messages.Tune(run="r", values={"PID.P": "six"}))
         assert "six" in (await received.until(run_messages.RunProgress, lambda event: event.fault)).message
-        run.obey(run_messages.Control(run="r", action="back"))
-        assert (await received.until(run_messages.RunRewound)).count < reached
+        run.send_command(run_messages.Control(run="r", action="back"))
+        assert (await received.until(run_messages.RunRewound)).count < paused_count
         received.events.clear()
-        run.obey(run_messages.Rewind(run="r", time=0.5))
+        run.send_command(run_messages.Rewind(run="r", time=0.5))
         rewound = await received.until(run_messages.RunRewound)
         assert received.times[-1] <= 0.5
         assert rewound.count == len(received.times)
-        run.obey(run_messages.SetSpeed(run="r", speed=None))
-        run.obey(run_messages.Control(run="r", action="resume"))
+        run.send_command(run_messages.SetSpeed(run="r", speed=None))
+        run.send_command(run_messages.Control(run="r", action="resume"))
         end = await received.until(run_messages.RunProgress, lambda event: event.state == "done")
         assert end.solver
         assert "auto" in end.reason
         assert np.all(np.diff(received.times) > 0)
         with pytest.raises(ArmblocksError, match="the run has ended"):
-            run.obey(run_messages.Control(run="r", action="back"))
+            run.send_command(run_messages.Control(run="r", action="back"))
         run.end()
 
     asyncio.run(main())

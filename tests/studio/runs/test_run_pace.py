@@ -28,7 +28,7 @@ class Clock:
         return self.now
 
 
-def test_due_time_follows_the_clock_from_its_reference() -> None:
+def test_target_time_follows_the_clock_from_its_reference() -> None:
     clock = Clock()
     pace = Pace(0.5, clock)
     assert pace.target_time == 0.0
@@ -111,9 +111,9 @@ def test_a_slow_run_is_never_ahead_of_the_clock(
     shown = [event["real_time_factor"] for event in pipe.events if event["kind"] == "run_progress"]
     assert len(shown) > 1000
     assert max(shown) <= 0.5 + 1e-12
-    whole = ab.simulate(lag())
-    np.testing.assert_array_equal(pipe.times, whole.time)
-    np.testing.assert_array_equal(pipe.values, whole["lag/y"])
+    complete = ab.simulate(lag())
+    np.testing.assert_array_equal(pipe.times, complete.time)
+    np.testing.assert_array_equal(pipe.values, complete["lag/y"])
 
 
 def test_a_tuned_value_applies_from_the_displayed_instant(

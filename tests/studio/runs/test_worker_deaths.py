@@ -37,15 +37,15 @@ class Client:
     def __init__(self, folder: Path) -> None:
         self.hub = Hub(ProjectFolder(folder))
         self.events: list[dict[str, Any]] = []
-        self.news = asyncio.Event()
-        self.page = Page(self._hear, self._hear_frame)
+        self.received = asyncio.Event()
+        self.page = Page(self._receive, self._receive_frame)
         self._number = 0
 
-    async def _hear(self, text: str) -> None:
+    async def _receive(self, text: str) -> None:
         self.events.append(json.loads(text))
-        self.news.set()
+        self.received.set()
 
-    async def _hear_frame(self, data: bytes) -> None:
+    async def _receive_frame(self, data: bytes) -> None:
         del data
 
     async def ask(self, kind: str, **values: Any) -> Any:
@@ -61,11 +61,11 @@ class Client:
         """Wait for the first message that reports one of these states of a run."""
         async with asyncio.timeout(TIMEOUT_SECONDS):
             while True:
-                self.news.clear()
+                self.received.clear()
                 for event in self.events:
                     if event["kind"] == "run_progress" and event["run"] == run and event["state"] in states:
                         return event
-                await self.news.wait()
+                await self.received.wait()
 
     def pid(self, run: str) -> int:
         pid = self.hub.runs.processes[run]._worker.process.pid  # pyright: ignore[reportPrivateUsage]
@@ -134,7 +134,7 @@ def use_up_the_processor(pipe: Connection) -> None:
     hang_in_python(pipe)
 
 
-def fail_unforeseen(pipe: Connection) -> None:
+def fail_unexpectedly(pipe: Connection) -> None:
     def defect(_: RunHistory) -> None:
         raise KeyError("something")
 
@@ -146,7 +146,7 @@ DEATHS: list[tuple[Callable[[Connection], None], str]] = [
     (crash, "the process of the run crashed (SIGSEGV)"),
     (use_up_memory, "the run exceeds its memory limit"),
     (use_up_the_processor, "the run has exceeded its limit of processor time (SIGXCPU)"),
-    (fail_unforeseen, "armblocks has a defect (KeyError: 'something')"),
+    (fail_unexpectedly, "armblocks has a defect (KeyError: 'something')"),
 ]
 
 
@@ -219,7 +219,7 @@ def test_a_paused_run_is_ended_at_the_time_limit(tmp_path: Path) -> None:
         await client.until(run, "running")
         await client.ask("control", run=run, action="pause")
         await client.until(run, "paused")
-        client.hub.runs.processes[run]._until = monotonic() + 0.2  # pyright: ignore[reportPrivateUsage]
+        client.hub.runs.processes[run]._deadline = monotonic() + 0.2  # pyright: ignore[reportPrivateUsage]
         await client.ask("control", run=run, action="back")
         last = await client.until(run, "failed")
         assert (
@@ -240,10 +240,10 @@ def test_a_killed_worker_is_reported_and_its_samples_remain(tmp_path: Path) -> N
         assert "(SIGKILL): the memory may be exhausted" in last["fault"]["what"]
         late: list[str | bytes] = []
 
-        async def hear(text: str | bytes) -> None:
+        async def receive(text: str | bytes) -> None:
             late.append(text)
 
-        other = Page(hear, hear)
+        other = Page(receive, receive)
         await client.hub.welcome(other)
         request = {"kind": "attach", "document": document, "document_kind": "diagram"}
         attach = {"number": 1, "request": request}
@@ -288,7 +288,7 @@ def defect_in_the_report(pipe: Connection, job: dict[str, Any]) -> None:
         raise KeyError("something")
 
     run_report.begin_run = defect  # pyright: ignore[reportAttributeAccessIssue]
-    run_report.write(pipe, job)
+    run_report.send_report(pipe, job)
 
 
 @pytest.mark.parametrize(
@@ -304,7 +304,7 @@ def test_a_report_whose_process_fails_raises_an_error_with_the_reason(
     death: Callable[[Connection, dict[str, Any]], None],
     words: str,
 ) -> None:
-    monkeypatch.setattr(run_report, "write", death)
+    monkeypatch.setattr(run_report, "send_report", death)
 
     async def scenario(client: Client) -> None:
         document = await client.ask("open_shipped", document_kind="diagram", name="falling_pendulum")

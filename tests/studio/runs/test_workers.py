@@ -18,7 +18,7 @@ from armblocks.studio.runs.workers import Worker, Workers
 
 def with_workers(scenario: Callable[[Workers], Awaitable[None]]) -> None:
     async def main() -> None:
-        pool = Workers(pause=0.0)
+        pool = Workers(delay=0.0)
         try:
             await scenario(pool)
         finally:
@@ -29,7 +29,7 @@ def with_workers(scenario: Callable[[Workers], Awaitable[None]]) -> None:
 
 async def waiting_worker(pool: Workers) -> Worker:
     """The prepared worker for the next run."""
-    waiting = pool._next  # pyright: ignore[reportPrivateUsage]
+    waiting = pool._next_worker  # pyright: ignore[reportPrivateUsage]
     assert waiting is not None
     return await waiting
 
@@ -65,7 +65,7 @@ def test_a_worker_that_died_while_waiting_is_not_used() -> None:
 def test_taking_a_worker_starts_a_delayed_one_at_once() -> None:
     async def scenario(pool: Workers) -> None:
         pool.prepare(after=3600.0)
-        assert pool._next is None  # pyright: ignore[reportPrivateUsage]
+        assert pool._next_worker is None  # pyright: ignore[reportPrivateUsage]
         (await pool.take()).end()
 
     with_workers(scenario)
@@ -85,7 +85,7 @@ def test_a_failed_process_start_is_reported(monkeypatch: pytest.MonkeyPatch) -> 
     with_workers(scenario)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere every worker imports for itself")
+@pytest.mark.skipif(sys.platform != "linux", reason="on other systems every worker imports its modules")
 def test_a_worker_is_not_a_fork_of_the_server() -> None:
     # A fork would hold the server's sockets and the locks of its threads in arbitrary states.
     worker = Worker()

@@ -155,16 +155,16 @@ def test_hostile_parameters_cause_no_server_error_and_reveal_no_file(
     web: Path, keys: Keys, tmp_path: Path
 ) -> None:
     (tmp_path / "project").mkdir()
-    coming = FutureHub(ProjectFolder(tmp_path / "project"))
-    app = studio_app(coming, keys, frozenset({HOST}), web)
+    future_hub = FutureHub(ProjectFolder(tmp_path / "project"))
+    app = studio_app(future_hub, keys, frozenset({HOST}), web)
 
     events: list[dict[str, Any]] = []
 
-    async def hear(text: str | bytes) -> None:
+    async def receive(text: str | bytes) -> None:
         events.append(json.loads(text))
 
     async def opened() -> str:
-        hub, page = await coming.ready(), Page(hear, hear)
+        hub, page = await future_hub.ready(), Page(receive, receive)
         await hub.answer(page, '{"number": 1, "request": {"kind": "new", "document_kind": "diagram"}}')
         return events[-1]["value"]
 
@@ -222,17 +222,17 @@ def test_a_websocket_needs_cookie_and_origin_or_the_token(app: Guard, keys: Keys
     bearer = {"host": HOST, "authorization": f"Bearer {keys.token}"}
     assert call(app, "/ws", bearer, kind="websocket") == 0
     assert call(app, "/ws", {**bearer, "authorization": "Bearer x"}, kind="websocket") == 4403
-    crossed = {**cookie(keys), "origin": ORIGIN, "sec-fetch-site": "cross-site"}
-    assert call(app, "/ws", crossed, kind="websocket") == 4403
+    cross_site = {**cookie(keys), "origin": ORIGIN, "sec-fetch-site": "cross-site"}
+    assert call(app, "/ws", cross_site, kind="websocket") == 4403
 
 
 def test_requests_that_change_something_need_the_custom_header(app: Guard, keys: Keys) -> None:
     assert call(app, "/", {**cookie(keys), "origin": ORIGIN}, method="POST")[0] == 403
-    crossed = {**cookie(keys), "origin": ORIGIN, "x-armblocks": "1", "sec-fetch-site": "same-site"}
-    assert call(app, "/", crossed, method="POST")[0] == 403
+    cross_site = {**cookie(keys), "origin": ORIGIN, "x-armblocks": "1", "sec-fetch-site": "same-site"}
+    assert call(app, "/", cross_site, method="POST")[0] == 403
     # Accepted by the guard, rejected by the route, which has no POST method.
-    passed = {**cookie(keys), "origin": ORIGIN, "x-armblocks": "1", "sec-fetch-site": "same-origin"}
-    assert call(app, "/", passed, method="POST")[0] == 405
+    accepted = {**cookie(keys), "origin": ORIGIN, "x-armblocks": "1", "sec-fetch-site": "same-origin"}
+    assert call(app, "/", accepted, method="POST")[0] == 405
 
 
 def test_two_host_headers_are_refused(app: Guard, keys: Keys) -> None:

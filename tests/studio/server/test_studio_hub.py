@@ -23,10 +23,10 @@ from armblocks.studio.server.launch import serve
 TIMEOUT_SECONDS = 180
 
 
-async def until(true: Callable[[], bool]) -> None:
+async def until(condition: Callable[[], bool]) -> None:
     """Let the hub run until a condition is true."""
     async with asyncio.timeout(TIMEOUT_SECONDS):
-        while not true():
+        while not condition():
             await asyncio.sleep(0.005)
 
 
@@ -172,10 +172,10 @@ def test_a_document_is_closed_only_on_the_page_that_closes_it(tmp_path: Path) ->
         key = await ask("new", document_kind="diagram")
         received: Events = []
 
-        async def hear(text: str) -> None:
+        async def receive(text: str) -> None:
             received.append(json.loads(text))
 
-        other = Page(hear, hear)  # type: ignore[arg-type]
+        other = Page(receive, receive)  # type: ignore[arg-type]
         await hub.welcome(other)
         attach = {"kind": "attach", "document": key, "document_kind": "diagram"}
         await hub.answer(other, json.dumps({"number": 1, "request": attach}))
@@ -196,10 +196,10 @@ def test_pages_that_do_not_show_a_document_are_notified_of_unsaved_changes(tmp_p
     async def scenario(hub: Hub, ask: Callable[..., Awaitable[Any]], events: Events) -> None:
         received: Events = []
 
-        async def hear(text: str) -> None:
+        async def receive(text: str) -> None:
             received.append(json.loads(text))
 
-        await hub.welcome(Page(hear, hear))  # type: ignore[arg-type]
+        await hub.welcome(Page(receive, receive))  # type: ignore[arg-type]
         key = await ask("new", document_kind="diagram")
         await ask("change", document=key, key="1", edit={"kind": "add", "blocks": [GAIN]})
         assert [state["dirty"] for state in received[-1]["documents"]] == [True]

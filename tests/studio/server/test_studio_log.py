@@ -21,7 +21,7 @@ from armblocks.studio.server.terminal_log import log_settings
 from conftest import TIMEOUT_MS, Studio
 from interruptible import killed_at_the_end
 
-CONTENT = "what-nobody-else-should-read"
+CONTENT = "confidential-content"
 
 
 class NoRedirect(urllib.request.HTTPRedirectHandler):

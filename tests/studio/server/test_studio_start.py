@@ -16,7 +16,7 @@ from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.server import launch
 from armblocks.studio.server.guard import Keys
 from armblocks.studio.server.hub import Hub
-from armblocks.studio.server.web_app import FOREVER, FutureHub, studio_app
+from armblocks.studio.server.web_app import CACHE_CONTROL, FutureHub, studio_app
 
 HOST = "127.0.0.1:8642"
 
@@ -29,7 +29,7 @@ def web(tmp_path: Path) -> Path:
     return tmp_path / "web"
 
 
-def answered(web: Path, hub: FutureHub, path: str) -> tuple[int, dict[str, str]]:
+def response(web: Path, hub: FutureHub, path: str) -> tuple[int, dict[str, str]]:
     """Status and headers of the response to an authenticated page."""
     keys, sent = Keys(8642), list[MutableMapping[str, Any]]()
     app = studio_app(hub, keys, frozenset({HOST}), web)
@@ -60,29 +60,29 @@ def answered(web: Path, hub: FutureHub, path: str) -> tuple[int, dict[str, str]]
 def test_the_page_is_served_while_the_hub_is_created(
     web: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    go_on = threading.Event()
+    resume = threading.Event()
 
-    def slow(folder: ProjectFolder) -> Hub:
-        go_on.wait()
+    def delayed_hub(folder: ProjectFolder) -> Hub:
+        resume.wait()
         return Hub(folder)
 
-    monkeypatch.setattr("armblocks.studio.server.hub.Hub", slow)
+    monkeypatch.setattr("armblocks.studio.server.hub.Hub", delayed_hub)
     hub = FutureHub(ProjectFolder(tmp_path))
     hub.begin()
     try:
-        assert answered(web, hub, "/")[0] == 200
-        assert answered(web, hub, "/assets/index-1a2b.js")[0] == 200
+        assert response(web, hub, "/")[0] == 200
+        assert response(web, hub, "/assets/index-1a2b.js")[0] == 200
         assert not hub.result.done()
     finally:
-        go_on.set()
+        resume.set()
     assert isinstance(hub.result.result(timeout=60), Hub)
     hub.result.result().close()
 
 
 def test_hashed_files_are_cached_and_the_page_is_not(web: Path, tmp_path: Path) -> None:
     hub = FutureHub(ProjectFolder(tmp_path))
-    assert answered(web, hub, "/assets/index-1a2b.js")[1]["cache-control"] == FOREVER
-    assert answered(web, hub, "/")[1]["cache-control"] == "no-cache"
+    assert response(web, hub, "/assets/index-1a2b.js")[1]["cache-control"] == CACHE_CONTROL
+    assert response(web, hub, "/")[1]["cache-control"] == "no-cache"
 
 
 def test_a_server_whose_hub_cannot_be_created_ends_with_the_reason(

@@ -28,8 +28,8 @@ from armblocks.studio.protocol.messages.sheet_edits import (
 )
 from armblocks.studio.protocol.messages.sheets import SheetChange
 from armblocks.studio.sheet.document import Document
+from armblocks.studio.sheet.drawing_data import sheet, sheet_change
 from armblocks.studio.sheet.lines import SheetLines, changed_lines
-from armblocks.studio.sheet.shown import sheet, sheet_change
 
 ORIGIN = Place(x=0, y=0)
 
@@ -144,12 +144,12 @@ class Page:
         self.version = document.version
         self.blocks: dict[str, Any] = dict(sheet(document.diagram).blocks)
         self.wires = set(sheet(document.diagram).wires)
-        self.lines: dict[str, Any] = dict(SheetLines().of(document.diagram))
-        self.coming: deque[tuple[int, SheetChange]] = deque()
+        self.lines: dict[str, Any] = dict(SheetLines().route(document.diagram))
+        self.pending: deque[tuple[int, SheetChange]] = deque()
 
-    def hear(self) -> None:
+    def receive(self) -> None:
         """Process the next message."""
-        self.version, change = self.coming.popleft()
+        self.version, change = self.pending.popleft()
         for name, block in change.blocks.items():
             if block is None:
                 self.blocks.pop(name, None)
@@ -187,8 +187,8 @@ def test_random_edits_of_two_pages_overwrite_no_unseen_change_and_converge(seed:
     applied: list[tuple[int, str, set[tuple[str, ...]]]] = []
     for _ in range(200):
         page = random_.choice(pages)
-        if page.coming and random_.random() < 0.6:
-            page.hear()
+        if page.pending and random_.random() < 0.6:
+            page.receive()
             continue
         before = document.diagram
         try:
@@ -201,12 +201,12 @@ def test_random_edits_of_two_pages_overwrite_no_unseen_change_and_converge(seed:
             if author != page.name and version > page.version:
                 assert not clash(touched, theirs), "an edit that the page had not seen was overwritten"
         applied.append((document.version, page.name, touched))
-        changed = changed_lines(lines.of(before), lines.of(document.diagram))
+        changed = changed_lines(lines.route(before), lines.route(document.diagram))
         for listener in pages:
-            listener.coming.append((document.version, sheet_change(before, document.diagram, changed)))
+            listener.pending.append((document.version, sheet_change(before, document.diagram, changed)))
     for page in pages:
-        while page.coming:
-            page.hear()
+        while page.pending:
+            page.receive()
     assert pages[0].blocks == pages[1].blocks == sheet(document.diagram).blocks
     assert pages[0].wires == pages[1].wires == set(sheet(document.diagram).wires)
-    assert pages[0].lines == pages[1].lines == SheetLines().of(document.diagram)
+    assert pages[0].lines == pages[1].lines == SheetLines().route(document.diagram)

@@ -19,9 +19,9 @@ NEW_NAMES = tuple(f"new {k}" for k in range(12))
 class Sheet:
     """One sheet of a diagram and a random generator."""
 
-    def __init__(self, diagram: Diagram, chance: random.Random) -> None:
+    def __init__(self, diagram: Diagram, rng: random.Random) -> None:
         self.diagram = diagram
-        self.chance = chance
+        self.rng = rng
         self.blocks = list(diagram.blocks)
         self.outputs = [
             f"{name}/{port.name}" for name, block in diagram.blocks.items() for port in block.output_ports()
@@ -30,62 +30,64 @@ class Sheet:
             f"{name}/{port.name}" for name, block in diagram.blocks.items() for port in block.input_ports()
         ]
         self.wires = [do.Wire(source=str(c.source), target=str(c.target)) for c in diagram.connections]
-        self.insides = [name for name, block in diagram.blocks.items() if isinstance(block, DiagramBlock)]
+        self.subsystems = [name for name, block in diagram.blocks.items() if isinstance(block, DiagramBlock)]
 
-    def one(self, of: Any) -> Any:
-        return self.chance.choice(list(of) or ["nothing"])
+    def pick(self, items: Any) -> Any:
+        return self.rng.choice(list(items) or ["nothing"])
 
-    def some(self, of: Any) -> list[Any]:
-        entries = list(of)
-        return self.chance.sample(entries, min(len(entries), self.chance.randint(1, 3)))
+    def pick_some(self, items: Any) -> list[Any]:
+        entries = list(items)
+        return self.rng.sample(entries, min(len(entries), self.rng.randint(1, 3)))
 
     def place(self) -> do.Place:
         return do.Place(
-            x=self.chance.randint(-500, 500),
-            y=float(self.chance.randint(-500, 500)),
-            flipped=self.chance.random() < 0.3,
-            rotation=self.one((0, 90, 180, 270)),
-            name_side=self.one(NAME_SIDES),
-            colour=self.one(BLOCK_COLOURS),
+            x=self.rng.randint(-500, 500),
+            y=float(self.rng.randint(-500, 500)),
+            flipped=self.rng.random() < 0.3,
+            rotation=self.pick((0, 90, 180, 270)),
+            name_side=self.pick(NAME_SIDES),
+            colour=self.pick(BLOCK_COLOURS),
         )
 
     def wire(self) -> do.Wire:
-        return do.Wire(source=self.one(self.outputs), target=self.one(self.inputs))
+        return do.Wire(source=self.pick(self.outputs), target=self.pick(self.inputs))
 
     def note(self) -> do.SheetNote:
-        return do.SheetNote(x=self.chance.random(), y=2.0, text=self.one(("a", "b\nc", "ä")))
+        return do.SheetNote(x=self.rng.random(), y=2.0, text=self.pick(("a", "b\nc", "ä")))
 
 
 def add(s: Sheet) -> do.DiagramEdit:
-    name = s.one(NEW_NAMES)
-    return do.AddBlocks(blocks=[do.NewBlock(name=name, type=s.one(TYPES), place=s.place())])
+    name = s.pick(NEW_NAMES)
+    return do.AddBlocks(blocks=[do.NewBlock(name=name, type=s.pick(TYPES), place=s.place())])
 
 
 def paste(s: Sheet) -> do.DiagramEdit:
-    names = s.some(s.blocks)
-    called = {name: f"{name} copy {s.chance.randrange(100)}" for name in names}
-    return do.PasteBlocks(text=clipped(s.diagram, names, [], load_robot), names=called, shift=20.0)
+    names = s.pick_some(s.blocks)
+    new_names = {name: f"{name} copy {s.rng.randrange(100)}" for name in names}
+    return do.PasteBlocks(text=clipped(s.diagram, names, [], load_robot), names=new_names, shift=20.0)
 
 
 def remove(s: Sheet) -> do.DiagramEdit:
-    return s.one(
+    return s.pick(
         (
-            do.RemoveBlocks(blocks=[s.one(s.blocks)] if s.blocks else []),
-            do.RemoveBlocks(wires=[s.one(s.wires)] if s.wires else []),
-            do.RemoveBlocks(notes=s.some(s.diagram.notes)),
+            do.RemoveBlocks(blocks=[s.pick(s.blocks)] if s.blocks else []),
+            do.RemoveBlocks(wires=[s.pick(s.wires)] if s.wires else []),
+            do.RemoveBlocks(notes=s.pick_some(s.diagram.notes)),
         )
     )
 
 
 def move(s: Sheet) -> do.DiagramEdit:
-    places = {name: s.place() for name in s.some(s.blocks)}
+    places = {name: s.place() for name in s.pick_some(s.blocks)}
     notes = {name: s.note() for name in s.diagram.notes}
-    return do.MoveBlocks(places=places, notes=notes, instead=s.some(s.wires)[: s.chance.randint(0, 1)])
+    return do.MoveBlocks(places=places, notes=notes, instead=s.pick_some(s.wires)[: s.rng.randint(0, 1)])
 
 
 def bend(s: Sheet) -> do.DiagramEdit:
-    ways = [[], [10.0, 40.0, 90.0], [1.5]]
-    return do.BendWires(wires=[w.model_copy(update={"bends": tuple(s.one(ways))}) for w in s.some(s.wires)])
+    routes = [[], [10.0, 40.0, 90.0], [1.5]]
+    return do.BendWires(
+        wires=[w.model_copy(update={"bends": tuple(s.pick(routes))}) for w in s.pick_some(s.wires)]
+    )
 
 
 def numbers(s: Sheet) -> list[str]:
@@ -99,78 +101,98 @@ def numbers(s: Sheet) -> list[str]:
 
 
 def parameters(s: Sheet) -> do.DiagramEdit:
-    block, _, parameter = s.one(numbers(s)).rpartition(".")
-    return do.SetParameters(block=block, values={parameter: s.one((2.0, "2*pi", "k", "1/3"))})
+    block, _, parameter = s.pick(numbers(s)).rpartition(".")
+    return do.SetParameters(block=block, values={parameter: s.pick((2.0, "2*pi", "k", "1/3"))})
 
 
 def mask(s: Sheet) -> do.DiagramEdit:
-    declared = [do.MaskParameter(name="k", default=s.one((1.0, "3*pi")), unit=s.one(("", "m")))]
-    return do.SetMask(block=s.one(["", *s.insides]), parameters=declared[: s.chance.randint(0, 3)])
+    declared = [do.MaskParameter(name="k", default=s.pick((1.0, "3*pi")), unit=s.pick(("", "m")))]
+    return do.SetMask(block=s.pick(["", *s.subsystems]), parameters=declared[: s.rng.randint(0, 3)])
 
 
 def keep_tuned(s: Sheet) -> do.DiagramEdit:
-    return do.KeepTuned(values={s.one(numbers(s)): s.chance.random()})
+    return do.KeepTuned(values={s.pick(numbers(s)): s.rng.random()})
 
 
 SET_NAMES = ("stiff", "soft")
 
 
 def save_parameter_set(s: Sheet) -> do.DiagramEdit:
-    values = {path: s.one((0.5, "2*pi", 3)) for path in s.some(numbers(s))}
-    flags = {"of_others": s.chance.random() < 0.5, "replace": s.chance.random() < 0.3}
-    return do.SaveParameterSet(name=s.one(SET_NAMES), values=values, **flags)
+    values = {path: s.pick((0.5, "2*pi", 3)) for path in s.pick_some(numbers(s))}
+    flags = {"all_parameters": s.rng.random() < 0.5, "replace": s.rng.random() < 0.3}
+    return do.SaveParameterSet(name=s.pick(SET_NAMES), values=values, **flags)
 
 
 def remove_set_parameter(s: Sheet) -> do.DiagramEdit:
     paths = {path for values in s.diagram.parameter_sets.values() for path in values}
-    return do.RemoveSetParameter(path=s.one(sorted(paths)))
+    return do.RemoveSetParameter(path=s.pick(sorted(paths)))
+
+
+BOOKMARK_NAMES = ("left", "right")
+
+
+def add_bookmark(s: Sheet) -> do.DiagramEdit:
+    x, width = float(s.rng.randint(-500, 500)), s.pick((1.0, 300.5))
+    part = do.SheetPart(x=x, y=-20.0, width=width, height=200.0)
+    return do.AddBookmark(name=s.pick(BOOKMARK_NAMES), part=part, replace=s.rng.random() < 0.3)
 
 
 MAKERS: dict[type[do.DiagramEdit], Callable[[Sheet], do.DiagramEdit]] = {
     do.AddBlocks: add,
     do.PasteBlocks: paste,
     do.RemoveBlocks: remove,
-    do.Connect: lambda s: do.Connect(wire=s.wire(), replace=s.chance.random() < 0.5),
+    do.Connect: lambda s: do.Connect(wire=s.wire(), replace=s.rng.random() < 0.5),
     do.MoveBlocks: move,
     do.BendWires: bend,
     do.SetAppearance: lambda s: do.SetAppearance(
-        blocks=s.some(s.blocks), name_side=s.one((None, *NAME_SIDES)), colour=s.one((None, *BLOCK_COLOURS))
+        blocks=s.pick_some(s.blocks),
+        name_side=s.pick((None, *NAME_SIDES)),
+        colour=s.pick((None, *BLOCK_COLOURS)),
     ),
-    do.SetNotes: lambda s: do.SetNotes(notes={s.one(("/1", "/2")): s.note()}),
-    do.Rename: lambda s: do.Rename(block=s.one(s.blocks), name=s.one(NEW_NAMES)),
+    do.SetNotes: lambda s: do.SetNotes(notes={s.pick(("/1", "/2")): s.note()}),
+    do.Rename: lambda s: do.Rename(block=s.pick(s.blocks), name=s.pick(NEW_NAMES)),
     do.SetParameters: parameters,
     do.SetMask: mask,
     do.KeepTuned: keep_tuned,
     do.SaveParameterSet: save_parameter_set,
     do.RenameParameterSet: lambda s: do.RenameParameterSet(
-        name=s.one(SET_NAMES), to=s.one((*SET_NAMES, "Soft"))
+        name=s.pick(SET_NAMES), to=s.pick((*SET_NAMES, "Soft"))
     ),
-    do.RemoveParameterSet: lambda s: do.RemoveParameterSet(name=s.one(SET_NAMES)),
+    do.RemoveParameterSet: lambda s: do.RemoveParameterSet(name=s.pick(SET_NAMES)),
     do.RemoveSetParameter: remove_set_parameter,
-    do.ApplyParameterSet: lambda s: do.ApplyParameterSet(name=s.one(SET_NAMES)),
+    do.ApplyParameterSet: lambda s: do.ApplyParameterSet(name=s.pick(SET_NAMES)),
     do.ArrangeBlocks: lambda s: do.ArrangeBlocks(),
-    do.LogSignal: lambda s: do.LogSignal(port=s.one(s.outputs), logged=s.chance.random() < 0.7),
+    do.LogSignal: lambda s: do.LogSignal(port=s.pick(s.outputs), logged=s.rng.random() < 0.7),
     do.CommentBlocks: lambda s: do.CommentBlocks(
-        blocks=s.some(s.blocks), comment=s.one(("out", "out", "through", ""))
+        blocks=s.pick_some(s.blocks), comment=s.pick(("out", "out", "through", ""))
     ),
-    do.NameSignal: lambda s: do.NameSignal(port=s.one(s.outputs), name=s.one(("speed", "error", "ä b", ""))),
-    do.GroundPorts: lambda s: do.GroundPorts(blocks=s.some(s.blocks)),
-    do.GroupBlocks: lambda s: do.GroupBlocks(blocks=s.some(s.blocks), name=s.one(NEW_NAMES)),
-    do.BreakLink: lambda s: do.BreakLink(block=s.one(s.insides)),
-    do.SetSettings: lambda s: do.SetSettings(values={"stop_time": s.chance.random() + 0.1}),
-    do.Describe: lambda s: do.Describe(text=s.one(("words", "other words"))),
+    do.NameSignal: lambda s: do.NameSignal(
+        port=s.pick(s.outputs), name=s.pick(("speed", "error", "ä b", ""))
+    ),
+    do.GroundPorts: lambda s: do.GroundPorts(blocks=s.pick_some(s.blocks)),
+    do.GroupBlocks: lambda s: do.GroupBlocks(blocks=s.pick_some(s.blocks), name=s.pick(NEW_NAMES)),
+    do.BreakLink: lambda s: do.BreakLink(block=s.pick(s.subsystems)),
+    do.AddBookmark: add_bookmark,
+    do.RenameBookmark: lambda s: do.RenameBookmark(
+        name=s.pick(s.diagram.bookmarks), to=s.pick((*BOOKMARK_NAMES, "Left"))
+    ),
+    do.RemoveBookmark: lambda s: do.RemoveBookmark(name=s.pick(s.diagram.bookmarks)),
+    do.SetSettings: lambda s: do.SetSettings(values={"stop_time": s.rng.random() + 0.1}),
+    do.Describe: lambda s: do.Describe(text=s.pick(("words", "other words"))),
 }
 
-SELDOM_VALID = (
+FREQUENT_EDITS = (
     *(do.KeepTuned, do.KeepTuned),
+    *(do.AddBookmark, do.AddBookmark, do.RenameBookmark),
     *(do.SaveParameterSet, do.SaveParameterSet, do.SaveParameterSet),
-    *(do.ApplyParameterSet, do.RenameParameterSet, do.RenameParameterSet, do.RemoveSetParameter),
+    *(do.ApplyParameterSet, do.ApplyParameterSet, do.RenameParameterSet, do.RenameParameterSet),
+    do.RemoveSetParameter,
 )
-"""Edits that are made more often: values are kept only in a model that can run, and most edits of parameter
-sets need a set."""
+"""Edits that are chosen more often, because they are seldom valid: tuned values need a model that can run,
+and most edits of parameter sets and bookmarks need an existing one."""
 
 
-def random_edit(document: Document, chance: random.Random) -> tuple[list[str], do.DiagramEdit]:
+def random_edit(document: Document, rng: random.Random) -> tuple[list[str], do.DiagramEdit]:
     """Return the path of a random sheet and a random edit of it."""
     path: list[str] = []
     diagram = document.diagram
@@ -178,9 +200,9 @@ def random_edit(document: Document, chance: random.Random) -> tuple[list[str], d
         inner = {
             name: block.diagram for name, block in diagram.blocks.items() if isinstance(block, DiagramBlock)
         }
-        if not inner or chance.random() < 0.6:
+        if not inner or rng.random() < 0.6:
             break
-        name = chance.choice(sorted(inner))
+        name = rng.choice(sorted(inner))
         path.append(name)
         diagram = inner[name]
-    return path, MAKERS[chance.choice([*MAKERS, *SELDOM_VALID])](Sheet(diagram, chance))
+    return path, MAKERS[rng.choice([*MAKERS, *FREQUENT_EDITS])](Sheet(diagram, rng))

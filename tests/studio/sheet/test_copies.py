@@ -73,10 +73,10 @@ def test_a_pasted_formula_becomes_a_value_where_its_names_are_undeclared() -> No
     plain = Document(Diagram(name="here", blocks={}), load_robot)
     plain.edit(PasteBlocks(text=text))
     assert plain.diagram.blocks["gain"] == Gain(gain=10.0)
-    own = Document(Diagram(name="here", blocks={}, mask=(mask_parameter("k", 1.5),)), load_robot)
-    own.edit(PasteBlocks(text=text))
-    assert dict(own.diagram.blocks["gain"].formulas) == {"gain": "2*k"}
-    assert own.diagram.blocks["gain"].parameter_value("gain") == 3.0
+    with_mask = Document(Diagram(name="here", blocks={}, mask=(mask_parameter("k", 1.5),)), load_robot)
+    with_mask.edit(PasteBlocks(text=text))
+    assert dict(with_mask.diagram.blocks["gain"].formulas) == {"gain": "2*k"}
+    assert with_mask.diagram.blocks["gain"].parameter_value("gain") == 3.0
 
 
 def test_pasting_used_names_or_invalid_text_is_refused() -> None:
@@ -124,7 +124,7 @@ def test_inserting_a_block_into_a_wire_and_removing_it_is_one_step_each() -> Non
     document = Document(placed(load_diagram("van_der_pol_pid", BLOCKS)), load_robot)
     before = document.diagram
     document.edit(PasteBlocks(text=copy(before, "damping"), names={"damping": "free"}))
-    alone = document.diagram
+    unconnected = document.diagram
     place = Place(x=500, y=400)
     through = [Wire(source="x2/y", target="free/u"), Wire(source="free/y", target="x1/u")]
     direct = [Wire(source="x2/y", target="x1/u")]
@@ -138,7 +138,7 @@ def test_inserting_a_block_into_a_wire_and_removing_it_is_one_step_each() -> Non
     assert document.diagram.connections == before.connections
     document.undo()
     document.undo()
-    assert document.diagram == alone
+    assert document.diagram == unconnected
     document.edit(RemoveBlocks(blocks=["free"]))
     with pytest.raises(DiagramError, match="the wire free/y -> x1/u does not exist"):
         document.edit(MoveBlocks(places={}, instead=through[1:]))

@@ -20,7 +20,7 @@ Ask = Callable[..., Awaitable[Any]]
 ROWS = "time [ms],x,y [deg],word\n0,1,10,a\n5,2,20,b\n20,4,30,c\n"
 
 
-def played(name: str, **choice: Any) -> dict[str, Any]:
+def file_block(name: str, **choice: Any) -> dict[str, Any]:
     return {
         "kind": "add",
         "blocks": [
@@ -31,7 +31,7 @@ def played(name: str, **choice: Any) -> dict[str, Any]:
     }
 
 
-def called(name: str, function: str, kind: str = "PythonFunction") -> dict[str, Any]:
+def function_block(name: str, function: str, kind: str = "PythonFunction") -> dict[str, Any]:
     return {
         "kind": "add",
         "blocks": [
@@ -46,20 +46,20 @@ def called(name: str, function: str, kind: str = "PythonFunction") -> dict[str, 
     }
 
 
-async def findings(message: Events, since: int) -> list[dict[str, Any]]:
+async def findings(events: Events, since: int) -> list[dict[str, Any]]:
     """The findings of the next check after a number of messages."""
     async with asyncio.timeout(TIMEOUT_SECONDS):
         while True:
-            for event in message[since:]:
+            for event in events[since:]:
                 if event["kind"] == "checked":
                     return event["findings"]
             await asyncio.sleep(0.01)
 
 
-async def end_of_run(message: Events, since: int) -> dict[str, Any]:
+async def end_of_run(events: Events, since: int) -> dict[str, Any]:
     async with asyncio.timeout(TIMEOUT_SECONDS):
         while True:
-            for event in message[since:]:
+            for event in events[since:]:
                 if event["kind"] == "run_progress" and event["state"] in ("done", "failed"):
                     return event
             await asyncio.sleep(0.01)
@@ -70,7 +70,7 @@ def test_a_file_is_previewed_and_its_columns_are_chosen(tmp_path: Path) -> None:
     (tmp_path / "data" / "drive.csv").write_text(ROWS)
     (tmp_path / "other.txt").write_text(ROWS)
 
-    async def scenario(_: Hub, ask: Ask, message: Events) -> None:
+    async def scenario(_: Hub, ask: Ask, events: Events) -> None:
         assert [file["path"] for file in await ask("data_files", holds="table")] == ["data/drive.csv"]
         shown = await ask("preview_table", file="data/drive.csv")
         assert shown["time"] == "time [ms]"
@@ -90,22 +90,22 @@ def test_a_file_is_previewed_and_its_columns_are_chosen(tmp_path: Path) -> None:
             with pytest.raises(ArmblocksError):
                 await ask("preview_table", file=path)
         document = await ask("new", document_kind="diagram")
-        since = len(message)
-        await ask("change", document=document, key="0", edit=played("all", file="data/drive.csv"))
+        since = len(events)
+        await ask("change", document=document, key="0", edit=file_block("all", file="data/drive.csv"))
         (finding,) = await findings(
-            message, since
+            events, since
         )  # as on the command line: all columns contain one with text
         assert "the column 'word' has no numbers: line 2 contains 'a'" in finding["what"]
         await ask("undo", document=document)
-        edit = played("drive", file="data/drive.csv", time="time [ms]", columns=["x"])
-        since = len(message)
+        edit = file_block("drive", file="data/drive.csv", time="time [ms]", columns=["x"])
+        since = len(events)
         await ask("change", document=document, key="1", edit=edit)
-        assert await findings(message, since) == []
+        assert await findings(events, since) == []
         await ask("save", document=document, path="models/model.json")
         document = (await ask("open", path="models/model.json"))[0]
-        since = len(message)
+        since = len(events)
         await ask("run", document=document, speed=None, tuned={})
-        assert (await end_of_run(message, since))["fault"] is None
+        assert (await end_of_run(events, since))["fault"] is None
 
     run_scenario(tmp_path, scenario, runs=True)
     block = json.loads((tmp_path / "models" / "model.json").read_text())["blocks"]["drive"]
@@ -119,15 +119,15 @@ def test_a_file_is_previewed_and_its_columns_are_chosen(tmp_path: Path) -> None:
 def test_a_table_that_cannot_be_read_is_a_finding_at_its_block(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("time,x\n0,1\n1,2\n")
 
-    async def scenario(_: Hub, ask: Ask, message: Events) -> None:
+    async def scenario(_: Hub, ask: Ask, events: Events) -> None:
         document = await ask("new", document_kind="diagram")
-        await ask("change", document=document, key="1", edit=played("a", file="a.csv"))
+        await ask("change", document=document, key="1", edit=file_block("a", file="a.csv"))
         await ask("save", document=document, path="m.json")
         await ask("close", document=document)
         (tmp_path / "a.csv").write_text("time,x\n0,1\n0,2\n0,3\n")
-        since = len(message)
+        since = len(events)
         document = (await ask("open", path="m.json"))[0]
-        (finding,) = await findings(message, since)
+        (finding,) = await findings(events, since)
         assert (
             finding["block"],
             "row 3 of the table is 0, as in the two rows before" in finding["what"],
@@ -135,22 +135,22 @@ def test_a_table_that_cannot_be_read_is_a_finding_at_its_block(tmp_path: Path) -
             "a",
             True,
         )
-        # the file is corrected: the run reads it as it is then
+        # the file is corrected, and the check reads the new content
         (tmp_path / "a.csv").write_text("time,x\n0,1\n1,5\n")
-        since = len(message)
+        since = len(events)
         edit = {"kind": "parameters", "block": "a", "values": {"data": {"file": "a.csv"}}}
         await ask("change", document=document, key="2", edit=edit)
-        assert await findings(message, since) == []
+        assert await findings(events, since) == []
         (tmp_path / "a.csv").unlink()
-        since = len(message)
+        since = len(events)
         await ask("undo", document=document)
-        assert "there is no such file" in (await findings(message, since))[0]["what"]
+        assert "there is no such file" in (await findings(events, since))[0]["what"]
 
     run_scenario(tmp_path, scenario, runs=True)
 
 
 def test_a_dropped_table_is_stored_and_replaced_only_on_request(tmp_path: Path) -> None:
-    async def scenario(_: Hub, ask: Ask, message: Events) -> None:
+    async def scenario(_: Hub, ask: Ask, events: Events) -> None:
         def content(text: str) -> str:
             return base64.b64encode(text.encode()).decode()
 
@@ -189,7 +189,7 @@ LAW = f"{MARK}\n\ndef law(u, t, gain=2.0):\n    return gain * u\n"
 def test_code_runs_only_after_its_content_was_trusted(tmp_path: Path) -> None:
     (tmp_path / "law.py").write_text(LAW)
 
-    async def scenario(_: Hub, ask: Ask, message: Events) -> None:
+    async def scenario(_: Hub, ask: Ask, events: Events) -> None:
         assert [file["path"] for file in await ask("data_files", holds="function")] == ["law.py"]
         source = await ask("read_source", file="law.py")
         assert source["text"] == LAW
@@ -201,35 +201,35 @@ def test_code_runs_only_after_its_content_was_trusted(tmp_path: Path) -> None:
         }
         assert not source["trusted"]
         document = await ask("new", document_kind="diagram")
-        since = len(message)
-        await ask("change", document=document, key="1", edit=called("f", "law.py:law"))
-        (finding,) = await findings(message, since)
+        since = len(events)
+        await ask("change", document=document, key="1", edit=function_block("f", "law.py:law"))
+        (finding,) = await findings(events, since)
         assert (finding["block"], "the code of law.py is not trusted" in finding["what"]) == ("f", True)
-        since = len(message)
+        since = len(events)
         await ask("run", document=document, speed=None, tuned={})
-        assert "not trusted" in (await end_of_run(message, since))["fault"]["what"]
+        assert "not trusted" in (await end_of_run(events, since))["fault"]["what"]
         assert not (tmp_path / "ran").exists()
         with pytest.raises(ArmblocksError, match="the file has changed since it was shown"):
             await ask("trust_source", file="law.py", digest="0" * 64, trusted=True)
-        since = len(message)
+        since = len(events)
         await ask("trust_source", file="law.py", digest=source["digest"], trusted=True)
-        assert await findings(message, since) == []
+        assert await findings(events, since) == []
         assert (tmp_path / "ran").exists()
-        since = len(message)
+        since = len(events)
         await ask("run", document=document, speed=None, tuned={})
-        assert (await end_of_run(message, since))["fault"] is None
+        assert (await end_of_run(events, since))["fault"] is None
         # every change of the file requires trust again
         (tmp_path / "ran").unlink()
         (tmp_path / "law.py").write_text(LAW.replace("gain * u", "gain / 0 * u"))
         source = await ask("read_source", file="law.py")
         assert not source["trusted"]
-        since = len(message)
+        since = len(events)
         await ask("run", document=document, speed=None, tuned={})
-        assert "not trusted" in (await end_of_run(message, since))["fault"]["what"]
+        assert "not trusted" in (await end_of_run(events, since))["fault"]["what"]
         assert not (tmp_path / "ran").exists()
-        since = len(message)
+        since = len(events)
         await ask("trust_source", file="law.py", digest=source["digest"], trusted=True)
-        (finding,) = await findings(message, since)
+        (finding,) = await findings(events, since)
         assert finding["block"] == "f"
         assert "law.py, line 6: ZeroDivisionError" in finding["what"]
 
@@ -239,20 +239,23 @@ def test_code_runs_only_after_its_content_was_trusted(tmp_path: Path) -> None:
 def test_ports_follow_the_arguments_after_a_reload(tmp_path: Path) -> None:
     (tmp_path / "law.py").write_text("def law(u):\n    return u\n")
 
-    async def scenario(_: Hub, ask: Ask, message: Events) -> None:
+    async def scenario(_: Hub, ask: Ask, events: Events) -> None:
         document = await ask("new", document_kind="diagram")
         await ask(
-            "change", document=document, key="1", edit=called("f", "law.py:law", "CalledPythonFunction")
+            "change",
+            document=document,
+            key="1",
+            edit=function_block("f", "law.py:law", "CalledPythonFunction"),
         )
         (tmp_path / "law.py").write_text("def law(u, v):\n    return u\n")
-        since = len(message)
+        since = len(events)
         edit = {"kind": "parameters", "block": "one", "values": {"value": 3.0}}
         await ask("change", document=document, key="2", edit=edit)
-        assert "the arguments of law are others" in (await findings(message, since))[0]["what"]
+        assert "the arguments of law are different" in (await findings(events, since))[0]["what"]
         edit = {"kind": "parameters", "block": "f", "values": {"function": "law.py:law"}}
-        since = len(message)
+        since = len(events)
         await ask("change", document=document, key="3", edit=edit)
-        changed = next(event for event in message[since:] if event["kind"] == "changed")
+        changed = next(event for event in events[since:] if event["kind"] == "changed")
         ports = changed["change"]["sheet"]["blocks"]["f"]["inputs"]
         assert [port["name"] for port in ports] == ["u", "v"]
         (tmp_path / "law.py").write_text("def law(u, v):\n    return u +\n")
@@ -268,7 +271,7 @@ def test_hidden_characters_of_a_source_are_shown(tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text("def law(u):\n    return u  # \u202e } \u200b\n")
     (tmp_path / "b.py").write_bytes(b"# -*- coding: utf-7 -*-\n#+AAo-def law(u): return u\n")
 
-    async def scenario(_: Hub, ask: Ask, message: Events) -> None:
+    async def scenario(_: Hub, ask: Ask, events: Events) -> None:
         source = await ask("read_source", file="a.py")
         assert source["hidden"] == 2
         assert "\\u202e" in source["text"]

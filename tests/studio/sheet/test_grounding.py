@@ -19,26 +19,26 @@ from armblocks.studio.sheet.document import Document
 from armblocks.studio.sheet.placing import placed
 
 NOT_GROUNDED = ("Merge", "BusSelector", "BusAssignment")
-"""Block types whose inputs zeros cannot drive; the other inputs of a Bus Assignment are grounded."""
+"""Block types with inputs that zeros cannot drive. Other inputs of a Bus Assignment are grounded."""
 
 
-def alone(kind: str, placement: Placement) -> Diagram:
+def single_block(kind: str, placement: Placement) -> Diagram:
     block = example_block(BLOCKS[kind])
-    return Diagram(name="alone", blocks={"it": block}, layout={"it": placement})
+    return Diagram(name="single_block", blocks={"it": block}, layout={"it": placement})
 
 
 @pytest.mark.parametrize("kind", [name for name, block in BLOCKS.items() if not issubclass(block, Ground)])
 def test_every_block_type_can_be_grounded(kind: str) -> None:
-    document = Document(alone(kind, Placement(x=0.0, y=0.0)), load_robot)
+    document = Document(single_block(kind, Placement(x=0.0, y=0.0)), load_robot)
     before = document.diagram
     block = before.blocks["it"]
     if not (block.input_ports() or block.output_ports()):
         return
     document.edit(GroundPorts())
     after = document.diagram
-    left = {ref.port for ref in open_inputs({"": after})}
+    still_open = {ref.port for ref in open_inputs({"": after})}
     allowed = {port.name for port in block.input_ports()} if kind == "Merge" else {"bus"}
-    assert left <= (allowed if kind in NOT_GROUNDED else set())
+    assert still_open <= (allowed if kind in NOT_GROUNDED else set())
     assert {ref.block for ref in {wire.source for wire in after.connections}} >= (
         {"it"} if block.output_ports() else set()
     )
@@ -55,27 +55,27 @@ def test_every_block_type_can_be_grounded(kind: str) -> None:
 @pytest.mark.parametrize("rotation", [0, 90, 180, 270])
 @pytest.mark.parametrize("flipped", [False, True])
 def test_new_blocks_are_beside_their_ports_and_do_not_overlap(rotation: int, flipped: bool) -> None:
-    diagram = alone("ForwardDynamics", Placement(x=0.0, y=0.0, rotation=rotation, flipped=flipped))
+    diagram = single_block("ForwardDynamics", Placement(x=0.0, y=0.0, rotation=rotation, flipped=flipped))
     document = Document(diagram, load_robot)
     document.edit(GroundPorts(blocks=["it"]))
     after = document.diagram
     drawn = boxes(after)
     for one, other in itertools.combinations(drawn.values(), 2):
-        apart = (
+        disjoint = (
             one.x + one.width < other.x
             or other.x + other.width < one.x
             or one.y + one.height < other.y
             or other.y + other.height < one.y
         )
-        assert apart, (one.name, other.name)
+        assert disjoint, (one.name, other.name)
     for wire in after.connections:
         ends = drawn[wire.source.block].outputs, drawn[wire.target.block].inputs
         source = next(spot for spot in ends[0] if spot.name == wire.source.port)
         target = next(spot for spot in ends[1] if spot.name == wire.target.port)
         assert (source.dx, source.dy) == (target.dx, target.dy)
         assert (target.x - source.x) * target.dx + (target.y - source.y) * target.dy >= 40
-        across = abs((target.x - source.x) * target.dy) + abs((target.y - source.y) * target.dx)
-        assert across <= 81
+        offset = abs((target.x - source.x) * target.dy) + abs((target.y - source.y) * target.dx)
+        assert offset <= 81
 
 
 def test_selected_blocks_alone_and_a_sheet_without_open_ports() -> None:
@@ -114,6 +114,6 @@ def test_a_ground_has_the_stated_shape() -> None:
         builder.add(name, Ground(dimensions=dimensions))
     shapes = infer_shapes(builder.build()).outputs
     assert [shapes[name]["y"] for name in ("scalar", "vector", "matrix")] == [(), (3,), (2, 4)]
-    for wrong in (0.0, 1.5, [2.0, 2.0, 2.0], 1e9):
+    for invalid in (0.0, 1.5, [2.0, 2.0, 2.0], 1e9):
         with pytest.raises(InputError, match=r"Ground\.dimensions"):
-            Ground(dimensions=wrong)
+            Ground(dimensions=invalid)

@@ -21,7 +21,7 @@ from armblocks.studio.sheet.placing import placed
 
 @pytest.fixture
 def document() -> Document:
-    """A model with a masked subsystem, a limit, and a parameter of its own."""
+    """A model with a masked subsystem, a limit, and a model parameter."""
     builder = ab.DiagramBuilder("servo")
     builder.parameter("scale", 2.0)
     source = builder.add("source", Constant(value=1.0))
@@ -68,8 +68,8 @@ def test_a_set_is_saved_updated_renamed_and_removed_in_steps_that_can_be_undone(
 
 def test_a_set_may_contain_the_values_that_the_model_has_for_the_other_sets(document: Document) -> None:
     save(document, "stiff", {"controller.kp": 9.0, "limit.upper": 3.0})
-    save(document, "nominal", {}, of_others=True)
-    save(document, "wide", {"limit.upper": 8.0}, of_others=True)
+    save(document, "nominal", {}, all_parameters=True)
+    save(document, "wide", {"limit.upper": 8.0}, all_parameters=True)
     assert sets(document)["nominal"] == {"controller.kp": 5.0, "limit.upper": 2.0}
     assert sets(document)["wide"] == {"controller.kp": 5.0, "limit.upper": 8.0}
 

@@ -7,18 +7,18 @@ from armblocks.diagram import Connection, PortRef
 from armblocks.drawing.diagram_drawing import drawn_bends, obstacle, wire_nets
 from armblocks.drawing.diagram_layout import boxes
 from armblocks.drawing.wire_routing import route
-from armblocks.studio.sheet.lines import SheetLines, is_possible
+from armblocks.studio.sheet.lines import SheetLines, has_ports
 
 
 def test_displayed_lines_equal_those_of_the_report_also_after_a_drag() -> None:
     sheet = ab.load_diagram("puma560_computed_torque")
     lines = SheetLines()
-    before = lines.of(sheet)
+    before = lines.route(sheet)
     place = boxes(sheet)["rne"]
-    moved = lines.dragged(sheet, {"rne": (place.x, place.y + 90)}, sheet.connections, sheet.bends, None)
+    moved = lines.route_dragged(sheet, {"rne": (place.x, place.y + 90)}, sheet.connections, sheet.bends, None)
     assert moved != before
-    again = lines.dragged(sheet, {}, sheet.connections, sheet.bends, None)
-    assert again == before == SheetLines().of(sheet)
+    again = lines.route_dragged(sheet, {}, sheet.connections, sheet.bends, None)
+    assert again == before == SheetLines().route(sheet)
     nets, wires = wire_nets(sheet.connections, drawn_bends(sheet), boxes(sheet))
     routed = route([obstacle(box) for box in boxes(sheet).values()], nets)
     for source, targets, net in zip(wires, wires.values(), routed):
@@ -30,14 +30,14 @@ def test_displayed_lines_equal_those_of_the_report_also_after_a_drag() -> None:
 def test_lines_do_not_avoid_a_block_that_may_be_inserted_into_them() -> None:
     sheet = ab.load_diagram("van_der_pol_pid")
     lines, ramp = SheetLines(), boxes(sheet)["x2"].outputs[0]
-    over = {"one": (ramp.x + 20, ramp.y - 25)}
+    moved = {"one": (ramp.x + 20, ramp.y - 25)}
     others = [wire for wire in sheet.connections if wire.source.block != "one"]
 
-    def path(passed: str | None) -> list[tuple[float, float]]:
-        changed = lines.dragged(sheet, over, others, sheet.bends, passed)
+    def path(ignored: str | None) -> list[tuple[float, float]]:
+        changed = lines.route_dragged(sheet, moved, others, sheet.bends, ignored)
         return changed["x2/y"].paths["x1/u"]
 
-    assert path("one") == lines.of(sheet)["x2/y"].paths["x1/u"]
+    assert path("one") == lines.route(sheet)["x2/y"].paths["x1/u"]
     assert path(None) != path("one")
 
 
@@ -48,4 +48,4 @@ def test_wires_with_ports_that_no_longer_exist_are_not_routed() -> None:
         (PortRef("gone", "y"), PortRef("u", "u1"), False),
         (PortRef("PID", "y"), PortRef("u", "u9"), False),
     ):
-        assert is_possible(Connection(source, target), sheet) == possible
+        assert has_ports(Connection(source, target), sheet) == possible

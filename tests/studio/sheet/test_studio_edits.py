@@ -37,12 +37,12 @@ from armblocks.studio.protocol.messages.sheet_edits import (
 )
 from armblocks.studio.sheet.clipping import clipped
 from armblocks.studio.sheet.document import Document
+from armblocks.studio.sheet.drawing_data import sheet, sheet_change
 from armblocks.studio.sheet.edits import EDITS, applied
 from armblocks.studio.sheet.nesting import inside
 from armblocks.studio.sheet.outline import find, outline
 from armblocks.studio.sheet.parameter_values import parameter_value
 from armblocks.studio.sheet.placing import placed
-from armblocks.studio.sheet.shown import sheet, sheet_change
 
 NAMES = ["sine", "gain", "scope", "Gain 2", "ä"]
 TYPES = ["SineWave", "Gain", "Scope", "Sum", "JTraj", "Integrator"]
@@ -383,6 +383,16 @@ def test_blocks_are_found_on_all_sheets_by_name_type_and_value() -> None:
     assert find(diagram, "no such thing") == find(diagram, " ") == []
     tree = outline(diagram)
     assert [(sub.name, sub.blocks) for sub in tree.subsystems] == [("inner", len(diagram_inside(diagram)))]
+
+
+def test_blocks_are_found_by_the_names_and_the_manufacturer_of_their_robot() -> None:
+    diagram = load_diagram("kr180model", BLOCKS)
+    for words in ("kr180 kuka", "Robotics"):
+        robot = "robot = KUKA Robotics, KR180, kr180"
+        assert {(one.name, one.match) for one in find(diagram, words)} == {
+            (name, robot) for name in ("kuka", "plot", "rne")
+        }
+    assert find(diagram, "puma") == []
 
 
 def diagram_inside(diagram: Diagram) -> list[str]:

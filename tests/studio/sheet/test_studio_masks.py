@@ -16,8 +16,8 @@ from armblocks.formats import load_diagram, load_robot
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol.messages.sheet_edits import BreakLink, SetParameters
 from armblocks.studio.sheet.document import Document
+from armblocks.studio.sheet.drawing_data import sheet
 from armblocks.studio.sheet.placing import placed
-from armblocks.studio.sheet.shown import sheet
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from armblocks.studio.protocol.messages import documents as document_messages
 from armblocks.studio.sheet.document import Document
 from armblocks.studio.sheet.edits import EDITS
 
-BEGINNINGS = ("puma560_servos", "van_der_pol_pid", "kr180model", "puma560_payload_drop")
+MODELS = ("puma560_servos", "van_der_pol_pid", "kr180model", "puma560_payload_drop")
 SEEDS = 28
 MIN_EDITS = 3
 """Minimum number of applied edits of each kind, so that the test covers all kinds."""
@@ -38,36 +38,36 @@ def test_random_edits_are_undone_redone_and_recovered_from_the_journal(tmp_path:
         nonlocal inner
         for seed in range(SEEDS):
             (tmp_path / str(seed) / "project").mkdir(parents=True)
-            disk, chance = Disk(tmp_path / str(seed)), random.Random(seed)
+            disk, rng = Disk(tmp_path / str(seed)), random.Random(seed)
             documents = disk.documents()
-            open_file = documents.open_shipped(BEGINNINGS[seed % len(BEGINNINGS)])
+            open_file = documents.open_shipped(MODELS[seed % len(MODELS)])
             document = open_file.document
             original = content(document)
-            forms = [document.diagram]
+            diagrams = [document.diagram]
             for number in range(40):
-                path, edit = random_edit(document, chance)
+                path, edit = random_edit(document, rng)
                 request = document_messages.Change(
                     document="", key=f"{seed} {number}", inside=path, edit=edit
                 )
                 try:
                     documents.perform(open_file, request)
                 except ArmblocksError:
-                    assert document.diagram is forms[-1]
+                    assert document.diagram is diagrams[-1]
                     continue
                 assert document.undo_title == EDITS.title(edit)
                 applied[type(edit)] += 1
                 inner += bool(path)
-                forms.append(document.diagram)
+                diagrams.append(document.diagram)
             end = content(document)
             again = disk.as_after_a_crash(tmp_path / f"{seed} crashed").documents().attach(open_file.key)
             for one in (document, again.document):
                 assert content(one) == end
-                for expected in reversed(forms[:-1]):
+                for expected in reversed(diagrams[:-1]):
                     one.undo()
                     assert one.diagram == expected
                 assert one.undo_title == ""
                 assert content(one) == original
-                for expected in forms[1:]:
+                for expected in diagrams[1:]:
                     one.redo()
                     assert one.diagram == expected
                 assert one.redo_title == ""

@@ -4,6 +4,7 @@ import type { LinkRow } from '../../protocol'
 import { atRest, cellText, setJoints, useRobotEditor, type Joints } from './state'
 
 const HALF_TURN = Math.PI
+/** Range of a prismatic joint without limits, m. */
 const DEFAULT_RANGE = 1
 
 /** The displayed quantity of the joints: position, speed, acceleration. */
@@ -118,7 +119,10 @@ function NumberField({
   )
 }
 
-/** The range of a slider: that of the joint, otherwise ±π rad or ±1 m; for speeds the speed limit. */
+/**
+ * The range of a slider: that of the joint, otherwise ±π rad or ±1 m. The range of speeds is the speed limit;
+ * that of accelerations is twice this number.
+ */
 function range(link: LinkRow, quantity: keyof Joints): [number, number] {
   const { lowest, highest, speed } = link.cells
   const limit = typeof speed === 'number' ? speed : link.turns ? HALF_TURN : DEFAULT_RANGE

@@ -41,7 +41,7 @@ export function ReadingsPanel() {
         <Matrix label="Transform T" rows={pose} />
       </section>
       {warnings.length > 0 && (
-        <ul className="said" aria-label="Notices">
+        <ul className="warnings" aria-label="Notices">
           {warnings.map((text) => (
             <li key={text}>
               <IconAlertTriangle size={14} aria-hidden /> {text}

@@ -32,7 +32,7 @@ import { LinkTable } from './table'
 import { saveRobot, SaveDialog } from './save_dialog'
 
 const ArmPanel = lazy(() => import('./arm_panel'))
-/** Panel height above which both tables are visible at the same time, px. */
+/** Window height above which both tables are visible at the same time, px. */
 const TALL_PX = 1000
 const BAR_PX = 44
 
@@ -159,7 +159,7 @@ export default function RobotEditor() {
   )
 }
 
-/** A cell in edit keeps its text; leaving the cell ends its undo step. */
+/** End the edit of a cell, and with it its undo step. */
 function leaveCell(): void {
   if (document.activeElement instanceof HTMLElement) document.activeElement.blur()
 }

@@ -11,7 +11,7 @@ export interface OpenRobot extends RobotContent {
 }
 export type Angles = 'deg' | 'rad'
 
-/** Joint positions, speeds and accelerations on the page: rad, m and per second. */
+/** Displayed joint positions, speeds and accelerations: rad or m, per second, per second². */
 export interface Joints {
   q: number[]
   qd: number[]

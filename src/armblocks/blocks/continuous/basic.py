@@ -39,7 +39,7 @@ class Integrator(Block):
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output at t = 0")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the rate"),)
+        return (Port("u", "signal to integrate"),)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the integral"),)

@@ -25,18 +25,19 @@ from armblocks.diagram import (
 from armblocks.errors import InputError
 
 Matrix = NDArray[np.float64]
-ROUNDING = 1e-12
-"""Singular values below this fraction of the largest one count as 0."""
+RELATIVE_TOLERANCE = 1e-12
+"""Singular values and matrix entries below this fraction of the largest one count as 0."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class DescriptorStateSpace(Block):
     """A linear system with algebraic equations: E x' = A x + B u, y = C x + D u, where E may be singular.
 
-    The equations must be of index 1: the algebraic equations determine the unknowns that E does not
-    differentiate. The block has rank(E) states z: coordinates in the row space of E (along its right singular
-    vectors), or x itself where E is regular. ``initial`` is x(0); only its part in the row space of E is
-    used, and the rest follows from u. The matrices are not tunable, so that the feedthrough is known exactly.
+    The equations must be of index 1: the algebraic equations determine the part of x in the null space of E.
+    The block has rank(E) states z. They are the coordinates of x in the row space of E, along its right
+    singular vectors; if E is regular, z is x itself. ``initial`` is x(0). Only its part in the row space of E
+    is used; the algebraic equations determine the rest from u. The matrices are not tunable, so that the
+    feedthrough is known exactly.
 
     P. Kunkel, V. Mehrmann, Differential-Algebraic Equations, 2006, section 2.1.
     """
@@ -89,12 +90,12 @@ class DescriptorStateSpace(Block):
 
     def states(self, inputs: Shapes) -> tuple[State, ...]:
         rank = len(self._explicit.A)
-        return (State("z", (rank,), "the part of x that E differentiates"),) if rank else ()
+        return (State("z", (rank,), "coordinates of x in the row space of E"),) if rank else ()
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         system = self._explicit
-        passed = mtimes(_sparse(system.D), u["u"])
-        return {"y": passed + mtimes(_sparse(system.C), x["z"]) if len(system.A) else passed}
+        feedthrough = mtimes(_sparse(system.D), u["u"])
+        return {"y": feedthrough + mtimes(_sparse(system.C), x["z"]) if len(system.A) else feedthrough}
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         system = self._explicit
@@ -131,31 +132,31 @@ def _explicit(*matrices: Any) -> _Explicit:
     Raises ``InputError`` if they do not determine their unknowns.
     """
     E, A, B, C, D = (np.asarray(value) for value in matrices)
-    U, sizes, Vt = np.linalg.svd(E)
-    rank = int(np.sum(sizes > ROUNDING * max(1.0, float(sizes[0]))))
+    U, singular_values, Vt = np.linalg.svd(E)
+    rank = int(np.sum(singular_values > RELATIVE_TOLERANCE * max(1.0, float(singular_values[0]))))
     if rank == len(E):
         return _Explicit(np.linalg.solve(E, A), np.linalg.solve(E, B), C, D, np.eye(rank))
     U1, U2, V1, V2 = U[:, :rank], U[:, rank:], Vt[:rank].T, Vt[rank:].T
     # 0 = U2' (A (V1 z + V2 w) + B u) must determine w.
     algebraic = U2.T @ A @ V2
     scale = float(np.linalg.norm(A)) or 1.0
-    if float(np.linalg.svd(algebraic, compute_uv=False)[-1]) <= ROUNDING * scale:
+    if float(np.linalg.svd(algebraic, compute_uv=False)[-1]) <= RELATIVE_TOLERANCE * scale:
         raise InputError(
             f"E has rank {rank} of {len(E)}, and its {len(E) - rank} algebraic equations do not determine "
-            "the unknowns that E does not differentiate",
+            "the part of x in the null space of E",
             where="DescriptorStateSpace",
             allowed="equations of index 1: A restricted to the left and right null spaces of E is regular",
             fix="differentiate the algebraic equations by hand, or leave out one that repeats another",
         )
-    of_z = -np.linalg.solve(algebraic, U2.T @ A @ V1)
-    of_u = -np.linalg.solve(algebraic, U2.T @ B)
-    whole = V1 + V2 @ of_z  # x = whole z + V2 of_u u
-    scaled = (U1 / sizes[:rank]).T
+    w_of_z = -np.linalg.solve(algebraic, U2.T @ A @ V1)
+    w_of_u = -np.linalg.solve(algebraic, U2.T @ B)
+    x_of_z = V1 + V2 @ w_of_z  # x = x_of_z z + V2 w_of_u u
+    scaled = (U1 / singular_values[:rank]).T
     return _Explicit(
-        A=_cleaned(scaled @ A @ whole),
-        B=_cleaned(scaled @ (B + A @ V2 @ of_u)),
-        C=_cleaned(C @ whole),
-        D=_cleaned(D + C @ V2 @ of_u),
+        A=_cleaned(scaled @ A @ x_of_z),
+        B=_cleaned(scaled @ (B + A @ V2 @ w_of_u)),
+        C=_cleaned(C @ x_of_z),
+        D=_cleaned(D + C @ V2 @ w_of_u),
         differentiated=_cleaned(V1.T),
     )
 
@@ -163,11 +164,11 @@ def _explicit(*matrices: Any) -> _Explicit:
 def _cleaned(matrix: Matrix) -> Matrix:
     """The matrix with entries of rounding size set to 0, so that they do not count as feedthrough."""
     largest = float(np.max(np.abs(matrix), initial=0.0))
-    return np.where(np.abs(matrix) <= ROUNDING * largest, 0.0, matrix)
+    return np.where(np.abs(matrix) <= RELATIVE_TOLERANCE * largest, 0.0, matrix)
 
 
 def _sparse(matrix: Matrix) -> SX:
-    """Structural zeros where the entries are 0."""
+    """The matrix as symbols; its zero entries are structural zeros."""
     rows, columns = matrix.shape
     sparse = SX(rows, columns)
     for i, j in zip(*np.nonzero(matrix)):

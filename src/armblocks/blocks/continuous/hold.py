@@ -41,7 +41,7 @@ class FirstOrderHold(Block):
     ``extrapolation`` continues the straight line through the last two samples. It is exact for a linear
     input; at each sample time y may jump to the new sample. ``interpolation`` connects the samples without a
     jump, one period late: y(t) = u(t_(k-1)) + (u(t_k) - u(t_(k-1))) (t - t_k) / T. Simulink's First Order
-    Hold extrapolates. The sample before the first one is ``initial``, which is also y before the offset.
+    Hold extrapolates. ``initial`` is the sample before the first one, and y before ``offset``.
 
     A sampled block that ticks at t_k reads the left limit of y.
     """
@@ -83,8 +83,8 @@ class FirstOrderHold(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         start = x["last"] if self.method == "extrapolation" else x["before"]
-        since = fmax(t - sample_time(p, x["count"] - 1.0), 0.0) / p["period"]
-        line = start + (x["last"] - x["before"]) * since
+        elapsed_periods = fmax(t - sample_time(p, x["count"] - 1.0), 0.0) / p["period"]
+        line = start + (x["last"] - x["before"]) * elapsed_periods
         return {"y": if_else(x["count"] > 0.0, line, x["last"])}
 
     def initial_states(self, p: Signals) -> Signals:
@@ -98,9 +98,9 @@ class FirstOrderHold(Block):
         return sampling_guards(t, x, p, u["u"], x["last"])
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        at_sample_time, samples, counted = sampled(t, x, p, e)
+        at_sample_time, samples, sampling_states = sampled(t, x, p, e)
         return {
-            **counted,
+            **sampling_states,
             "last": if_else(samples, u["u"], x["last"]),
             "before": if_else(at_sample_time, x["last"], x["before"]),
         }

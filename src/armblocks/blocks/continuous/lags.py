@@ -23,6 +23,7 @@ from armblocks.diagram.signs import FaceSign, Fraction, value_text
 
 
 def _lag(time: object) -> str:
+    """The polynomial T s + 1 as text."""
     return f"{'' if value_text(time) == '1' else value_text(time)}s + 1"
 
 
@@ -39,7 +40,9 @@ class FirstOrderLag(Block):
     )
 
     gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="steady-state gain y / u")
-    time_constant: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, above=0.0, doc="T", unit="s")
+    time_constant: ArrayLike = parameter(
+        1.0, kind=ParameterKind.ARRAY, above=0.0, doc="time constant T", unit="s"
+    )
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output at t = 0")
 
     def face_sign(self) -> FaceSign:
@@ -100,8 +103,8 @@ class SecondOrderLag(Block):
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         w = p["natural_frequency"]
-        pull = w * (p["gain"] * u["u"] - x["y"]) - 2.0 * p["damping"] * x["rate"]
-        return {"y": x["rate"], "rate": w * pull}
+        acceleration_by_w = w * (p["gain"] * u["u"] - x["y"]) - 2.0 * p["damping"] * x["rate"]
+        return {"y": x["rate"], "rate": w * acceleration_by_w}
 
     def initial_states(self, p: Signals) -> Signals:
         return {"y": SX(0.0), "rate": SX(0.0)}
@@ -123,8 +126,10 @@ class LeadLag(Block):
     )
 
     gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="steady-state gain y / u")
-    lead_time: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="T1", unit="s")
-    lag_time: ArrayLike = parameter(0.1, kind=ParameterKind.ARRAY, above=0.0, doc="T2", unit="s")
+    lead_time: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="lead time constant T1", unit="s")
+    lag_time: ArrayLike = parameter(
+        0.1, kind=ParameterKind.ARRAY, above=0.0, doc="lag time constant T2", unit="s"
+    )
 
     def face_sign(self) -> FaceSign:
         return Fraction(_lag(self.lead_time), _lag(self.lag_time))
@@ -136,7 +141,7 @@ class LeadLag(Block):
         return (Port("y", "the compensated signal"),)
 
     def states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", self.output_shapes(inputs)["y"], "the input, lagging by T2"),)
+        return (State("x", self.output_shapes(inputs)["y"], "u after a lag with time constant T2"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         ratio = p["lead_time"] / p["lag_time"]

@@ -16,7 +16,7 @@ from armblocks.blocks.external_resets import (
     external_reset_parameter,
     initial_source_parameter,
     reset_ports,
-    side_of,
+    trigger_state,
 )
 from armblocks.blocks.switching import THRESHOLD_OFFSET, limits_in_order
 from armblocks.diagram import (
@@ -41,13 +41,13 @@ _SATURATED = Port("saturated", "1 at the upper limit, -1 at the lower limit, els
 
 @dataclass(frozen=True, kw_only=True)
 class ResettableIntegrator(Block):
-    """The integral over time with resets: y' = u, and y = initial at t = 0 and whenever a trigger fires.
+    """The integral over time with resets: y' = u, and y = initial at t = 0 and at each reset.
 
-    It corresponds to Simulink's Integrator with its ports. With ``level`` and ``level hold`` y equals the
-    present initial value while the trigger is not 0. The initial value may come from a port: always
-    (``external``), or only at resets (``external at resets``), so that it may depend on y itself. The
-    ``state_port`` gives the state before a reset: a loop through it is not algebraic. With ``limit_output`` y
-    stays between ``lower`` and ``upper``.
+    It corresponds to Simulink's Integrator with its optional ports. With ``level`` and ``level hold`` y
+    equals the present initial value while the trigger is not 0. The initial value may come from a port:
+    always (``external``), or only at resets (``external at resets``), so that it may depend on y itself. The
+    ``state_port`` outputs the state before a reset, so that a loop through this port is not algebraic. With
+    ``limit_output`` y stays between ``lower`` and ``upper``.
     """
 
     title: ClassVar[str] = "Integrator with Reset"
@@ -76,7 +76,7 @@ class ResettableIntegrator(Block):
 
     def input_ports(self) -> tuple[Port, ...]:
         further = reset_ports(self.external_reset, self.initial_condition_source)
-        return (Port("u", "the rate"), *further)
+        return (Port("u", "signal to integrate"), *further)
 
     def output_ports(self) -> tuple[Port, ...]:
         saturated = (_SATURATED,) if self.limit_output else ()
@@ -84,9 +84,9 @@ class ResettableIntegrator(Block):
         return (Port("y", "the integral"), *saturated, *state)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
-        wide = {name: shape for name, shape in inputs.items() if name != "reset"}
+        signal_shapes = {name: shape for name, shape in inputs.items() if name != "reset"}
         own = ("initial", "lower", "upper") if self.limit_output else ("initial",)
-        shape = broadcast({**wide, "initial value": parameters_shape(self, *own)})
+        shape = broadcast({**signal_shapes, "initial value": parameters_shape(self, *own)})
         return {port.name: shape for port in self.output_ports()}
 
     def assumed_output_shapes(self) -> Shapes:
@@ -181,7 +181,7 @@ class ResettableIntegrator(Block):
         return self.external_reset in LEVELS
 
     def _level(self, u: Signals) -> SX:
-        return if_else(side_of(self.external_reset, u["reset"]), 1.0, 0.0)
+        return if_else(trigger_state(self.external_reset, u["reset"]), 1.0, 0.0)
 
     def _start(self, u: Signals, p: Signals) -> SX:
         """The state after a reset."""
@@ -214,7 +214,7 @@ class IntegratorLimited(Block):
         limits_in_order(self, "lower", "upper")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the rate"),)
+        return (Port("u", "signal to integrate"),)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the integral"), _SATURATED)
@@ -250,7 +250,7 @@ class IntegratorLimited(Block):
         return _limited(x, p, e)
 
 
-# The state x between the limits p["lower"] and p["upper"], with u["u"] for its rate.
+# The next functions are for a state x between the limits p["lower"] and p["upper"] with the rate u["u"].
 
 
 def _limit_mode(shape: Shape) -> State:
@@ -295,7 +295,6 @@ def _limited(x: Signals, p: Signals, e: Signals) -> dict[str, SX]:
     inner = if_else(leaves, 0.0, x["mode"])
     return {
         "mode": if_else(upper, 1.0, if_else(lower, -1.0, inner)),
-        # A state slightly beyond a limit is set to the limit, also where the mode follows from the values
-        # alone.
+        # A state slightly beyond a limit is set to the limit.
         "x": fmin(fmax(x["x"], p["lower"]), p["upper"]),
     }

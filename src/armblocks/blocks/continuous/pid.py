@@ -107,7 +107,7 @@ class ContinuousPidBlock(Block):
 
     @abstractmethod
     def errors(self, u: Signals, p: Signals) -> Errors:
-        """The error that each of the three actions acts on."""
+        """The errors at the inputs of the proportional, integral and derivative actions."""
 
     @property
     def _law(self) -> ContinuousPid:
@@ -123,9 +123,9 @@ class ContinuousPidBlock(Block):
 class PID(ContinuousPidBlock):
     """Proportional, integral and filtered derivative action: y = (P + I/s + D N s/(s + N)) u.
 
-    This is the parallel form of Simulink's PID Controller; in the ideal form y = P (1 + I/s + D N s/(s + N))
+    This is the parallel form of Simulink's PID Controller. In the ideal form y = P (1 + I/s + D N s/(s + N))
     u. States: ``integral`` and ``filter`` (filter' = N (D u - filter)). With ``limit_output`` the output
-    stays between two limits. ``clamping`` then stops an integral that would drive the output further beyond a
+    stays between two limits. ``clamping`` then stops the integral while it drives the output further beyond a
     limit. ``back_calculation`` adds Kb (y - unlimited y) to the rate of the integral. ``tracking`` adds Kt
     (tracking - y) to this rate, for a bumpless transfer from another controller.
     """

@@ -34,7 +34,7 @@ from armblocks.errors import InputError
 
 @dataclass(frozen=True, kw_only=True)
 class SecondOrderIntegrator(Block):
-    """Position and speed of an acceleration: x'' = u, dx = x'."""
+    """Position and speed from an acceleration: x'' = u, dx = x'."""
 
     title: ClassVar[str] = "Integrator, Second-Order"
     sign: ClassVar[FaceSign] = Fraction("1", "s²")
@@ -46,8 +46,8 @@ class SecondOrderIntegrator(Block):
         shown=("x", "dx"),
     )
 
-    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="x at t = 0")
-    initial_speed: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="dx at t = 0")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="position x at t = 0")
+    initial_speed: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="speed dx at t = 0")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the acceleration"),)
@@ -56,11 +56,11 @@ class SecondOrderIntegrator(Block):
         return (Port("x", "the position"), Port("dx", "the speed"))
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
-        shape = broadcast({**inputs, "initial values": self._own()})
+        shape = broadcast({**inputs, "initial values": self._parameter_shape()})
         return {"x": shape, "dx": shape}
 
     def assumed_output_shapes(self) -> Shapes:
-        return {"x": self._own(), "dx": self._own()}
+        return {"x": self._parameter_shape(), "dx": self._parameter_shape()}
 
     def states(self, inputs: Shapes) -> tuple[State, ...]:
         shape = self.output_shapes(inputs)["x"]
@@ -75,7 +75,7 @@ class SecondOrderIntegrator(Block):
     def initial_states(self, p: Signals) -> Signals:
         return {"x": p["initial"], "dx": p["initial_speed"]}
 
-    def _own(self) -> Shape:
+    def _parameter_shape(self) -> Shape:
         return parameters_shape(self, "initial", "initial_speed")
 
 
@@ -83,7 +83,7 @@ class SecondOrderIntegrator(Block):
 class SecondOrderIntegratorLimited(Block):
     """Position and speed between limits: x'' = u; at a limit of x the speed becomes 0 or the input ``dx0``.
 
-    As in Simulink: where x reaches a limit, dx jumps to 0 and x stays while u points outwards. With
+    As in Simulink, dx jumps to 0 when x reaches a limit, and x stays there while u points outwards. With
     ``reinitialize`` dx jumps to the input ``dx0`` instead, which may depend on dx (a bounce). If the speed
     after a bounce is at most ``rest_speed``, the block stops: x stays exactly at the limit until u points
     inwards. A bouncing ball therefore comes to rest after a finite number of bounces (no Zeno behaviour). The
@@ -103,8 +103,10 @@ class SecondOrderIntegratorLimited(Block):
         stop_time=3.0,
     )
 
-    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="x at t = 0, within the limits")
-    initial_speed: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="dx at t = 0")
+    initial: ArrayLike = parameter(
+        0.0, kind=ParameterKind.ARRAY, doc="position x at t = 0, within the limits"
+    )
+    initial_speed: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="speed dx at t = 0")
     lower: ArrayLike = parameter(-math.inf, kind=ParameterKind.ARRAY, finite=False, doc="lower limit of x")
     upper: ArrayLike = parameter(math.inf, kind=ParameterKind.ARRAY, finite=False, doc="upper limit of x")
     lower_speed: ArrayLike = parameter(
@@ -114,7 +116,9 @@ class SecondOrderIntegratorLimited(Block):
         math.inf, kind=ParameterKind.ARRAY, finite=False, doc="upper limit of dx"
     )
     reinitialize: bool = parameter(False, doc="whether the input dx0 gives the speed after x reaches a limit")
-    rest_speed: float = parameter(1e-6, minimum=0.0, doc="at or below this speed a bounce becomes a stop")
+    rest_speed: float = parameter(
+        1e-6, minimum=0.0, doc="largest speed after a bounce at which the block stops"
+    )
 
     def check(self) -> None:
         limits_in_order(self, "lower", "upper")
@@ -141,11 +145,11 @@ class SecondOrderIntegratorLimited(Block):
         return (Port("x", "the position"), Port("dx", "the speed"))
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
-        shape = broadcast({**inputs, "parameters": self._own()})
+        shape = broadcast({**inputs, "parameters": self._parameter_shape()})
         return {"x": shape, "dx": shape}
 
     def assumed_output_shapes(self) -> Shapes:
-        return {"x": self._own(), "dx": self._own()}
+        return {"x": self._parameter_shape(), "dx": self._parameter_shape()}
 
     def states(self, inputs: Shapes) -> tuple[State, ...]:
         shape = self.output_shapes(inputs)["x"]
@@ -251,11 +255,11 @@ class SecondOrderIntegratorLimited(Block):
         fastest = if_else(
             logic_or(fast, pushed), 1.0, if_else(logic_or(fast_back, pushed_back), -1.0, fastest)
         )
-        free = logic_not(hits)
-        speed = if_else(logic_and(free, fast), p["upper_speed"], speed)
-        speed = if_else(logic_and(free, fast_back), p["lower_speed"], speed)
+        no_hit = logic_not(hits)
+        speed = if_else(logic_and(no_hit, fast), p["upper_speed"], speed)
+        speed = if_else(logic_and(no_hit, fast_back), p["lower_speed"], speed)
         return {"x": position, "dx": speed, "rests": rests, "fastest": if_else(hits, 0.0, fastest)}
 
-    def _own(self) -> Shape:
+    def _parameter_shape(self) -> Shape:
         names = ("initial", "initial_speed", "lower", "upper", "lower_speed", "upper_speed")
         return parameters_shape(self, *names)

@@ -82,10 +82,10 @@ class TransportDelay(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class VariableTimeDelay(Block):
-    """A variable time delay: y(t) = u(t - d(t)), with d held between ``shortest`` and ``longest``.
+    """A variable time delay: y(t) = u(t - d(t)), with d limited to ``shortest`` … ``longest``.
 
-    No step is longer than ``shortest``. A jump of the input is a jump of the output, whose time is not
-    located.
+    No step is longer than ``shortest``. A jump of the input causes a jump of the output, and the
+    time of the output jump is not located as an event.
     """
 
     title: ClassVar[str] = "Variable Time Delay"
@@ -139,8 +139,8 @@ class VariableTransportDelay(Block):
     """A transport delay in a pipe: y(t) = u(t - d), where ``T(t)`` is the transit time at the inlet.
 
     The flow between t - d and t fills the pipe, so the integral of 1/T over that time is 1. Therefore
-    d' = 1 - T(t - d) / T(t). This is Simulink's Variable Transport Delay; the input of a Variable Time Delay
-    is d itself. A transit time of 0 or below ends the run with an error.
+    d' = 1 - T(t - d) / T(t). This is Simulink's Variable Transport Delay. (For a Variable Time
+    Delay, the input is d itself.) A transit time of 0 or below ends the run with an error.
     """
 
     title: ClassVar[str] = "Variable Transport Delay"
@@ -200,8 +200,8 @@ class VariableTransportDelay(Block):
         return {"delay": p["initial_delay"]}
 
     def delay_times(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        inside = fmin(fmax(x["delay"], p["shortest"]), p["longest"])
-        return {"past": inside, "transit": inside}
+        limited_delay = fmin(fmax(x["delay"], p["shortest"]), p["longest"])
+        return {"past": limited_delay, "transit": limited_delay}
 
     def delay_bounds(self, p: Signals) -> Mapping[str, tuple[SX, SX]]:
         return dict.fromkeys(("past", "transit"), (p["shortest"], p["longest"]))

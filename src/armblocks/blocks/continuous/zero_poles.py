@@ -14,8 +14,8 @@ from armblocks.blocks.linear_blocks import (
 )
 from armblocks.blocks.linear_systems import (
     LinearSystem,
+    frequency_transformed,
     realised,
-    shifted,
 )
 from armblocks.diagram import (
     Shapes,
@@ -33,14 +33,14 @@ from armblocks.diagram.signs import FaceSign, ratio_of_roots
 class ZeroPole(SectionsByRoots):
     """A transfer function: y = gain (s - z1) … (s - zm) / ((s - p1) … (s - pn)) u, m <= n.
 
-    Complex zeros and poles come in conjugate pairs, as complex numbers in Python and as rows (real,
-    imaginary) in files. The block is initially at rest. The states are those of a cascade of sections with
-    one or two poles.
+    Complex zeros and poles come in conjugate pairs. Files contain them as rows (real, imaginary); Python also
+    accepts complex numbers. The block is initially at rest. The states are those of a cascade of sections
+    with one or two poles.
     """
 
     title: ClassVar[str] = "Zero-Pole"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The step response of a zero at -2 and poles at -0.5 and -1 ± 3i.",
+        shows="The step response of a system with a zero at -2 and poles at -0.5 and -1 ± 3i.",
         parameters={"zeros": (-2.0,), "poles": ((-0.5, 0.0), (-1.0, 3.0), (-1.0, -3.0)), "gain": 2.5},
         inputs={"u": driver("Step")},
     )
@@ -59,9 +59,9 @@ class ZeroPole(SectionsByRoots):
 class AnalogFilter(FilterByBand):
     """An analog filter; the Butterworth low pass has |y / u| = 1 / sqrt(1 + (w / edge)^(2 order)).
 
-    ``chebyshev1`` falls faster and has ripple in the pass band. ``chebyshev2`` has ripple in the stop band,
-    and its edge is where the stop band begins. Band filters have twice as many poles as the order. Initially
-    at rest.
+    ``chebyshev1`` has a steeper roll-off and ripple in the pass band. ``chebyshev2`` has ripple in the stop
+    band, and its edge is the beginning of the stop band. Band filters have twice as many poles as the order.
+    The filter is initially at rest.
     """
 
     title: ClassVar[str] = "Analog Filter Design"
@@ -72,7 +72,7 @@ class AnalogFilter(FilterByBand):
     )
 
     edge: float = parameter(
-        1.0, above=0.0, tunable=False, doc="edge frequency; of a band, the lower one", unit="rad/s"
+        1.0, above=0.0, tunable=False, doc="edge frequency; for band filters, the lower edge", unit="rad/s"
     )
     upper_edge: float = parameter(
         2.0, above=0.0, tunable=False, doc="upper edge frequency of a band", unit="rad/s"
@@ -86,4 +86,4 @@ class AnalogFilter(FilterByBand):
 
     @property
     def system(self) -> LinearSystem:
-        return realised(shifted(self.prototype, self.filter_type, self.edge, self.upper_edge))
+        return realised(frequency_transformed(self.prototype, self.filter_type, self.edge, self.upper_edge))

@@ -146,7 +146,7 @@ class DeadZone(Block):
 class Relay(Block):
     """A relay with hysteresis: on_value once u rises to on_point, off_value once u falls to off_point.
 
-    It is off at the start, unless u is at or above on_point then.
+    At t = 0 it is off, unless u is at or above on_point.
     """
 
     title: ClassVar[str] = "Relay"
@@ -193,16 +193,16 @@ class Relay(Block):
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         sides = self.guard_values(t, x, u, p)
-        stays = if_else(sides["off"] < 0.0, 0.0, x["mode"])
-        return {"mode": if_else(sides["on"] > 0.0, 1.0, stays)}
+        unless_on = if_else(sides["off"] < 0.0, 0.0, x["mode"])
+        return {"mode": if_else(sides["on"] > 0.0, 1.0, unless_on)}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Quantizer(Block):
-    """The input rounded to multiples of an interval: y = interval round(u / interval), halves upwards.
+    """The input rounded to multiples of an interval: y = interval floor(u / interval + 1/2).
 
-    The threshold for a step down lies 1e-9 interval below the threshold for a step up. This hysteresis
-    prevents chattering by rounding errors.
+    The threshold for a step down lies 1e-9 times the interval below the threshold for a step up. This
+    hysteresis prevents chattering by rounding errors.
     """
 
     following_modes: ClassVar[bool] = True
@@ -213,7 +213,7 @@ class Quantizer(Block):
         inputs={"u": driver("SineWave", amplitude=2.0)},
     )
 
-    interval: float = parameter(0.5, above=0.0, doc="the height of a step")
+    interval: float = parameter(0.5, above=0.0, doc="height of a step, in the unit of u")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the signal"),)
@@ -229,7 +229,10 @@ class Quantizer(Block):
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         shape = inputs["u"]
-        return (Guard("up", shape, "the edge above", 1), Guard("down", shape, "the edge below", -1))
+        return (
+            Guard("up", shape, "threshold of the next step up", 1),
+            Guard("down", shape, "threshold of the next step down", -1),
+        )
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": p["interval"] * x["step"]}
@@ -246,7 +249,8 @@ class Quantizer(Block):
         return {"step": beyond(self.guard_values(t, x, u, p))}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        # A jump may pass several thresholds at once; at a threshold, rounding errors must not undo the step.
+        # A jump may cross several thresholds. The minimum and maximum ensure at least one step in the
+        # direction of the event, despite rounding errors at the threshold.
         nearest = floor(u["u"] / p["interval"] + 0.5)
         down = if_else(e["down"] < 0.0, fmin(nearest, x["step"] - 1.0), x["step"])
         return {"step": if_else(e["up"] > 0.0, fmax(nearest, x["step"] + 1.0), down)}

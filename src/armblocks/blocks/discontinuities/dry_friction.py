@@ -40,8 +40,10 @@ class CoulombFriction(Block):
         inputs={"u": driver("SineWave")},
     )
 
-    offset: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="Coulomb friction")
-    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="viscous friction")
+    offset: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="Coulomb friction force")
+    gain: ArrayLike = parameter(
+        1.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="viscous friction coefficient"
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the speed"),)
@@ -94,7 +96,7 @@ class Backlash(Block):
     differentiated_inputs: ClassVar[tuple[str, ...]] = ("u",)
 
     width: float = parameter(1.0, minimum=0.0, doc="the width of the play")
-    initial: float = parameter(0.0, doc="the output at t = 0, if that is within the play")
+    initial: float = parameter(0.0, doc="the output at t = 0, if it is within the play around u")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the driving part"),)
@@ -127,7 +129,8 @@ class Backlash(Block):
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         ahead = u["u"] - x["rest"]
-        # At rest, reversals of u have no effect; while driven, the ends of the play have none.
+        # At rest, reversals of u have no effect. While the part is driven, the ends of the play have no
+        # effect.
         free = x["mode"] == 0.0
         return {
             "upper": if_else(free, ahead - p["width"] / 2.0 - THRESHOLD_OFFSET, -1.0),
@@ -160,7 +163,7 @@ class Backlash(Block):
 class StickSlipFriction(Block):
     """A mass with dry friction: mass v' = F - sign(v) coulomb - viscous v, and v = 0 while |F| <= static.
 
-    The mass sticks: once it stops under a force that static friction holds, its speed is exactly 0, until the
+    If the mass stops while the force is within static friction, it sticks: its speed is exactly 0 until the
     force exceeds static friction.
     """
 
@@ -168,8 +171,8 @@ class StickSlipFriction(Block):
     sign: ClassVar[FaceSign] = graph((0, 0.12), (0.4, 0.22), (0.5, 0), (0.5, 1), (0.6, 0.78), (1, 0.88))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(
-            "The force grows evenly. The mass rests, and friction holds the force, until it breaks "
-            "away at 1.2 N; then 1 N remains."
+            "The force grows linearly. Friction balances it, and the mass rests, until the force "
+            "exceeds 1.2 N. In motion the friction is 1 N."
         ),
         inputs={"F": driver("Ramp", slope=0.2)},
     )
@@ -177,7 +180,7 @@ class StickSlipFriction(Block):
     mass: float = parameter(1.0, above=0.0, doc="the mass", unit="kg")
     coulomb: float = parameter(1.0, minimum=0.0, doc="friction in motion", unit="N")
     static: float = parameter(1.2, minimum=0.0, doc="friction at rest, at least coulomb", unit="N")
-    viscous: float = parameter(0.0, minimum=0.0, doc="friction that grows with the speed", unit="N s/m")
+    viscous: float = parameter(0.0, minimum=0.0, doc="viscous friction coefficient", unit="N s/m")
     initial_position: float = parameter(0.0, doc="the position at t = 0", unit="m")
     initial_speed: float = parameter(0.0, doc="the speed at t = 0", unit="m/s")
 
@@ -212,7 +215,7 @@ class StickSlipFriction(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         sliding = x["mode"] * p["coulomb"] + p["viscous"] * x["v"]
-        # The friction is limited to static friction, also after a jump of the force.
+        # After a jump of the force beyond static friction, the friction is Coulomb friction at once.
         breaking = logic_and(same_instant(t, x["instant"]), fabs(u["F"]) > p["static"])
         holding = if_else(breaking, sign(u["F"]) * p["coulomb"], u["F"])
         return {"x": x["x"], "v": x["v"], "friction": if_else(x["mode"] == 0.0, holding, sliding)}
@@ -241,7 +244,7 @@ class StickSlipFriction(Block):
         stops = logic_and(x["mode"] != 0.0, e["stop"] * x["mode"] < 0.0)
         broken = if_else(e["forwards"] > 0.0, 1.0, if_else(e["backwards"] < 0.0, -1.0, 0.0))
         moving = if_else(x["mode"] == 0.0, broken, x["mode"])
-        # At rest the speed is 0 whatever the parameters are: the derivatives of the speed are 0 too.
+        # The speed of a mass at rest does not depend on the parameters: its sensitivities are 0 too.
         rests = logic_and(x["v"] == 0.0, self._breaking(u, p) == 0.0)
         return {
             "mode": if_else(stops, self._breaking(u, p), moving),

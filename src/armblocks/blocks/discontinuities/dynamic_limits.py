@@ -41,8 +41,9 @@ class MovingLimits(Block):
 
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         shape = broadcast(inputs)
-        above = Condition("above", shape, "1 above the upper limit", closed=False)
-        return located(self, above, Condition("below", shape, "1 below the lower limit", closed=False))
+        above = Condition("above", shape, "1 while u is above the upper limit", closed=False)
+        below = Condition("below", shape, "1 while u is below the lower limit", closed=False)
+        return located(self, above, below)
 
     def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"above": u["u"] - u["upper"], "below": u["lower"] - u["u"]}
@@ -72,7 +73,7 @@ class SaturationDynamic(MovingLimits):
 
 @dataclass(frozen=True, kw_only=True)
 class DeadZoneDynamic(MovingLimits):
-    """A dead zone between two signals: y = u - upper above, u - lower below, 0 between."""
+    """A dead zone between two signals: y = u - upper above the zone, u - lower below it, 0 within it."""
 
     title: ClassVar[str] = "Dead Zone Dynamic"
     sign: ClassVar[FaceSign] = DEAD_ZONE
@@ -94,13 +95,13 @@ class DeadZoneDynamic(MovingLimits):
 
 @dataclass(frozen=True, kw_only=True)
 class WrapToZero(Block):
-    """Zero where the input exceeds a threshold: y = u, but 0 where u > threshold."""
+    """The input, or zero if it exceeds a threshold: y = u where u <= threshold, else 0."""
 
     title: ClassVar[str] = "Wrap To Zero"
     sign: ClassVar[FaceSign] = graph((0, 0), (0.6, 1), (0.6, 0), (1, 0))
     broadcast_parameters: ClassVar[tuple[str, ...]] = ("threshold",)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A ramp that falls to 0 once it exceeds 5.",
+        shows="A ramp; the output falls to 0 once the ramp exceeds 5.",
         parameters={"threshold": 5.0},
         inputs={"u": driver("Ramp")},
     )
@@ -119,7 +120,7 @@ class WrapToZero(Block):
 
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         shape = self.output_shapes(inputs)["y"]
-        return located(self, Condition("above", shape, "1 above the threshold", closed=False))
+        return located(self, Condition("above", shape, "1 while u is above the threshold", closed=False))
 
     def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"above": u["u"] - p["threshold"]}
@@ -132,8 +133,8 @@ class WrapToZero(Block):
 class HitCrossing(Block):
     """The number of crossings of an offset and the time of the last one; crossings are located exactly.
 
-    Simulink's block outputs 1 during the step that ends at the crossing. A count remains visible after the
-    crossing, and a triggered subsystem detects its change.
+    Simulink's block outputs 1 during the step that ends at the crossing. Here the count keeps its value after
+    the crossing, and a triggered subsystem can detect the change of the count.
     """
 
     title: ClassVar[str] = "Hit Crossing"

@@ -1,9 +1,9 @@
 """Rate limiters.
 
 In continuous time the start and the end of a rate limitation are events. While no limit is active, the output
-is u. Else it is a state y with y' equal to one of the limits, until y and u meet again. The output is
-continuous: ``kept`` is its left limit at the latest tick, event or breakpoint, so that ``u - kept`` is the
-jump of u at that time.
+is u. While a limit is active, the output is a state y with y' equal to that limit, until y and u are equal
+again. The output is continuous: ``kept`` is its left limit at the latest tick, event or breakpoint, so that
+``u - kept`` is the jump of u at that time.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from armblocks.diagram import (
 )
 from armblocks.diagram.signs import RATE_LIMIT, FaceSign
 
-APART = 1e-3
-"""Relative tolerance of an enabled limiter: an input this close to the last output is followed directly."""
+ENABLE_TOLERANCE = 1e-3
+"""Relative tolerance: a limiter that is enabled this close to the input follows it at once."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +44,7 @@ class RateLimiting(Block):
 
     @abstractmethod
     def limits(self, u: Signals, p: Signals) -> Signals:
-        """The mapping with the entries ``rising`` and ``falling``."""
+        """The rate limits, under the names ``rising`` and ``falling``."""
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the limited signal"),)
@@ -70,7 +70,7 @@ class RateLimiting(Block):
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         shape = self.output_shapes(inputs)["y"]
         return (
-            Guard("gap", shape, "y meets u"),
+            Guard("gap", shape, "y becomes equal to u"),
             Guard("fast", shape, "u' - rising"),
             Guard("fast_down", shape, "u' - falling"),
         )
@@ -102,18 +102,18 @@ class RateLimiting(Block):
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         # When the block is enabled, y is its last output, and u need not jump at this time.
         gap = u["u"] - x["y"]
-        apart = logic_and(x["mode"] == 0.0, fabs(gap) > APART * fmax(1.0, fabs(u["u"])))
-        return {"mode": if_else(apart, sign(gap), self._law(t, x, u, p))}
+        distant = logic_and(x["mode"] == 0.0, fabs(gap) > ENABLE_TOLERANCE * fmax(1.0, fabs(u["u"])))
+        return {"mode": if_else(distant, sign(gap), self._next_mode(t, x, u, p))}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"mode": self._law(t, x, u, p) != x["mode"]}
+        return {"mode": self._next_mode(t, x, u, p) != x["mode"]}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        law = self._law(t, x, u, p)
+        next_mode = self._next_mode(t, x, u, p)
         fired = logic_or(e["gap"] != 0.0, logic_or(e["fast"] != 0.0, e["fast_down"] != 0.0))
-        leaves = logic_and(x["mode"] == 0.0, law != 0.0)
+        leaves = logic_and(x["mode"] == 0.0, next_mode != 0.0)
         return {
-            "mode": if_else(fired, law, x["mode"]),
+            "mode": if_else(fired, next_mode, x["mode"]),
             "y": if_else(logic_and(leaves, same_instant(t, x["kept_at"])), x["kept"], x["y"]),
         }
 
@@ -125,18 +125,18 @@ class RateLimiting(Block):
         """The largest jump that the output follows."""
         return SMALLEST_JUMP * fmax(1.0, fabs(u["u"]))
 
-    def _law(self, t: SX, x: Signals, u: Signals, p: Signals) -> SX:
-        """The mode after this event, from the mode before it."""
+    def _next_mode(self, t: SX, x: Signals, u: Signals, p: Signals) -> SX:
+        """The mode after this event, as a function of the mode before it."""
         limits, guards = self.limits(u, p), self.guard_values(t, x, u, p)
         band, jump = self._band(u), self._jump(t, x, u)
         too_fast, too_fast_down = guards["fast"] > 0.0, guards["fast_down"] < 0.0
         by_rate = if_else(too_fast, 1.0, if_else(too_fast_down, -1.0, 0.0))
         follows = if_else(jump > band, 1.0, if_else(jump < -band, -1.0, by_rate))
         gap = guards["gap"]
-        met = logic_and(gap <= 0.0, u["u'"] <= limits["rising"])
-        met_down = logic_and(gap >= 0.0, u["u'"] >= limits["falling"])
-        rises = if_else(gap < -band, -1.0, if_else(met, by_rate, 1.0))
-        falls = if_else(gap > band, 1.0, if_else(met_down, by_rate, -1.0))
+        caught_up = logic_and(gap <= 0.0, u["u'"] <= limits["rising"])
+        caught_down = logic_and(gap >= 0.0, u["u'"] >= limits["falling"])
+        rises = if_else(gap < -band, -1.0, if_else(caught_up, by_rate, 1.0))
+        falls = if_else(gap > band, 1.0, if_else(caught_down, by_rate, -1.0))
         return if_else(x["mode"] == 0.0, follows, if_else(x["mode"] > 0.0, rises, falls))
 
 
@@ -144,9 +144,9 @@ class RateLimiting(Block):
 class RateLimiterContinuous(RateLimiting):
     """A rate limiter in continuous time: y = u while falling <= u' <= rising, else y' equals the limit.
 
-    Then y' stays at the limit until y meets u again. The output does not jump where u jumps. (The Rate
-    Limiter is the sampled block. Simulink has one block for both, and uses the difference between two
-    solver steps instead of the derivative.)
+    While a limit is active, y' stays at the limit until y equals u again. The output does not jump where u
+    jumps. (The Rate Limiter is the sampled block. Simulink has one block for both, and uses the difference
+    between two solver steps instead of the derivative.)
     """
 
     title: ClassVar[str] = "Rate Limiter (continuous)"

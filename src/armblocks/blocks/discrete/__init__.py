@@ -1,1 +1,1 @@
-"""Blocks that work at the ticks of a clock: delays, filters, sampled linear systems and controllers."""
+"""Blocks that compute at the ticks of a clock: delays, filters, sampled linear systems and controllers."""

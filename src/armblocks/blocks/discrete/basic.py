@@ -19,7 +19,7 @@ from armblocks.blocks.external_resets import (
     fires_at_tick,
     initial_source_parameter,
     reset_ports,
-    side_of,
+    trigger_state,
 )
 from armblocks.blocks.switching import limits_in_order
 from armblocks.diagram import (
@@ -47,12 +47,12 @@ _METHODS = {
 
 @dataclass(frozen=True, kw_only=True)
 class DiscreteIntegrator(Block):
-    """A discrete-time integrator: x(k+1) = x(k) + gain T u(k), held between two limits, x(0) = initial.
+    """A discrete-time integrator: x(k+1) = x(k) + gain T u(k), within two limits, x(0) = initial.
 
     It corresponds to Simulink's Discrete-Time Integrator. Forward Euler: y(k) = x(k). Backward Euler: y(k) =
     x(k) + gain T u(k). Trapezoidal: y(k) = x(k) + gain T u(k) / 2 and x(k+1) = y(k) + gain T u(k) / 2. An
-    external reset sets x(k) to the initial value at its tick before the output is computed. The
-    ``state_port`` gives x(k) before the reset, so that no loop through it is algebraic.
+    external reset sets x(k) to the initial value before the output of that tick is computed. The
+    ``state_port`` outputs x(k) before the reset, so that a loop through this port is not algebraic.
     """
 
     title: ClassVar[str] = "Discrete-Time Integrator"
@@ -63,14 +63,14 @@ class DiscreteIntegrator(Block):
     sampled: ClassVar[bool] = True
 
     method: str = parameter("forward_euler", choices=tuple(_METHODS), doc="integration method")
-    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the factor")
+    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the gain")
     external_reset: str = external_reset_parameter("none")
     initial_condition_source: str = initial_source_parameter()
     initial: ArrayLike = parameter(
         0.0, kind=ParameterKind.ARRAY, doc="the state at the first tick and at a reset, if no port gives it"
     )
-    lower: float = parameter(-math.inf, finite=False, doc="lower limit of the sum")
-    upper: float = parameter(math.inf, finite=False, doc="upper limit of the sum")
+    lower: float = parameter(-math.inf, finite=False, doc="lower limit of the state and the output")
+    upper: float = parameter(math.inf, finite=False, doc="upper limit of the state and the output")
     state_port: bool = parameter(False, doc="whether an output gives the state before a reset")
     saturation_port: bool = parameter(False, doc="whether an output shows which limit is active")
     sample_time: ArrayLike = sample_time_parameter()
@@ -86,21 +86,24 @@ class DiscreteIntegrator(Block):
         limits_in_order(self, "lower", "upper")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the rate"), *reset_ports(self.external_reset, self.initial_condition_source))
+        return (
+            Port("u", "signal to integrate"),
+            *reset_ports(self.external_reset, self.initial_condition_source),
+        )
 
     def output_ports(self) -> tuple[Port, ...]:
         saturated = Port("saturated", "1 at the upper limit, -1 at the lower limit, else 0")
         return (
-            Port("y", "the sum"),
+            Port("y", "the integral"),
             *((saturated,) if self.saturation_port else ()),
-            *((Port("state", "the sum before a reset"),) if self.state_port else ()),
+            *((Port("state", "the integral before a reset"),) if self.state_port else ()),
         )
 
     def assumed_output_shapes(self) -> Shapes:
         return self.output_shapes({})
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        x = State("x", self.output_shapes(inputs)["y"], "the sum")
+        x = State("x", self.output_shapes(inputs)["y"], "the integral")
         return (x, PREVIOUS_SIGN) if self._has_resets else (x,)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
@@ -118,7 +121,7 @@ class DiscreteIntegrator(Block):
         after = {"x": self._limited(self._state_after_reset(x, u, p) + p["gain"] * p["T"] * u["u"], p)}
         if self._has_resets:
             untriggered = self.external_reset == "none"
-            after["seen"] = SX(0.0) if untriggered else side_of(self.external_reset, u["reset"])
+            after["seen"] = SX(0.0) if untriggered else trigger_state(self.external_reset, u["reset"])
         return after
 
     def initial_states(self, p: Signals) -> Signals:
@@ -191,7 +194,7 @@ class DiscreteDerivative(Block):
     )
     sampled: ClassVar[bool] = True
 
-    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the factor")
+    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the gain")
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the input before the first tick")
     sample_time: ArrayLike = sample_time_parameter()
 

@@ -18,7 +18,7 @@ from armblocks.blocks.external_resets import (
     fires_at_tick,
     initial_source_parameter,
     reset_ports,
-    side_of,
+    trigger_state,
 )
 from armblocks.diagram import (
     Block,
@@ -95,9 +95,9 @@ class UnitDelay(OneTickDelay):
 class Memory(OneTickDelay):
     """A delay of one tick, like Simulink's Memory with a sample time: y(k) = u(k-1), y(0) = initial.
 
-    In a continuous part, Simulink's Memory gives the input at the previous solver step. Its output depends on
-    the solver, so this block does not support it: the sample time -1 with a continuous input is an error. Use
-    a Transport Delay there, or give this block or a Unit Delay a period.
+    With a continuous input, Simulink's Memory outputs the input at the previous solver step, which depends on
+    the solver. This block does not support that: the sample time -1 with a continuous input is an error. Use
+    a Transport Delay instead, or set a sample time for this block.
     """
 
     title: ClassVar[str] = "Memory"
@@ -135,7 +135,7 @@ class Delay(Block):
         return (OUTPUT,)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": _a_vector(inputs["u"])}
+        return {"y": _vector_shape(inputs["u"])}
 
     def assumed_output_shapes(self) -> Shapes:
         return {"y": ()}
@@ -158,11 +158,11 @@ class Delay(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class ResettableDelay(Block):
-    """A delay with reset: y(k) = u(k - length), or initial if no input has been stored length ticks ago.
+    """A delay with reset: y(k) = u(k - length), or initial for length ticks after the start or a reset.
 
-    It corresponds to Simulink's Delay with its ports. At the tick of a reset y and all values in the delay
-    buffer become the initial value. With ``enable_port`` the block holds its state and output at ticks at
-    which the input enable is 0.
+    It corresponds to Simulink's Delay with its optional ports. At the tick of a reset y and all values in the
+    delay buffer become the initial value. With ``enable_port`` the block holds its state and output at every
+    tick at which the input enable is 0.
     """
 
     title: ClassVar[str] = "Resettable Delay"
@@ -183,7 +183,7 @@ class ResettableDelay(Block):
     initial: ArrayLike = parameter(
         0.0, kind=ParameterKind.ARRAY, doc="the initial output, also after a reset, if no port gives it"
     )
-    enable_port: bool = parameter(False, doc="whether an input enable can stop the block")
+    enable_port: bool = parameter(False, doc="whether the block has an input enable, which stops it while 0")
     sample_time: ArrayLike = sample_time_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -198,8 +198,8 @@ class ResettableDelay(Block):
         return (OUTPUT,)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
-        wide = {name: shape for name, shape in inputs.items() if name in ("u", "initial")}
-        return {"y": _a_vector(broadcast({**wide, "initial value": shape_of(self.initial)}))}
+        signal_shapes = {name: shape for name, shape in inputs.items() if name in ("u", "initial")}
+        return {"y": _vector_shape(broadcast({**signal_shapes, "initial value": shape_of(self.initial)}))}
 
     def assumed_output_shapes(self) -> Shapes:
         return {"y": shape_of(self.initial)}
@@ -223,9 +223,9 @@ class ResettableDelay(Block):
         after = {"x": vertcat(buffer[1:, :], u["u"].T + row), "seen": self._side(u)}
         if not self.enable_port:
             return after
-        works = u["enable"] != 0.0
+        enabled = u["enable"] != 0.0
         held = {"held": self.outputs(t, x, u, p)["y"]}
-        return {name: if_else(works, value, x[name]) for name, value in after.items()} | held
+        return {name: if_else(enabled, value, x[name]) for name, value in after.items()} | held
 
     def initial_states(self, p: Signals) -> Signals:
         many = p["initial"].numel() > 1
@@ -236,20 +236,20 @@ class ResettableDelay(Block):
         return {"y": p["initial"]}
 
     def _side(self, u: Signals) -> SX:
-        return SX(0.0) if self.external_reset == "none" else side_of(self.external_reset, u["reset"])
+        return SX(0.0) if self.external_reset == "none" else trigger_state(self.external_reset, u["reset"])
 
     def _start(self, u: Signals, p: Signals) -> SX:
         return u.get("initial", p["initial"])
 
     def _resets(self, x: Signals, u: Signals) -> SX:
-        """1 at the first tick if a port gives the initial value, and where the trigger fires."""
+        """1 at a reset by the trigger, and at the first tick if a port gives the initial value; else 0."""
         first = x["seen"] < 0.0 if self.initial_condition_source == "external" else SX(0.0)
         if self.external_reset == "none":
             return first
         return logic_or(first, fires_at_tick(self.external_reset, u["reset"], x["seen"]))
 
 
-def _a_vector(shape: Shape) -> Shape:
+def _vector_shape(shape: Shape) -> Shape:
     """The shape; raises ``InputError`` for a matrix, because the delay buffer holds vectors."""
     if len(shape) > 1:
         raise InputError(
@@ -262,7 +262,7 @@ def _a_vector(shape: Shape) -> Shape:
 
 @dataclass(frozen=True, kw_only=True)
 class TappedDelay(Block):
-    """A tapped delay, the last inputs in one vector: y(k) = [u(k - length), …, u(k - 1)]."""
+    """A tapped delay; the output vector holds the last inputs: y(k) = [u(k - length), …, u(k - 1)]."""
 
     title: ClassVar[str] = "Tapped Delay"
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -326,7 +326,7 @@ class ZeroOrderHold(Block):
 class RateTransition(Block):
     """Transfers a signal from one sample time to another: y(t) = u(k T) at the ticks of the receiving clock.
 
-    Where both clocks tick at the same time, the output is the value of that tick.
+    If both clocks tick at the same time, the output is the input at that tick.
     """
 
     title: ClassVar[str] = "Rate Transition"

@@ -31,7 +31,7 @@ class TransferFunctionFirstOrder(Block):
     title: ClassVar[str] = "Transfer Fcn First Order"
     broadcast_parameters: ClassVar[tuple[str, ...]] = ("pole", "initial")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The step response: each tick covers a fifth of the remaining distance.",
+        shows="The step response: at each tick the output moves by a fifth of the remaining distance.",
         parameters={"pole": 0.8},
         inputs={"u": driver("Step")},
     )
@@ -72,7 +72,8 @@ class TransferFunctionFirstOrder(Block):
 class TransferFunctionLeadOrLag(Block):
     """A sampled compensator: y(k) = pole y(k-1) + u(k) - zero u(k-1), which is (z - zero) / (z - pole).
 
-    It leads where zero > pole. Its gain is 1 at high frequency and (1 - zero) / (1 - pole) in steady state.
+    It is a lead compensator if zero > pole, else a lag compensator. Its gain is 1 at high frequency and (1 -
+    zero) / (1 - pole) in steady state.
     """
 
     title: ClassVar[str] = "Transfer Fcn Lead or Lag"
@@ -138,7 +139,7 @@ class TransferFunctionRealZero(Block):
         return (Port("u", "the input"),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the input minus its share of the previous tick"),)
+        return (Port("y", "the input minus zero times the previous input"),)
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         return (State("x", self.output_shapes(inputs)["y"], "the input at the previous tick"),)

@@ -92,7 +92,7 @@ class SampledPidBlock(Block):
 
     @abstractmethod
     def errors(self, u: Signals, p: Signals) -> Errors:
-        """The error that each of the three actions acts on."""
+        """The errors at the inputs of the proportional, integral and derivative actions."""
 
     @property
     def _law(self) -> SampledPid:
@@ -110,10 +110,10 @@ class DiscretePID(SampledPidBlock):
     """Sampled PID: y = limit(P u + i + N (D u - f)), i(k+1) = i + T I u, f(k+1) = f + T N (D u - f).
 
     This is Simulink's Discrete PID Controller with forward Euler rules. The integral and the filter may each
-    use ``backward_euler`` or ``trapezoidal`` instead. While the output is limited, ``clamping`` stops an
-    integral that would drive the output further beyond the limit. ``back_calculation`` adds T Kb (y -
-    unlimited y) to the integral. ``tracking`` adds T Kt (tracking - y). A reset happens at the first tick
-    after the trigger has crossed zero.
+    use ``backward_euler`` or ``trapezoidal`` instead. While the output is limited, ``clamping`` stops the
+    integral if it drives the output further beyond the limit. ``back_calculation`` adds T Kb (y - unlimited
+    y) to the integral. ``tracking`` adds T Kt (tracking - y) to the integral. A reset happens at the first
+    tick after the trigger has crossed zero.
     """
 
     title: ClassVar[str] = "Discrete PID Controller"

@@ -51,7 +51,7 @@ class DiscreteTransferFunction(RationalBlock):
         return Fraction(polynomial("b", self.numerator, "z"), polynomial("a", self.denominator, "z"))
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", (self.degree,), "u filtered by 1/denominator, at the last ticks"),)
+        return (State("x", (self.degree,), "the last values of u filtered by 1/denominator, latest first"),)
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return self._shifted(x, u, p)
@@ -93,7 +93,7 @@ class DiscreteFilter(RationalBlock):
         return (Port("y", "the filtered input", shape=()),)
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", (self.degree,), "u filtered by 1/denominator, at the last ticks"),)
+        return (State("x", (self.degree,), "the last values of u filtered by 1/denominator, latest first"),)
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return self._shifted(x, u, p)

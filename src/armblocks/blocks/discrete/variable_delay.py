@@ -1,4 +1,4 @@
-"""A delay in ticks that is given by a signal."""
+"""A delay by a variable number of ticks."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from armblocks.errors import InputError
 class VariableIntegerDelay(Block):
     """A delay by a variable number of ticks: y(k) = u(k - d(k)), and ``initial`` where k < d(k).
 
-    The delay d is truncated to an integer and limited to the range 0 to ``longest``.
+    The delay d is rounded down to an integer and limited to the range 0 to ``longest``.
     """
 
     title: ClassVar[str] = "Variable Integer Delay"

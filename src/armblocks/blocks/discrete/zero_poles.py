@@ -15,9 +15,9 @@ from armblocks.blocks.linear_blocks import (
 )
 from armblocks.blocks.linear_systems import (
     LinearSystem,
+    frequency_transformed,
     realised,
     sampled,
-    shifted,
     warped,
 )
 from armblocks.diagram import (
@@ -37,8 +37,8 @@ from armblocks.diagram.signs import FaceSign, ratio_of_roots
 class DiscreteZeroPole(SectionsByRoots):
     """A sampled transfer function: y = gain (z - z1) … (z - zm) / ((z - p1) … (z - pn)) u, m <= n.
 
-    Complex zeros and poles come in conjugate pairs, as complex numbers in Python and as rows (real,
-    imaginary) in files. The block is initially at rest.
+    Complex zeros and poles come in conjugate pairs. Files contain them as rows (real, imaginary); Python also
+    accepts complex numbers. The block is initially at rest.
     """
 
     title: ClassVar[str] = "Discrete Zero-Pole"
@@ -93,10 +93,14 @@ class DigitalFilter(FilterByBand):
         above=0.0,
         maximum=0.9999,
         tunable=False,
-        doc="edge frequency (of a band, the lower one); 1 is 1 / (2 T)",
+        doc="edge frequency (for band filters, the lower edge), in units of 1 / (2 T)",
     )
     upper_edge: float = parameter(
-        0.4, above=0.0, maximum=0.9999, tunable=False, doc="upper edge frequency of a band"
+        0.4,
+        above=0.0,
+        maximum=0.9999,
+        tunable=False,
+        doc="upper edge frequency of a band, in units of 1 / (2 T)",
     )
     sample_time: ArrayLike = sample_time_parameter()
 
@@ -109,5 +113,9 @@ class DigitalFilter(FilterByBand):
     @property
     def system(self) -> LinearSystem:
         return realised(
-            sampled(shifted(self.prototype, self.filter_type, warped(self.edge), warped(self.upper_edge)))
+            sampled(
+                frequency_transformed(
+                    self.prototype, self.filter_type, warped(self.edge), warped(self.upper_edge)
+                )
+            )
         )

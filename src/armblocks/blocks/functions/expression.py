@@ -101,6 +101,12 @@ class Expression(Block):
             size, columns = self._value(SX.sym("t"), u, values).shape
         except UnknownNameError as error:
             raise InputError(error.what, allowed=error.allowed, fix=error.fix) from None
+        if size * columns == 0:
+            raise InputError(
+                "the formula gives an empty array",
+                allowed="scalars and vectors",
+                fix="check ranges and indices",
+            )
         if columns > 1:
             raise InputError(
                 f"the formula gives a matrix of {size} x {columns}",

@@ -49,7 +49,7 @@ class PythonFunction(Block):
     ``results``.
 
     The file of a diagram stores ``file.py:name`` and runs no code unless it is trusted. The studio shows the
-    code, and runs it in a separate process after you have trusted it in this form.
+    code, and runs it in a separate process after you have trusted this version of it.
     """
 
     title: ClassVar[str] = "Python Function"
@@ -95,8 +95,7 @@ class PythonFunction(Block):
         where = f"the function {user.name}"
         try:
             with warnings.catch_warnings():
-                # CasADi warns that the result type of NumPy functions of its values will change; it is SX
-                # here.
+                # CasADi warns of a future change of the result type of NumPy functions. Here the type is SX.
                 warnings.simplefilter("ignore", FutureWarning)
                 returned: Any = user.function(**arguments)
             values = [returned] if len(names) == 1 else list(returned)
@@ -185,7 +184,8 @@ class CalledPythonFunction(Block):
         return (*arguments, *results)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        # The outputs depend on the inputs without an equation; the order of the tick must include this.
+        # The call is not an equation. This expression declares feedthrough from every input to every output,
+        # which determines the order of the calls at a tick.
         all_inputs = sum((sum1(sum2(value)) for value in u.values()), SX(0.0))
         results = {port.name: x[f"{port.name}?"] for port in self.output_ports()}
         return {name: if_else(all_inputs > 0.0, value, value) for name, value in results.items()}
@@ -228,6 +228,7 @@ _SHAPE = re.compile("[1-9][0-9]*(x[1-9][0-9]*)?")
 
 
 def _names(text: str) -> list[str]:
+    """The names in a text that separates them by commas or spaces."""
     return text.replace(",", " ").split()
 
 
@@ -262,6 +263,7 @@ def _array(value: SX, shape: Shape) -> Any:
 
 
 def _natural_shape(value: SX) -> Shape:
+    """The shape of a symbolic matrix: one entry is a scalar, one column is a vector."""
     rows, columns = value.shape
     return (rows, columns) if columns > 1 else (rows,) if rows > 1 else ()
 

@@ -69,7 +69,7 @@ class RelationalOperator(Block):
         return (Port("u1", "the left operand"), Port("u2", "the right operand"))
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "1 or 0"),)
+        return (Port("y", "1 for true, 0 for false"),)
 
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         return located(self, *_sides(self.relation, self.output_shapes(inputs)["y"]))
@@ -109,7 +109,7 @@ class LogicalOperator(Block):
         return numbered_ports("u", 1 if self.operator == "NOT" else self.inputs, "condition")
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "1 or 0"),)
+        return (Port("y", "1 for true, 0 for false"),)
 
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         return located(self, *_truth_conditions(inputs))
@@ -148,7 +148,7 @@ class CompareToConstant(Block):
         return (Port("u", "the left operand"),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "1 or 0"),)
+        return (Port("y", "1 for true, 0 for false"),)
 
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         return located(self, *_sides(self.relation, self.output_shapes(inputs)["y"]))
@@ -179,7 +179,7 @@ class CompareToZero(Block):
         return (Port("u", "the left operand"),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "1 or 0"),)
+        return (Port("y", "1 for true, 0 for false"),)
 
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         return located(self, *_sides(self.relation, self.output_shapes(inputs)["y"]))
@@ -214,15 +214,15 @@ class IntervalTest(Block):
         return (Port("u", "the tested signal"),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "1 or 0"),)
+        return (Port("y", "1 for true, 0 for false"),)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"y": broadcast({**inputs, "lower": shape_of(self.lower), "upper": shape_of(self.upper)})}
 
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         shape = self.output_shapes(inputs)["y"]
-        above = Condition("above", shape, "1 above the lower end", closed=self.lower_closed)
-        below = Condition("below", shape, "1 below the upper end", closed=self.upper_closed)
+        above = Condition("above", shape, "1 while u is above the lower end", closed=self.lower_closed)
+        below = Condition("below", shape, "1 while u is below the upper end", closed=self.upper_closed)
         return located(self, above, below)
 
     def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
@@ -259,12 +259,12 @@ class IntervalTestDynamic(Block):
         )
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "1 or 0"),)
+        return (Port("y", "1 for true, 0 for false"),)
 
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         shape = self.output_shapes(inputs)["y"]
-        above = Condition("above", shape, "1 above the lower end", closed=self.lower_closed)
-        below = Condition("below", shape, "1 below the upper end", closed=self.upper_closed)
+        above = Condition("above", shape, "1 while u is above the lower end", closed=self.lower_closed)
+        below = Condition("below", shape, "1 while u is below the upper end", closed=self.upper_closed)
         return located(self, above, below)
 
     def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
@@ -373,7 +373,7 @@ class TruthTable(Block):
             raise InputError(
                 f"there are {rows.shape[0]} decisions and {shape_of(self.actions)[0]} actions",
                 where="TruthTable",
-                allowed="an action for each decision, of entries 1, 0 and -1",
+                allowed="one action for each decision; the entries of a decision are 1, 0 or -1",
                 fix="correct the table",
             )
         if rows.shape[1] > _MAX_CONDITIONS:
@@ -385,7 +385,9 @@ class TruthTable(Block):
             )
         table = rows.tolist()
         for combination in product((0, 1), repeat=rows.shape[1]):
-            if any(all(want in (-1.0, one) for want, one in zip(row, combination)) for row in table):
+            if any(
+                all(required in (-1.0, value) for required, value in zip(row, combination)) for row in table
+            ):
                 continue
             raise InputError(
                 f"the conditions {list(combination)} are not decided",
@@ -411,8 +413,8 @@ class TruthTable(Block):
         rows: list[list[float]] = np.asarray(self.decisions, dtype=np.float64).tolist()
         action, true = p["actions"][len(rows) - 1, :].T, _truth(x, "u")
         for k in reversed(range(len(rows) - 1)):
-            requested = [true[i] == required for i, required in enumerate(rows[k]) if required >= 0.0]
-            action = if_else(reduce(logic_and, requested, SX(1.0)), p["actions"][k, :].T, action)
+            fulfilled = [true[i] == required for i, required in enumerate(rows[k]) if required >= 0.0]
+            action = if_else(reduce(logic_and, fulfilled, SX(1.0)), p["actions"][k, :].T, action)
         return {"y": action}
 
 
@@ -436,7 +438,7 @@ def _truth(x: Signals, name: str) -> SX:
 
 
 def _sides(relation: str, shape: Shape) -> tuple[Condition, ...]:
-    """The conditions of a relation on the difference of left and right operand; equality needs two."""
+    """The conditions of a relation on the difference of its operands; equality needs two."""
     above = Condition("above", shape, "1 where the left operand is greater", closed=False)
     below = Condition("below", shape, "1 where the left operand is less", closed=False)
     if relation in (">", "<="):

@@ -43,7 +43,7 @@ _EDGES: Mapping[str, Callable[[SX, SX], SX]] = {
     "fall negative": lambda u, before: logic_and(u < 0.0, before >= 0.0),
     "fall nonpositive": lambda u, before: logic_and(u <= 0.0, before > 0.0),
 }
-_PULSES = driver("SineWave", frequency=2.0)
+_SINE = driver("SineWave", frequency=2.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +60,7 @@ class EdgeDetection(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The output is 1 at each tick at which the sine has become positive.",
         parameters={"sample_time": 0.1},
-        inputs={"u": _PULSES},
+        inputs={"u": _SINE},
     )
 
     edge: str = parameter("rise positive", choices=tuple(_EDGES), doc="the change to detect")
@@ -109,7 +109,7 @@ class SRFlipFlop(Block):
     sample_time: ArrayLike = sample_time_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("S", "sets Q"), Port("R", "resets Q"))
+        return (Port("S", "Q becomes 1 if this is not 0"), Port("R", "Q becomes 0 if this is not 0"))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("Q", "the state"), Port("not_Q", "1 - Q; 0 while both inputs are true"))
@@ -160,7 +160,7 @@ class DFlipFlop(Block):
     sample_time: ArrayLike = sample_time_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("D", "the value that Q takes at the edge"), Port("CLK", "the clock", shape=()))
+        return (Port("D", "value of Q after the edge"), Port("CLK", "the clock", shape=()))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("Q", "the state"), Port("not_Q", "1 where Q is 0, else 0"))
@@ -181,8 +181,8 @@ class DFlipFlop(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         high = u["CLK"] > 0.0
-        takes = high if self.trigger == "level" else logic_and(high, x["clock"] <= 0.0)
-        state = if_else(takes, u["D"], x["state"])
+        is_set = high if self.trigger == "level" else logic_and(high, x["clock"] <= 0.0)
+        state = if_else(is_set, u["D"], x["state"])
         return {"Q": state, "not_Q": state == 0.0}
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
@@ -194,7 +194,7 @@ class DFlipFlop(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class JKFlipFlop(Block):
-    """A JK flip-flop, which changes at a falling clock edge: J sets, K resets, both toggle, neither keeps Q.
+    """A JK flip-flop with a falling clock edge: J sets Q, K resets Q, both toggle Q, else Q is constant.
 
     A falling edge is CLK(k-1) > 0 >= CLK(k), as in Simulink.
     """
@@ -203,7 +203,7 @@ class JKFlipFlop(Block):
     sign: ClassVar[FaceSign] = Lines(("J-K", "Flip-Flop"))
     sampled: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="With J = K = 1 it halves the frequency of the pulses.",
+        shows="With J = K = 1, Q has half the frequency of the pulses.",
         parameters={"sample_time": 0.1},
         inputs={
             "J": driver("Constant", value=1.0).named("one"),
@@ -258,7 +258,7 @@ class Counter(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The periods of a sine are counted until a step resets the count.",
         parameters={"sample_time": 0.1},
-        inputs={"u": _PULSES, "reset": driver("Step", time=8.0).named("reset")},
+        inputs={"u": _SINE, "reset": driver("Step", time=8.0).named("reset")},
     )
 
     initial: float = parameter(0.0, doc="the count at the start and after a reset")
@@ -267,7 +267,7 @@ class Counter(Block):
     def input_ports(self) -> tuple[Port, ...]:
         return (
             Port("u", "signal whose rising edges are counted"),
-            Port("reset", "resets while not 0", shape=()),
+            Port("reset", "the count is initial while this is not 0", shape=()),
         )
 
     def output_ports(self) -> tuple[Port, ...]:

@@ -9,12 +9,18 @@ from typing import ClassVar
 from casadi import SX, floor, fmax, fmin, if_else
 from numpy.typing import ArrayLike
 
-from armblocks.blocks.elementwise import numbered_ports
 from armblocks.blocks.integer_steps import BlockWithSteps, IntegerSteps
 from armblocks.blocks.interpolation import EXTRAPOLATIONS, cells, contract
 from armblocks.blocks.long_tables import is_long
 from armblocks.blocks.switching import zero_crossing_parameter
-from armblocks.blocks.table_axes import BlockWithAxes, ascending_positions, elementwise, numbers_of, read
+from armblocks.blocks.table_axes import (
+    BlockWithAxes,
+    ascending_positions,
+    axis_ports,
+    elementwise,
+    numbers_of,
+    read,
+)
 from armblocks.diagram import (
     Block,
     Port,
@@ -33,8 +39,9 @@ from armblocks.errors import InputError
 class Prelookup(BlockWithAxes):
     """The interval of a position and the fraction in it: u = b(k) + f (b(k+1) - b(k)), k from 0.
 
-    Several Interpolation Using Prelookup blocks can share it. At the last break point the index is that of
-    the last interval and f is 1. Beyond the ends ``clip`` limits f to 0 or 1, and ``linear`` extrapolates.
+    Several Interpolation Using Prelookup blocks can use the result of one Prelookup. At the last position
+    the index is that of the last interval and f is 1. Beyond the ends ``clip`` limits f to 0 or 1, and
+    ``linear`` extrapolates.
     """
 
     title: ClassVar[str] = "Prelookup"
@@ -72,10 +79,10 @@ class Prelookup(BlockWithAxes):
         def fraction(u: SX, cell: SX) -> SX:
             k = interval(cell)
             begin, end = (self._at(points, index) for index in (k, k + 1.0))
-            free = (u - begin) / (end - begin)
+            unlimited = (u - begin) / (end - begin)
             if self.extrapolation == "linear":
-                return free
-            return if_else(cell == 0.0, 0.0, if_else(cell == float(n), 1.0, free))
+                return unlimited
+            return if_else(cell == 0.0, 0.0, if_else(cell == float(n), 1.0, unlimited))
 
         return {"k": elementwise([cell], interval), "f": elementwise([u["u"], cell], fraction)}
 
@@ -103,7 +110,7 @@ class InterpolationUsingPrelookup(Block):
     """Linear interpolation at known intervals: y = (1 - f) table[k] + f table[k + 1], along each axis.
 
     Indices and fractions come from Prelookup blocks, one pair for each axis of the table. An index is
-    truncated to an integer and limited to the table.
+    rounded down to an integer and limited to the table.
     """
 
     title: ClassVar[str] = "Interpolation Using Prelookup"
@@ -120,7 +127,7 @@ class InterpolationUsingPrelookup(Block):
     )
 
     table: ArrayLike = parameter(
-        (0.0, 1.0), dimensions=(1, 2, 3, 4), doc="values, two or more along each axis"
+        (0.0, 1.0), dimensions=(1, 2, 3, 4), doc="values, at least two along each axis"
     )
 
     def check(self) -> None:
@@ -188,7 +195,7 @@ class DirectLookup(BlockWithSteps):
     zero_crossing: bool = zero_crossing_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
-        return numbered_ports("u", len(shape_of(self.table)), "index along axis")
+        return axis_ports("index", self.table)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the entry"),)
@@ -196,7 +203,7 @@ class DirectLookup(BlockWithSteps):
     def _steps(self) -> tuple[IntegerSteps, ...]:
         ports, counts = self.input_ports(), shape_of(self.table)
         return tuple(
-            IntegerSteps(port.name, mode=f"index {port.name}", count=count, mark=f"{port.name} ")
+            IntegerSteps(port.name, mode=f"index {port.name}", count=count, prefix=f"{port.name} ")
             for port, count in zip(ports, counts)
             if self.zero_crossing
         )

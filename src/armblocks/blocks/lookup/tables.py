@@ -1,4 +1,7 @@
-"""Lookup tables with constant break points and tunable entries. Every element of the input is looked up."""
+"""Lookup tables: constant positions with tunable entries, and positions that are signals.
+
+The blocks look up each element of their inputs.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +14,10 @@ import numpy as np
 from casadi import SX
 from numpy.typing import ArrayLike
 
-from armblocks.blocks.elementwise import numbered_ports
 from armblocks.blocks.interpolation import EXTRAPOLATIONS, METHODS
 from armblocks.blocks.long_tables import is_long
 from armblocks.blocks.switching import zero_crossing_parameter
-from armblocks.blocks.table_axes import Axes, BlockWithAxes, ascending_positions, axis, numbers_of
+from armblocks.blocks.table_axes import Axes, BlockWithAxes, ascending_positions, axis, axis_ports, numbers_of
 from armblocks.diagram import (
     Block,
     Guard,
@@ -36,15 +38,15 @@ from armblocks.errors import InputError
 class LookupTable1D(BlockWithAxes):
     """A curve through given points: y = table(u), interpolated by the chosen method.
 
-    ``cubic`` is the spline with not-a-knot ends (MATLAB's ``spline``); ``flat`` uses the entry at or below u,
-    ``nearest`` the nearest entry. Beyond the ends ``clip`` holds the last value and ``linear`` extrapolates
-    along the tangent.
+    ``cubic`` is the spline with not-a-knot ends (MATLAB's ``spline``). ``flat`` uses the entry at the largest
+    position below or equal to u, and ``nearest`` the entry at the nearest position. Beyond the ends, ``clip``
+    gives the value at the end and ``linear`` extrapolates along the tangent.
     """
 
     title: ClassVar[str] = "1-D Lookup Table"
     sign: ClassVar[FaceSign] = TABLE
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A curve through five points: linear interpolation, held beyond the ends.",
+        shows="A curve through five points: linear interpolation, constant beyond the ends.",
         parameters={"positions": (1.0, 3.0, 5.0, 6.0, 8.0), "table": (0.0, 2.0, 1.0, 1.5, 0.0)},
         inputs={"u": driver("Ramp")},
     )
@@ -79,7 +81,10 @@ class LookupTable1D(BlockWithAxes):
 
 @dataclass(frozen=True, kw_only=True)
 class LookupTable2D(BlockWithAxes):
-    """A surface over given points: y = table(u1, u2), rows along u1 and columns along u2."""
+    """A surface through given points: y = table(u1, u2), rows along u1 and columns along u2.
+
+    Interpolation and extrapolation methods are those of the 1-D Lookup Table.
+    """
 
     title: ClassVar[str] = "2-D Lookup Table"
     sign: ClassVar[FaceSign] = Words("T(u₁, u₂)")
@@ -94,12 +99,12 @@ class LookupTable2D(BlockWithAxes):
     )
 
     positions1: ArrayLike = parameter(
-        (0.0, 1.0), dimensions=(1,), tunable=False, doc="break points of the rows"
+        (0.0, 1.0), dimensions=(1,), tunable=False, doc="positions of the rows (m,)"
     )
     positions2: ArrayLike = parameter(
-        (0.0, 1.0), dimensions=(1,), tunable=False, doc="break points of the columns"
+        (0.0, 1.0), dimensions=(1,), tunable=False, doc="positions of the columns (n,)"
     )
-    table: ArrayLike = parameter(((0.0, 1.0), (1.0, 2.0)), dimensions=(2,), doc="values (rows, columns)")
+    table: ArrayLike = parameter(((0.0, 1.0), (1.0, 2.0)), dimensions=(2,), doc="values (m, n)")
     method: str = parameter("linear", choices=METHODS, doc="interpolation method")
     extrapolation: str = parameter("clip", choices=EXTRAPOLATIONS, doc="extrapolation method")
     zero_crossing: bool = zero_crossing_parameter()
@@ -110,7 +115,7 @@ class LookupTable2D(BlockWithAxes):
         ascending_positions("LookupTable2D", "positions2", self.positions2, columns)
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u1", "the position along the rows"), Port("u2", "the position along the columns"))
+        return (Port("u1", "position along axis 1, rows"), Port("u2", "position along axis 2, columns"))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the value"),)
@@ -133,12 +138,13 @@ class LookupTableND(BlockWithAxes):
     """A table of one to four axes: y = table(u1, u2, …), one input for each axis.
 
     ``positions`` lists the positions of the first axis, then those of the second, and so on. Each axis has as
-    many positions as the table has entries along it.
+    many positions as the table has entries along it. Interpolation and extrapolation methods are those of the
+    1-D Lookup Table.
     """
 
     title: ClassVar[str] = "n-D Lookup Table"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A table of two axes, smooth by cubic splines, crossed along the first.",
+        shows="A table with two axes and cubic splines; the position moves along the first axis.",
         parameters={
             "positions": (0.0, 3.0, 6.0, 10.0, 0.0, 1.0, 2.0, 3.0),
             "table": ((0.0, 1.0, 1.0, 0.0), (2.0, 3.0, 3.0, 2.0), (1.0, 2.0, 2.0, 1.0), (0.0, 1.0, 1.0, 0.0)),
@@ -162,16 +168,16 @@ class LookupTableND(BlockWithAxes):
         shape, count = shape_of(self.table), shape_of(self.positions)[0]
         if count != sum(shape):
             raise InputError(
-                f"there are {count} break points for a table of shape {shape}",
+                f"there are {count} positions for a table of shape {shape}",
                 where="LookupTableND",
                 allowed=f"{sum(shape)}: {' + '.join(map(str, shape))}",
                 fix="list the positions of all axes, axis after axis",
             )
-        for k, along in enumerate(self._positions_by_input().values(), 1):
-            ascending_positions("LookupTableND", f"axis {k} of positions", along, shape[k - 1])
+        for k, axis_positions in enumerate(self._positions_by_input().values(), 1):
+            ascending_positions("LookupTableND", f"axis {k} of positions", axis_positions, shape[k - 1])
 
     def input_ports(self) -> tuple[Port, ...]:
-        return numbered_ports("u", len(shape_of(self.table)), "position along axis")
+        return axis_ports("position", self.table)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the value"),)
@@ -184,12 +190,12 @@ class LookupTableND(BlockWithAxes):
 
     def _positions_by_input(self) -> Mapping[str, list[float]]:
         points = numbers_of(self, "positions")
-        return {port: points[part] for port, part in self._parts().items()}
+        return {port: points[part] for port, part in self._slices().items()}
 
     def _run_positions(self, p: Signals) -> Mapping[str, SX]:
-        return {port: p["positions"][part] for port, part in self._parts().items()}
+        return {port: p["positions"][part] for port, part in self._slices().items()}
 
-    def _parts(self) -> dict[str, slice]:
+    def _slices(self) -> dict[str, slice]:
         """The slice of the positions for each input."""
         ends = np.cumsum(shape_of(self.table)).tolist()
         ports = (port.name for port in self.input_ports())
@@ -198,9 +204,10 @@ class LookupTableND(BlockWithAxes):
 
 @dataclass(frozen=True, kw_only=True)
 class LookupTableDynamic(Block):
-    """A curve whose points are signals: y = table(u), linear between the points, held beyond the ends.
+    """A curve whose points are signals: y = table(u), linear between the points, constant beyond the ends.
 
-    The positions must be strictly ascending at all times; if two of them are equal the output is not finite.
+    The positions must be strictly ascending at all times. The block does not check this; equal positions may
+    give NaN.
     """
 
     following_modes: ClassVar[bool] = True
@@ -233,7 +240,7 @@ class LookupTableDynamic(Block):
         if positions != values or len(positions) != 1 or math.prod(positions) < 2:
             raise InputError(
                 f"the positions have shape {positions} and the values {values}",
-                allowed="two vectors of one length, of at least 2",
+                allowed="two vectors of the same length, at least 2",
                 fix="change the width of one of the signals",
             )
         return {"y": inputs["u"]}
@@ -260,7 +267,7 @@ class LookupTableDynamic(Block):
         return self._axes(u["positions"]).resets(x, u, e)
 
     def _axes(self, positions: SX | int) -> Axes:
-        """The axis of positions that are signals. Any ascending positions suffice for counting boundaries."""
-        whole = isinstance(positions, int)
-        points = range(positions) if whole else (positions[k] for k in range(positions.numel()))
+        """The axis with these positions. An integer gives an axis with as many placeholder positions."""
+        is_count = isinstance(positions, int)
+        points = range(positions) if is_count else (positions[k] for k in range(positions.numel()))
         return Axes({"u": axis([*points], "linear", "clip")}, self.zero_crossing)

@@ -1,4 +1,4 @@
-"""Angles: their units, polar coordinates, and the difference of two."""
+"""Blocks for angles: conversion of units, polar coordinates, wrapped differences."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from casadi import SX, atan2, cos, hypot, sin
 
 from armblocks.blocks.elementwise import common_unit
 from armblocks.blocks.maths.rounding import (
+    quotient_guard_values,
+    quotient_guards,
+    quotient_modes,
+    quotient_of,
     remainder,
-    remainder_of_turn,
+    remainder_for_quotient,
     step_after,
-    turn_guard_values,
-    turn_guards,
-    turn_modes,
-    turns_of,
 )
 from armblocks.blocks.switching import beyond, cell_of, zero_crossing_parameter
 from armblocks.diagram import (
@@ -86,8 +86,7 @@ class CartesianToPolar(Block):
     sign: ClassVar[FaceSign] = Words("xy→rθ")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(
-            "A point on an ellipse with the half axes 2 and 1: its distance, and its angle, which wraps at "
-            "pi."
+            "Distance and angle of a point on an ellipse with the half axes 2 and 1. The angle wraps at pi."
         ),
         inputs={"x": driver("SineWave", amplitude=2.0, phase=pi / 2), "y": driver("SineWave")},
     )
@@ -154,37 +153,41 @@ class AngleDifference(Block):
     zero_crossing: bool = zero_crossing_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("a", "one angle", "rad"), Port("b", "the angle to subtract", "rad"))
+        return (Port("a", "the first angle", "rad"), Port("b", "the angle to subtract", "rad"))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "a - b, at least -pi and below pi", "rad"),)
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return turn_modes(broadcast(inputs)) if self.zero_crossing else ()
+        return quotient_modes(broadcast(inputs)) if self.zero_crossing else ()
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return turn_guards(broadcast(inputs)) if self.zero_crossing else ()
+        return quotient_guards(broadcast(inputs)) if self.zero_crossing else ()
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         if not self.zero_crossing:
-            return {"y": remainder("mod", _raised(u), _TURN) - pi}
-        return {"y": remainder_of_turn("mod", _raised(u), _TURN, x["turns"]) - pi}
+            return {"y": remainder("mod", _shifted_difference(u), _TURN) - pi}
+        return {"y": remainder_for_quotient("mod", _shifted_difference(u), _TURN, x["turns"]) - pi}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return turn_guard_values("mod", _raised(u), _TURN, x["turns"]) if self.zero_crossing else {}
+        return (
+            quotient_guard_values("mod", _shifted_difference(u), _TURN, x["turns"])
+            if self.zero_crossing
+            else {}
+        )
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         if not self.zero_crossing:
             return {}
-        turns = turns_of("mod", _raised(u), _TURN)
-        return {"turns": cell_of(turns, x["turns"], self.guard_values(t, x, u, p))}
+        quotient = quotient_of("mod", _shifted_difference(u), _TURN)
+        return {"turns": cell_of(quotient, x["turns"], self.guard_values(t, x, u, p))}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"turns": beyond(self.guard_values(t, x, u, p))} if self.zero_crossing else {}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         return (
-            {"turns": step_after(turns_of("mod", _raised(u), _TURN), x["turns"], e)}
+            {"turns": step_after(quotient_of("mod", _shifted_difference(u), _TURN), x["turns"], e)}
             if self.zero_crossing
             else {}
         )
@@ -193,5 +196,6 @@ class AngleDifference(Block):
 _TURN = SX(2.0 * pi)
 
 
-def _raised(u: Signals) -> SX:
+def _shifted_difference(u: Signals) -> SX:
+    """The difference plus pi: its remainder modulo 2 pi minus pi is the wrapped difference."""
     return u["a"] - u["b"] + pi

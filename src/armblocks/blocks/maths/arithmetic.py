@@ -76,7 +76,7 @@ class Bias(Block):
     title: ClassVar[str] = "Bias"
     broadcast_parameters: ClassVar[tuple[str, ...]] = ("bias",)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The sine, 1 higher.",
+        shows="A sine plus 1.",
         parameters={"bias": 1.0},
     )
 
@@ -168,7 +168,7 @@ class Sqrt(Block):
         return function_sign(self.function)
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the square"),)
+        return (Port("u", "the radicand"),)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the root"),)
@@ -189,7 +189,7 @@ class Hypot(Block):
     )
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "one leg"), Port("v", "the other leg"))
+        return (Port("u", "first leg"), Port("v", "second leg"))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the hypotenuse"),)
@@ -226,7 +226,7 @@ class Divide(Block):
 class Polynomial(Block):
     """A polynomial of every element, highest power first: y = c1 u^n + … + cn u + c(n+1).
 
-    Evaluated by Horner's scheme.
+    The block uses Horner's scheme.
     """
 
     title: ClassVar[str] = "Polynomial"

@@ -63,11 +63,11 @@ class Gain(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class MatrixGain(Block):
-    """A vector times a matrix: y = gain u, with gain (m, n), u (n,), y (m,)."""
+    """The product of a matrix and a vector: y = gain u, with gain (m, n), u (n,), y (m,)."""
 
     title: ClassVar[str] = "Matrix Gain"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows=("A rotation by 90 degrees: the outputs are minus the second input and the first input."),
+        shows=("A rotation of the input vector by 90 degrees."),
         parameters={"gain": ((0.0, -1.0), (1.0, 0.0))},
         inputs={"u": driver("SineWave", amplitude=(1.0, 0.5))},
     )
@@ -136,7 +136,7 @@ class Product(Block):
     title: ClassVar[str] = "Product"
     card_size: ClassVar[tuple[float, float]] = (46.0, 46.0)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A fast sine times a slow one: its amplitude rises and falls.",
+        shows="A fast sine times a slow sine: the amplitude of the product rises and falls.",
         inputs={
             "u1": driver("SineWave", frequency=8.0).named("fast"),
             "u2": driver("SineWave", frequency=0.6).named("slow"),
@@ -273,8 +273,8 @@ class MathFunction(BlockWithSteps):
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         above = Condition("positive", inputs["u"], "1 where u > 0", closed=False)
         below = Condition("negative", inputs["u"], "1 where u < 0", closed=False)
-        requested = {"sign": (above, below), "abs": (below,)}
-        return located(self, *requested.get(self.function, ()))
+        by_function = {"sign": (above, below), "abs": (below,)}
+        return located(self, *by_function.get(self.function, ()))
 
     def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"positive": u["u"], "negative": -u["u"]}
@@ -348,7 +348,7 @@ class Power(Block):
     title: ClassVar[str] = "Power"
     sign: ClassVar[FaceSign] = Words("uᵛ")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A base between 1 and 3 to a power that rises from -1 to 1: at 5 s, power 0, the output is 1.",
+        shows="A base between 1 and 3, and an exponent that rises from -1 to 1. At 5 s the output is 1.",
         inputs={"base": driver("SineWave", bias=2.0), "exponent": driver("Ramp", slope=0.2, initial=-1.0)},
     )
 
@@ -391,18 +391,23 @@ class MinMax(Block):
         shape = self.output_shapes(inputs)["y"]
         doc = "1 if input {} is beyond all previous inputs"
         return located(
-            self, *(Condition(f"beyond{k}", shape, doc.format(k), closed=False) for k in self._later())
+            self,
+            *(Condition(f"beyond{k}", shape, doc.format(k), closed=False) for k in self._further_inputs()),
         )
 
     def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         sign = -1.0 if self.function == "min" else 1.0
         values = list(u.values())
-        return {f"beyond{k}": sign * (values[k - 1] - self._best(x, values, k - 1)) for k in self._later()}
+        return {
+            f"beyond{k}": sign * (values[k - 1] - self._best(x, values, k - 1))
+            for k in self._further_inputs()
+        }
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": self._best(x, list(u.values()), self.inputs)}
 
-    def _later(self) -> range:
+    def _further_inputs(self) -> range:
+        """The numbers of all inputs except the first."""
         return range(2, self.inputs + 1)
 
     def _best(self, x: Signals, values: list[SX], count: int) -> SX:

@@ -1,4 +1,4 @@
-"""Algebraic constraints: signals that are solved for."""
+"""Algebraic constraints: signals that an equation determines."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ class AlgebraicConstraint(Block):
 
     An equation that is linear in z is solved symbolically when the diagram is compiled. Other equations are
     solved by Newton's method with the exact Jacobian, which starts from ``initial`` at t = 0 and later from
-    the previous solution. The start value selects one of several solutions. There are as many equations as
-    unknowns: the elements of a vector are solved together. An input that does not depend on z is an error.
+    the previous solution. If the equation has several solutions, the start value selects one. A vector z has
+    as many equations as elements, which are solved together. An input that does not depend on z is an error.
     """
 
     title: ClassVar[str] = "Algebraic Constraint"
     sign: ClassVar[FaceSign] = Words("f(z) = 0")
     implicit_outputs: ClassVar[tuple[str, ...]] = ("z",)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The z for which z + z^3 is the sine.",
+        shows="The solution z of the equation z + z^3 = sin t.",
         inputs={
             "u": driver("Expression", formula="u2 + u2 ^ 3 - u1", inputs=2).by(
                 u1=driver("SineWave").named("sine"), u2="z"

@@ -41,7 +41,7 @@ class SliderGain(Block):
     title: ClassVar[str] = "Slider Gain"
     outline: ClassVar[Outline] = Outline.TRIANGLE
 
-    gain: float = parameter(1.0, doc="the factor")
+    gain: float = parameter(1.0, doc="the gain")
     low: float = parameter(0.0, tunable=False, doc="the lower end of the slider")
     high: float = parameter(2.0, tunable=False, doc="the upper end of the slider")
 
@@ -52,7 +52,7 @@ class SliderGain(Block):
                 f"gain is {self.gain}",
                 where="SliderGain",
                 allowed=f"low <= gain <= high: {self.low} to {self.high}",
-                fix="change the gain or the ends",
+                fix="change the gain or the limits",
             )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -67,7 +67,7 @@ class SliderGain(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class WeightedSampleTime(Block):
-    """A signal and the sample time T: y(k) = u(k) + weight T, and likewise with -, * or /."""
+    """Arithmetic with the sample time T: y(k) = u(k) + weight T; the operation may also be -, * or /."""
 
     title: ClassVar[str] = "Weighted Sample Time Math"
     broadcast_parameters: ClassVar[tuple[str, ...]] = ("weight",)
@@ -97,7 +97,8 @@ class SineWaveFunction(Block):
     title: ClassVar[str] = "Sine Wave Function"
     sign: ClassVar[FaceSign] = sine_curve(1.0)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The input is a time that runs twice as fast.", inputs={"u": driver("Ramp", slope=2.0)}
+        shows="The input rises by 2 s per second, so the sine has twice its frequency.",
+        inputs={"u": driver("Ramp", slope=2.0)},
     )
 
     amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="half the peak-to-peak value")

@@ -70,7 +70,7 @@ class ProductOfElements(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Extremum(Block):
-    """The minimum or maximum of all elements, and its index: y = u(index), index from 1.
+    """The minimum or maximum of all elements, and its index: y = u(index). Indices start at 1.
 
     If several elements are equal, the index is that of the first. Indices of a matrix are in column-major
     order.
@@ -166,12 +166,12 @@ class DotProduct(Block):
     title: ClassVar[str] = "Dot Product"
     sign: ClassVar[FaceSign] = Words("u · v")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The component of a rotating vector along a fixed one.",
+        shows="The dot product of a rotating vector and the vector (1, 1).",
         inputs={"u": CIRCLING, "v": driver("Constant", value=(1.0, 1.0))},
     )
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "one vector"), Port("v", "the other vector"))
+        return (Port("u", "first vector"), Port("v", "second vector"))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the dot product"),)

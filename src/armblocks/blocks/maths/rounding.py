@@ -36,7 +36,7 @@ from armblocks.equations import Shape
 
 @dataclass(frozen=True, kw_only=True)
 class Rounding(BlockWithSteps):
-    """Rounds every element: down, up, to the nearest integer (halves away from zero) or towards zero."""
+    """Rounds every element: ``floor``, ``ceil``, ``round`` (halves away from zero) or ``fix`` (to zero)."""
 
     title: ClassVar[str] = "Rounding Function"
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -70,7 +70,8 @@ class Rounding(BlockWithSteps):
 class Modulo(Block):
     """The remainder: mod(u, v) has the sign of v, and mod(u, 0) = u; rem(u, v) has the sign of u.
 
-    Both are exact. ``rem(u, 0)`` is NaN. In Simulink they are options of the Math Function block.
+    Both are computed by ``fmod``, without rounding u / v. ``rem(u, 0)`` is NaN. In Simulink, mod and rem are
+    options of the Math Function block.
     """
 
     following_modes: ClassVar[bool] = True
@@ -82,7 +83,7 @@ class Modulo(Block):
     )
 
     function: str = parameter(
-        "mod", choices=("mod", "rem"), doc="mod or rem, which determines the sign of the result"
+        "mod", choices=("mod", "rem"), doc="mod or rem; they differ in the sign of the result"
     )
     zero_crossing: bool = zero_crossing_parameter()
 
@@ -96,24 +97,24 @@ class Modulo(Block):
         return {"y": common_unit(inputs)}
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return turn_modes(broadcast(inputs)) if self.zero_crossing else ()
+        return quotient_modes(broadcast(inputs)) if self.zero_crossing else ()
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return turn_guards(broadcast(inputs)) if self.zero_crossing else ()
+        return quotient_guards(broadcast(inputs)) if self.zero_crossing else ()
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         if not self.zero_crossing:
             return {"y": remainder(self.function, u["u"], u["v"])}
-        return {"y": remainder_of_turn(self.function, u["u"], u["v"], x["turns"])}
+        return {"y": remainder_for_quotient(self.function, u["u"], u["v"], x["turns"])}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return turn_guard_values(self.function, u["u"], u["v"], x["turns"]) if self.zero_crossing else {}
+        return quotient_guard_values(self.function, u["u"], u["v"], x["turns"]) if self.zero_crossing else {}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         if not self.zero_crossing:
             return {}
-        turns = turns_of(self.function, u["u"], u["v"])
-        return {"turns": cell_of(turns, x["turns"], self.guard_values(t, x, u, p))}
+        quotient = quotient_of(self.function, u["u"], u["v"])
+        return {"turns": cell_of(quotient, x["turns"], self.guard_values(t, x, u, p))}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"turns": beyond(self.guard_values(t, x, u, p))} if self.zero_crossing else {}
@@ -121,7 +122,7 @@ class Modulo(Block):
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         if not self.zero_crossing:
             return {}
-        return {"turns": step_after(turns_of(self.function, u["u"], u["v"]), x["turns"], e)}
+        return {"turns": step_after(quotient_of(self.function, u["u"], u["v"]), x["turns"], e)}
 
 
 # The remainder is u - n v; the integer n is a mode, so that the remainder is smooth between two events.
@@ -131,7 +132,7 @@ _QUOTIENTS = {"mod": "floor", "rem": "fix"}
 
 
 def remainder(function: str, u: SX, v: SX) -> SX:
-    """The exact ``mod`` (sign of the divisor; u if the divisor is zero) or ``rem``."""
+    """``mod`` (sign of the divisor; u if the divisor is zero) or ``rem``."""
     rest = fmod(u, v)
     if function == "rem":
         return rest
@@ -139,35 +140,36 @@ def remainder(function: str, u: SX, v: SX) -> SX:
     return if_else(v == 0.0, u, if_else(other_sign, rest + v, rest))
 
 
-def turns_of(function: str, u: SX, v: SX) -> SX:
+def quotient_of(function: str, u: SX, v: SX) -> SX:
     """The integer n in u - n v, consistent with :func:`remainder`."""
     return if_else(v == 0.0, 0.0, nearest((u - remainder(function, u, v)) / v))
 
 
-def remainder_of_turn(function: str, u: SX, v: SX, turns: SX) -> SX:
-    """The remainder for a given n, valid also slightly beyond the end of its interval."""
-    return if_else(turns_of(function, u, v) == turns, remainder(function, u, v), u - turns * v)
+def remainder_for_quotient(function: str, u: SX, v: SX, quotient: SX) -> SX:
+    """The remainder u - n v for a given n, also slightly beyond the ends of its interval."""
+    return if_else(quotient_of(function, u, v) == quotient, remainder(function, u, v), u - quotient * v)
 
 
-def turn_modes(shape: Shape) -> tuple[State, ...]:
+def quotient_modes(shape: Shape) -> tuple[State, ...]:
     """The integer n of the remainder u - n v."""
     return (State("turns", shape, "the integer n in u - n v"),)
 
 
-def turn_guards(shape: Shape) -> tuple[Guard, ...]:
+def quotient_guards(shape: Shape) -> tuple[Guard, ...]:
     """The events at both ends of an interval with constant n."""
     up = Guard("up", shape, "n increases", 1)
     return (up, Guard("down", shape, "n decreases", -1))
 
 
-def turn_guard_values(function: str, u: SX, v: SX, turns: SX) -> Signals:
+def quotient_guard_values(function: str, u: SX, v: SX, quotient: SX) -> Signals:
     """The distance of u beyond both ends of the interval, in the direction of v."""
     rule = _QUOTIENTS[function]
-    edge, owned = rounding_edges(rule, turns)
-    below, below_owned = rounding_edges(rule, -turns, mirrored=True)
+    edge, upper_end_rounds_up = rounding_edges(rule, quotient)
+    below, lower_end_rounds_down = rounding_edges(rule, -quotient, mirrored=True)
     values = {
-        "up": (u - edge * v) * sign(v) + if_else(owned, THRESHOLD_OFFSET, -THRESHOLD_OFFSET),
-        "down": (u + below * v) * sign(v) - if_else(below_owned, THRESHOLD_OFFSET, -THRESHOLD_OFFSET),
+        "up": (u - edge * v) * sign(v) + if_else(upper_end_rounds_up, THRESHOLD_OFFSET, -THRESHOLD_OFFSET),
+        "down": (u + below * v) * sign(v)
+        - if_else(lower_end_rounds_down, THRESHOLD_OFFSET, -THRESHOLD_OFFSET),
     }
     # With a divisor of zero, n is 0 and no event occurs.
     return {name: if_else(v == 0.0, 0.0, value) for name, value in values.items()}

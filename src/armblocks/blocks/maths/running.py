@@ -27,7 +27,10 @@ from armblocks.diagram.signs import FaceSign, Words
 
 @dataclass(frozen=True, kw_only=True)
 class MinMaxRunningResettable(Block):
-    """The running minimum or maximum of the input: y(k) = min(u(k), y(k-1)) or max."""
+    """The running minimum or maximum of the input: y(k) = min(u(k), y(k-1)) or max(u(k), y(k-1)).
+
+    At ticks at which ``reset`` is not 0, y is ``initial``.
+    """
 
     title: ClassVar[str] = "MinMax Running Resettable"
     sampled: ClassVar[bool] = True
@@ -51,7 +54,7 @@ class MinMaxRunningResettable(Block):
         return (Port("u", "the signal"), Port("reset", "resets the output while not 0", shape=()))
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the extreme so far"),)
+        return (Port("y", "the running minimum or maximum"),)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"y": broadcast({"u": inputs["u"], "initial": shape_of(self.initial)})}

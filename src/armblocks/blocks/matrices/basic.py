@@ -19,7 +19,7 @@ from armblocks.errors import InputError
 
 
 def _square(shape: Shape) -> Shape:
-    """The shape of a square matrix; a scalar counts as (1, 1)."""
+    """The shape of a square matrix; a scalar has (1, 1). Raises ``InputError`` for other shapes."""
     if math.prod(shape) == 1:
         return (1, 1)
     if len(shape) != 2 or shape[0] != shape[1]:
@@ -29,12 +29,12 @@ def _square(shape: Shape) -> Shape:
 
 @dataclass(frozen=True, kw_only=True)
 class CrossProduct(Block):
-    """The vector product of two vectors of three: y = u x v."""
+    """The vector product of two vectors (3,): y = u x v."""
 
     title: ClassVar[str] = "Cross Product"
     sign: ClassVar[FaceSign] = Words("u × v")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A vector that rotates in the plane, times z: the product lags by a quarter turn.",
+        shows="The product of a vector that rotates in the xy plane and the z axis lags by 90 degrees.",
         inputs={
             "u": driver("SineWave", amplitude=(1.0, 1.0, 0.0), phase=(pi / 2, 0.0, 0.0)).named("turning"),
             "v": driver("Constant", value=(0.0, 0.0, 1.0)),
@@ -82,7 +82,10 @@ class Transpose(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class MatrixInverse(Block):
-    """The inverse of a square matrix: u y = I, by Gaussian elimination; not finite if u is singular."""
+    """The inverse of a square matrix: u y = I, by Gaussian elimination.
+
+    The result is not finite if u is singular.
+    """
 
     title: ClassVar[str] = "Matrix Inverse"
     sign: ClassVar[FaceSign] = Words("A⁻¹")
@@ -107,7 +110,10 @@ class MatrixInverse(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class LinearSolve(Block):
-    """The solution of linear equations: A y = B, by Gaussian elimination; not finite if A is singular."""
+    """The solution of linear equations: A y = B, by Gaussian elimination.
+
+    The result is not finite if A is singular.
+    """
 
     title: ClassVar[str] = "Matrix Solve"
     sign: ClassVar[FaceSign] = Words("A⁻¹ B")
@@ -172,7 +178,7 @@ class Trace(Block):
     title: ClassVar[str] = "Trace"
     sign: ClassVar[FaceSign] = Words("tr")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The trace: one diagonal entry oscillates about 1, the other about 2.",
+        shows="The trace of a matrix; one diagonal entry oscillates about 1, the other about 2.",
         inputs={
             "u": driver(
                 "SineWave",
@@ -224,9 +230,9 @@ class MatrixPower(Block):
         return {"y": inputs["u"]}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        unit = SX.eye(u["u"].shape[0])
-        factor = u["u"] if self.exponent >= 0 else solve(u["u"], unit)
-        power = unit
+        identity = SX.eye(u["u"].shape[0])
+        factor = u["u"] if self.exponent >= 0 else solve(u["u"], identity)
+        power = identity
         for digit in f"{abs(self.exponent):b}":  # square and multiply, the highest digit first
             power = mtimes(power, power)
             power = mtimes(power, factor) if digit == "1" else power
@@ -247,7 +253,7 @@ class Reshape(Block):
     )
 
     output: str = parameter("vector", choices=("vector", "column", "row", "matrix"), doc="the new shape")
-    rows: int = parameter(1, minimum=1, doc="number of rows of the matrix")
+    rows: int = parameter(1, minimum=1, doc="number of rows, for the shape matrix")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "any signal"),)
@@ -301,18 +307,18 @@ class MatrixConcatenate(Block):
         return (Port("y", "all parts in one matrix"),)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
-        along = 1 if self.direction == "horizontal" else 0
-        full = [(*shape, 1, 1)[:2] for shape in inputs.values()]
-        if len({shape[1 - along] for shape in full}) > 1:
+        axis = 1 if self.direction == "horizontal" else 0
+        matrix_shapes = [(*shape, 1, 1)[:2] for shape in inputs.values()]
+        if len({shape[1 - axis] for shape in matrix_shapes}) > 1:
             raise InputError(
                 f"the parts have shapes {', '.join(map(str, inputs.values()))}",
                 allowed="equal numbers of rows side by side, equal numbers of columns one under another",
                 fix="change the direction or one of the inputs",
             )
-        length = sum(shape[along] for shape in full)
-        if along == 0 and all(len(shape) < 2 for shape in inputs.values()):
+        length = sum(shape[axis] for shape in matrix_shapes)
+        if axis == 0 and all(len(shape) < 2 for shape in inputs.values()):
             return {"y": (length,)}
-        return {"y": (full[0][0], length) if along else (length, full[0][1])}
+        return {"y": (matrix_shapes[0][0], length) if axis else (length, matrix_shapes[0][1])}
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": common_unit(inputs)}

@@ -31,7 +31,7 @@ from armblocks.diagram import (
 from armblocks.dynamics.held_joints import (
     DryFriction,
     JointEquations,
-    Rest,
+    JointModes,
     locked_joints,
     viscous_friction,
 )
@@ -43,19 +43,20 @@ from armblocks.robot import Robot
 class ArmPlant(Block):
     """The robot with stick-slip friction: M(q) q'' + C q' + g + friction = tau + stops - J' wrench.
 
-    Friction is that of the motors, by the robot's friction model. A joint at rest sticks, with zero
-    acceleration, while the torque that holds it is within ``breakaway`` times its Coulomb friction; beyond
-    that it slides. The holding torque includes the coupling with the other joints. The block Robot
+    The robot's friction model determines the friction of the motors. A joint at rest sticks, with zero
+    acceleration, while the torque that holds it is within ``breakaway`` times its Coulomb friction. Beyond
+    this torque it slides. The holding torque includes the coupling with the other joints. The block Robot
     (ForwardDynamics) has no sticking, and its joints creep instead.
 
-    End stops are at the robot's joint limits. ``elastic``: torque stiffness (limit - q) - damping qd beyond a
-    limit, which never pulls. ``hard``: the joint stops at once in a plastic impact, whose impulse acts on the
-    other joints too, and stays exactly at the limit until a torque moves it away. Joints that rest at their
-    stops before the impact stay there.
+    End stops are at the robot's joint limits. ``elastic``: beyond a limit the stop exerts the torque
+    stiffness (limit - q) - damping qd, but only in the direction away from the stop. ``hard``: the joint
+    stops at once in a plastic impact, whose impulse also acts on the other joints. It stays exactly at the
+    limit until a torque moves it away. Joints that rest at their stops before the impact stay there.
 
-    ``payload``: mass, centre x y z and inertia xx yy zz xy yz xz about it, in the tool frame. If the payload
-    jumps, the joint speeds do not change: a payload is picked up and released at the speed of the tool.
-    ``wrench``: force, then moment, of the tip on the environment, in the axes of the last link.
+    ``payload``: mass (kg), centre x y z (m) and inertia xx yy zz xy yz xz (kg m^2) about this centre, in the
+    tool frame. If the payload jumps, the joint speeds do not change: a payload is picked up and released at
+    the speed of the tool. ``wrench``: force (N), then moment (N m), of the tip on the environment, in the
+    axes of the last link.
     """
 
     title: ClassVar[str] = "Arm Plant"
@@ -117,7 +118,7 @@ class ArmPlant(Block):
         for k, name in enumerate(self.robot.joint_names):
             if friction.forward[k] < 0.0 or friction.backward[k] > 0.0:
                 raise InputError(
-                    f"the Coulomb friction of joint '{name}' drives it",
+                    f"the Coulomb friction of joint '{name}' has the direction of the motion",
                     where="ArmPlant",
                     allowed="friction opposite to the motion: forwards >= 0 >= backwards",
                     fix="correct the robot's Coulomb friction, or choose the friction model squared-gear",
@@ -132,14 +133,14 @@ class ArmPlant(Block):
                     fix="start within the limits, or choose elastic stops",
                 )
 
-    # -- description
+    # -- ports, states, modes and guards
 
     def input_ports(self) -> tuple[Port, ...]:
         ports = [tau_port(self.robot, "torque or force at the joints")]
         if self.wrench_input:
             ports.append(Port("wrench", "force (N) and moment (N m) on the environment", shape=(6,)))
         if self.payload_input:
-            ports.append(Port("payload", "mass, centre, inertia", shape=(10,)))
+            ports.append(Port("payload", "mass (kg), centre (m), inertia (kg m^2)", shape=(10,)))
         return tuple(ports)
 
     def output_ports(self) -> tuple[Port, ...]:
@@ -160,22 +161,22 @@ class ArmPlant(Block):
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         shape = (self.robot.n,)
         states: list[State] = []
-        if self._holdable():
+        if self._lockable_joints():
             states.append(
                 State("mode", shape, "1 sliding forwards or free, -1 sliding backwards, 0 sticking")
             )
-        if self._lower() or self._upper():
+        if self._lower_stop_joints() or self._upper_stop_joints():
             states.append(State("contact", shape, "1 at the upper stop, -1 at the lower stop, else 0"))
         return tuple(states)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         elastic = self.stops == "elastic"
         declared = (
-            ("rest", self._dry(), "a sliding joint comes to rest", -1),
-            ("forwards", self._holdable(), "a sticking joint breaks away forwards", 1),
-            ("backwards", self._holdable(), "a sticking joint breaks away backwards", -1),
-            ("upper", self._upper(), "a joint reaches its upper stop", 0 if elastic else 1),
-            ("lower", self._lower(), "a joint reaches its lower stop", 0 if elastic else -1),
+            ("rest", self._friction_joints(), "a sliding joint comes to rest", -1),
+            ("forwards", self._lockable_joints(), "a sticking joint breaks away forwards", 1),
+            ("backwards", self._lockable_joints(), "a sticking joint breaks away backwards", -1),
+            ("upper", self._upper_stop_joints(), "a joint reaches its upper stop", 0 if elastic else 1),
+            ("lower", self._lower_stop_joints(), "a joint reaches its lower stop", 0 if elastic else -1),
         )
         return tuple(
             Guard(name, (len(joints),), doc, direction) for name, joints, doc, direction in declared if joints
@@ -185,13 +186,13 @@ class ArmPlant(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         equations, torque, qdd = self._motion(x, u, p)
-        unbalanced = equations.unbalanced(torque, qdd)
+        holding_torque = equations.holding_torque(torque, qdd)
         mode, contact = self._mode(x), self._rigid(self._contact(x))
         dry = DryFriction.of(self.robot)
         forward, backward = (p["breakaway"] * SX(side) for side in (dry.forward, dry.backward))
-        holding = fmin(fmax(unbalanced, backward), forward)
+        holding = fmin(fmax(holding_torque, backward), forward)
         friction = if_else(mode == 0.0, holding, dry.sliding(mode))
-        rigid = if_else(logic_and(mode == 0.0, contact != 0.0), holding - unbalanced, 0.0)
+        rigid = if_else(logic_and(mode == 0.0, contact != 0.0), holding - holding_torque, 0.0)
         return {
             "q": x["q"],
             "qd": x["qd"],
@@ -209,20 +210,24 @@ class ArmPlant(Block):
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         mode, contact, q, qd = self._mode(x), self._contact(x), x["q"], x["qd"]
         values: dict[str, SX] = {"rest": if_else(mode == 0.0, 1.0, mode * qd)}
-        if self._holdable():
+        if self._lockable_joints():
             equations, torque, qdd = self._motion(x, u, p)
-            unbalanced = equations.unbalanced(torque, qdd)
+            holding_torque = equations.holding_torque(torque, qdd)
             dry = DryFriction.of(self.robot)
             forward, backward = (p["breakaway"] * SX(side) for side in (dry.forward, dry.backward))
             held, rigid = mode == 0.0, self._rigid(contact)
             free_forwards, free_backwards = logic_and(held, rigid <= 0.0), logic_and(held, rigid >= 0.0)
-            values["forwards"] = if_else(free_forwards, unbalanced - forward - THRESHOLD_OFFSET, -1.0)
-            values["backwards"] = if_else(free_backwards, unbalanced - backward + THRESHOLD_OFFSET, 1.0)
+            values["forwards"] = if_else(free_forwards, holding_torque - forward - THRESHOLD_OFFSET, -1.0)
+            values["backwards"] = if_else(free_backwards, holding_torque - backward + THRESHOLD_OFFSET, 1.0)
         beyond_upper, beyond_lower = q - self._limits(1), q - self._limits(0)
         if self.stops == "elastic":
-            drag = p["damping"] * qd
-            values["upper"] = fmin(beyond_upper, p["stiffness"] * beyond_upper + drag) - THRESHOLD_OFFSET
-            values["lower"] = fmax(beyond_lower, p["stiffness"] * beyond_lower + drag) + THRESHOLD_OFFSET
+            damping_torque = p["damping"] * qd
+            values["upper"] = (
+                fmin(beyond_upper, p["stiffness"] * beyond_upper + damping_torque) - THRESHOLD_OFFSET
+            )
+            values["lower"] = (
+                fmax(beyond_lower, p["stiffness"] * beyond_lower + damping_torque) + THRESHOLD_OFFSET
+            )
         else:
             values["upper"] = if_else(contact > 0.0, -1.0, beyond_upper - THRESHOLD_OFFSET)
             values["lower"] = if_else(contact < 0.0, 1.0, beyond_lower + THRESHOLD_OFFSET)
@@ -233,15 +238,19 @@ class ArmPlant(Block):
         q, qd = x["q"], x["qd"]
         if self.stops == "hard":
             resting = qd == 0.0
-            upper, lower = self._marked("upper"), self._marked("lower")
+            upper, lower = self._joint_mask("upper"), self._joint_mask("lower")
             at_upper = logic_and(logic_and(upper, q >= self._limits(1)), resting)
             at_lower = logic_and(logic_and(lower, q <= self._limits(0)), resting)
             contact = at_upper - at_lower
-            guess = Rest(if_else(contact != 0.0, 0.0, self._mode(x)), contact)
+            guess = JointModes(if_else(contact != 0.0, 0.0, self._mode(x)), contact)
         else:
             contact = self._elastic_contact(q, qd, p)
-            guess = Rest(self._mode(x), self._rigid(contact))
-        rest = self._locked({**x, "contact": contact}, u, p, guess) if self._holdable() else guess
+            guess = JointModes(self._mode(x), self._rigid(contact))
+        rest = (
+            self._consistent_rest({**x, "contact": contact}, u, p, guess)
+            if self._lockable_joints()
+            else guess
+        )
         values = {"mode": rest.mode, "contact": rest.contact if self.stops == "hard" else contact}
         return {state.name: values[state.name] for state in self.modes({})}
 
@@ -249,11 +258,15 @@ class ArmPlant(Block):
         # Modes change by the guards; the consistent modes are the solution of a complementarity problem.
         inconsistent = dict[str, SX]()
         guards = self.guard_values(t, x, u, p)
-        if self._holdable():
-            turned = self._spread("rest", guards) < 0.0 if "rest" in guards else SX.zeros(self.robot.n)
-            away = logic_or(self._spread("forwards", guards) > 0.0, self._spread("backwards", guards) < 0.0)
-            inconsistent["mode"] = logic_or(turned, away)
-        if self._lower() or self._upper():
+        if self._lockable_joints():
+            reversed_joints = (
+                self._on_all_joints("rest", guards) < 0.0 if "rest" in guards else SX.zeros(self.robot.n)
+            )
+            away = logic_or(
+                self._on_all_joints("forwards", guards) > 0.0, self._on_all_joints("backwards", guards) < 0.0
+            )
+            inconsistent["mode"] = logic_or(reversed_joints, away)
+        if self._lower_stop_joints() or self._upper_stop_joints():
             contact = self._elastic_contact(x["q"], x["qd"], p) if self.stops == "elastic" else x["contact"]
             inconsistent["contact"] = contact != x["contact"]
         return inconsistent
@@ -261,68 +274,78 @@ class ArmPlant(Block):
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         if not e:
             return {}
-        fired = {name: self._spread(name, e) for name in ("rest", "forwards", "backwards", "upper", "lower")}
+        fired = {
+            name: self._on_all_joints(name, e) for name in ("rest", "forwards", "backwards", "upper", "lower")
+        }
         contact, mode, q, qd = self._contact(x), self._mode(x), x["q"], x["qd"]
         hits_upper, hits_lower = fired["upper"] > 0.0, fired["lower"] < 0.0
         contact = if_else(hits_upper, 1.0, if_else(hits_lower, -1.0, contact))
         if self.stops == "elastic":
-            left = logic_or(fired["upper"] < 0.0, fired["lower"] > 0.0)
-            contact = if_else(left, 0.0, contact)
-        if not self._holdable():
+            departed = logic_or(fired["upper"] < 0.0, fired["lower"] > 0.0)
+            contact = if_else(departed, 0.0, contact)
+        if not self._lockable_joints():
             return {"contact": contact}
         stopping = fired["rest"] < 0.0
         qd = if_else(stopping, 0.0, qd)
         if self.stops == "hard":
             impact = logic_or(hits_upper, hits_lower)
             resting = logic_or(impact, contact != 0.0)
-            after = JointEquations(self.robot, q, qd, u.get("wrench"), u.get("payload")).stopped(qd, resting)
+            after = JointEquations(self.robot, q, qd, u.get("wrench"), u.get("payload")).speeds_after_impact(
+                qd, resting
+            )
             qd = if_else(dot(impact, impact) > 0.0, after, qd)
             q = if_else(hits_upper, self._limits(1), if_else(hits_lower, self._limits(0), q))
             stopping = logic_or(stopping, impact)
         away = (fired["forwards"] > 0.0) - (fired["backwards"] < 0.0)
         guess = if_else(stopping, 0.0, if_else(away != 0.0, away, mode))
         after_impact = {**x, "q": q, "qd": qd, "contact": contact}
-        rest = self._locked(after_impact, u, p, Rest(guess, if_else(guess == 0.0, self._rigid(contact), 0.0)))
+        rest = self._consistent_rest(
+            after_impact, u, p, JointModes(guess, if_else(guess == 0.0, self._rigid(contact), 0.0))
+        )
         values = {"q": q, "qd": qd, "mode": rest.mode}
-        if self._lower() or self._upper():
+        if self._lower_stop_joints() or self._upper_stop_joints():
             values["contact"] = rest.contact if self.stops == "hard" else contact
-        happened = dot(vertcat(*e.values()), vertcat(*e.values())) > 0.0
-        after = {name: if_else(happened, value, x[name]) for name, value in values.items()}
+        any_event = dot(vertcat(*e.values()), vertcat(*e.values())) > 0.0
+        after = {name: if_else(any_event, value, x[name]) for name, value in values.items()}
         # At rest the speed is 0 for all parameter values, so its derivatives with respect to parameters are 0
         # too.
         rests = logic_and(rest.mode == 0.0, x["qd"] == 0.0)
-        return {**after, "qd": if_else(logic_and(rests, logic_not(happened)), 0.0, after["qd"])}
+        return {**after, "qd": if_else(logic_and(rests, logic_not(any_event)), 0.0, after["qd"])}
 
-    # -- parts
+    # -- joints with friction or stops, and the parts of the equations
 
-    def _dry(self) -> tuple[int, ...]:
+    def _friction_joints(self) -> tuple[int, ...]:
         return DryFriction.of(self.robot).joints
 
-    def _upper(self) -> tuple[int, ...]:
-        return tuple(np.flatnonzero(np.isfinite(self.robot.qlim[:, 1])).tolist()) if self._stops() else ()
+    def _upper_stop_joints(self) -> tuple[int, ...]:
+        return tuple(np.flatnonzero(np.isfinite(self.robot.qlim[:, 1])).tolist()) if self._has_stops() else ()
 
-    def _lower(self) -> tuple[int, ...]:
-        return tuple(np.flatnonzero(np.isfinite(self.robot.qlim[:, 0])).tolist()) if self._stops() else ()
+    def _lower_stop_joints(self) -> tuple[int, ...]:
+        return tuple(np.flatnonzero(np.isfinite(self.robot.qlim[:, 0])).tolist()) if self._has_stops() else ()
 
-    def _stops(self) -> bool:
+    def _has_stops(self) -> bool:
         return self.stops != "none"
 
-    def _holdable(self) -> tuple[int, ...]:
+    def _lockable_joints(self) -> tuple[int, ...]:
         """The joints that can be locked by friction or by a rigid stop."""
-        stops = (*self._upper(), *self._lower()) if self.stops == "hard" else ()
-        return tuple(sorted({*self._dry(), *stops}))
+        stops = (*self._upper_stop_joints(), *self._lower_stop_joints()) if self.stops == "hard" else ()
+        return tuple(sorted({*self._friction_joints(), *stops}))
 
     def _joints_of(self, guard: str) -> tuple[int, ...]:
-        sets = {"rest": self._dry, "upper": self._upper, "lower": self._lower}
-        return sets.get(guard, self._holdable)()
+        sets = {
+            "rest": self._friction_joints,
+            "upper": self._upper_stop_joints,
+            "lower": self._lower_stop_joints,
+        }
+        return sets.get(guard, self._lockable_joints)()
 
-    def _marked(self, guard: str) -> SX:
-        """1 for each joint (n,) that has the guard."""
+    def _joint_mask(self, guard: str) -> SX:
+        """The mask (n,): 1 for joints that have the guard, else 0."""
         marks = np.zeros(self.robot.n)
         marks[list(self._joints_of(guard))] = 1.0
         return SX(marks)
 
-    def _spread(self, guard: str, e: Signals) -> SX:
+    def _on_all_joints(self, guard: str, e: Signals) -> SX:
         """The fired directions of a guard as (n,); 0 for joints without the guard."""
         marks = SX.zeros(self.robot.n)
         if guard in e:
@@ -335,13 +358,17 @@ class ArmPlant(Block):
         return SX(np.where(np.isfinite(limits), limits, 0.0))
 
     def _mode(self, x: Signals) -> SX:
-        return x["mode"] if self._holdable() else SX.ones(self.robot.n)
+        """The friction modes (n,); 1 if no joint can be locked."""
+        return x["mode"] if self._lockable_joints() else SX.ones(self.robot.n)
 
     def _contact(self, x: Signals) -> SX:
-        return x["contact"] if self._lower() or self._upper() else SX.zeros(self.robot.n)
+        """The contacts with the end stops (n,); 0 if there are no stops."""
+        return (
+            x["contact"] if self._lower_stop_joints() or self._upper_stop_joints() else SX.zeros(self.robot.n)
+        )
 
     def _rigid(self, contact: SX) -> SX:
-        """Contact with hard stops; 0 for elastic stops."""
+        """The contacts with hard stops (n,); 0 for elastic stops."""
         return contact if self.stops == "hard" else SX.zeros(self.robot.n)
 
     def _elastic_stops(self, x: Signals, p: Signals) -> SX:
@@ -353,28 +380,36 @@ class ArmPlant(Block):
         return if_else(contact != 0.0, push, 0.0)
 
     def _elastic_contact(self, q: SX, qd: SX, p: Signals) -> SX:
-        beyond_upper, beyond_lower, drag = q - self._limits(1), q - self._limits(0), p["damping"] * qd
+        beyond_upper, beyond_lower, damping_torque = (
+            q - self._limits(1),
+            q - self._limits(0),
+            p["damping"] * qd,
+        )
         above = logic_and(
-            self._marked("upper"), fmin(beyond_upper, p["stiffness"] * beyond_upper + drag) > 0.0
+            self._joint_mask("upper"),
+            fmin(beyond_upper, p["stiffness"] * beyond_upper + damping_torque) > 0.0,
         )
         below = logic_and(
-            self._marked("lower"), fmax(beyond_lower, p["stiffness"] * beyond_lower + drag) < 0.0
+            self._joint_mask("lower"),
+            fmax(beyond_lower, p["stiffness"] * beyond_lower + damping_torque) < 0.0,
         )
         return above - below
 
-    def _driving(self, x: Signals, u: Signals, p: Signals) -> SX:
+    def _driving_torque(self, x: Signals, u: Signals, p: Signals) -> SX:
         """The joint torque without dry friction and rigid stops."""
         return u["tau"] - SX(viscous_friction(self.robot)) * x["qd"] + self._elastic_stops(x, p)
 
     def _motion(self, x: Signals, u: Signals, p: Signals) -> tuple[JointEquations, SX, SX]:
+        """The equations of motion, the joint torque with sliding friction, and the accelerations."""
         equations = JointEquations(self.robot, x["q"], x["qd"], u.get("wrench"), u.get("payload"))
         mode = self._mode(x)
-        torque = self._driving(x, u, p) - DryFriction.of(self.robot).sliding(mode)
-        free = mode != 0.0 if self._holdable() else SX.ones(self.robot.n)
+        torque = self._driving_torque(x, u, p) - DryFriction.of(self.robot).sliding(mode)
+        free = mode != 0.0 if self._lockable_joints() else SX.ones(self.robot.n)
         return equations, torque, equations.accelerations(torque, free)
 
-    def _locked(self, x: Signals, u: Signals, p: Signals, guess: Rest) -> Rest:
+    def _consistent_rest(self, x: Signals, u: Signals, p: Signals, guess: JointModes) -> JointModes:
+        """The consistent modes and contacts of the joints at rest; the search begins at ``guess``."""
         equations = JointEquations(self.robot, x["q"], x["qd"], u.get("wrench"), u.get("payload"))
         breakaway = p["breakaway"] * SX.ones(self.robot.n)
-        driving = self._driving(x, u, p)
+        driving = self._driving_torque(x, u, p)
         return locked_joints(equations, x["qd"], driving, guess, DryFriction.of(self.robot), breakaway)

@@ -62,7 +62,7 @@ class JacobianInverse(Block):
         return (Port("J", "the Jacobian (m, n)"),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("Ji", "its inverse of the chosen kind (n, m)"),)
+        return (Port("Ji", "the chosen inverse of J (n, m)"),)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         shape = inputs["J"]
@@ -114,7 +114,11 @@ class Manipulability(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class RobotEnergy(Block):
-    """Kinetic and potential energy of an arm: T = 1/2 qd' M(q) qd, V = -sum of m g . r."""
+    """Kinetic and potential energy of an arm: T = 1/2 qd' M(q) qd, V = -sum of m g . r.
+
+    M contains the rotor inertias. The sum is over the links, with mass m and centre of mass r in the world
+    frame; g is the acceleration of gravity.
+    """
 
     title: ClassVar[str] = "Energy"
     sign: ClassVar[FaceSign] = Words("E(q, qd)")
@@ -156,8 +160,9 @@ class RobotEnergy(Block):
 class LoadedRne(Block):
     """Inverse dynamics with a force at the tip and a payload: tau = rne(q, qd, qdd) + load torque.
 
-    ``wrench`` (force, moment) is the load of the tip on the environment, in the axes of the last link. The
-    payload is mass, centre of mass (3) and inertia xx yy zz xy yz xz about it, in the tool frame.
+    ``wrench`` is the force (N) and the moment (N m) of the tip on the environment, in the axes of the last
+    link. The payload is mass (kg), centre of mass x y z (m) and inertia xx yy zz xy yz xz (kg m^2) about this
+    centre, in the tool frame.
     """
 
     title: ClassVar[str] = "rne with load"
@@ -175,7 +180,7 @@ class LoadedRne(Block):
     def input_ports(self) -> tuple[Port, ...]:
         motion = (q_port(self.robot), qd_port(self.robot), qdd_port(self.robot))
         wrench = Port("wrench", "force (N) and moment (N m) on the environment", shape=(6,))
-        return *motion, wrench, Port("payload", "mass, centre, inertia", shape=(10,))
+        return *motion, wrench, Port("payload", "mass (kg), centre (m), inertia (kg m^2)", shape=(10,))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (tau_port(self.robot, "torque or force at the joints"),)

@@ -79,7 +79,7 @@ class JTraj(Block):
                 f"q0 has {n} joints and qf has {m}",
                 where="JTraj",
                 allowed="equal numbers of joints",
-                fix="correct one",
+                fix="correct q0 or qf",
             )
 
     def output_ports(self) -> tuple[Port, ...]:
@@ -265,14 +265,15 @@ class Coriolis(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class ForwardDynamics(Block):
-    """Forward dynamics of the robot: q'' = accel(q, q', tau), from q(0) = q0 at speed qd0.
+    """Forward dynamics of the robot: q'' = accel(q, q', tau), with q(0) = q0 and q'(0) = qd0.
 
     With Coulomb friction the equations are discontinuous at zero speed, and the steps become very small where
-    a joint comes to rest. Use ArmPlant for such robots, whose joints can stick, or a robot without Coulomb
-    friction.
+    a joint comes to rest. For such robots use ArmPlant, which models sticking joints, or set
+    Coulomb friction to zero.
 
-    This is the toolbox's block Robot. In the toolbox, q0 is the initial position since tag 9.7 (2013);
-    before, the parameter was not connected and the robot started at zero. The initial speed is zero there.
+    This is the toolbox's block Robot. In the toolbox, q0 is the initial position since tag 9.7 of its
+    repository (2013). In earlier versions the parameter is not connected, and the robot starts at q = 0.
+    The initial speed is always zero in the toolbox.
     """
 
     title: ClassVar[str] = "Robot"
@@ -328,7 +329,7 @@ class ForwardDynamics(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class RobotPlot(Block):
-    """Animation of the robot: records the poses of all links, so that a view needs no kinematics."""
+    """Animation of the robot: records the poses of all links, from which a view draws the robot."""
 
     title: ClassVar[str] = "plot"
     card_size: ClassVar[tuple[float, float]] = (84.0, 64.0)

@@ -47,7 +47,7 @@ class DcMotor(Block):
     L: float = parameter(0.5, above=0.0, doc="inductance of the armature", unit="H")
     k: float = parameter(0.01, above=0.0, doc="torque constant and back-EMF constant", unit="N m/A")
     J: float = parameter(0.01, above=0.0, doc="inertia of rotor and load", unit="kg m2")
-    b: float = parameter(0.1, minimum=0.0, doc="viscous friction", unit="N m s/rad")
+    b: float = parameter(0.1, minimum=0.0, doc="viscous friction coefficient", unit="N m s/rad")
     initial_current: float = parameter(0.0, doc="the current at t = 0", unit="A")
     initial_speed: float = parameter(0.0, doc="the speed at t = 0", unit="rad/s")
     initial_angle: float = parameter(0.0, doc="the angle at t = 0", unit="rad")
@@ -106,7 +106,9 @@ class MotorWinding(Block):
     k: ArrayLike = parameter(
         0.1, kind=ParameterKind.ARRAY, above=0.0, doc="torque constant and back-EMF constant", unit="N m/A"
     )
-    gear_ratio: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="G, negative for a reversing gear")
+    gear_ratio: ArrayLike = parameter(
+        1.0, kind=ParameterKind.ARRAY, doc="G, motor turns per joint turn; negative for a reversing gear"
+    )
     initial_current: ArrayLike = parameter(
         0.0, kind=ParameterKind.ARRAY, doc="the current at t = 0", unit="A"
     )

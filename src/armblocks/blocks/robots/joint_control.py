@@ -61,8 +61,18 @@ class JointPD(Block):
         stop_time=5.0,
     )
 
-    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="position gains")
-    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="speed gains")
+    Kp: ArrayLike = parameter(
+        100.0,
+        kind=ParameterKind.ARRAY,
+        dimensions=(0, 1),
+        doc="position gains, N m/rad (N/m for a prismatic joint)",
+    )
+    Kd: ArrayLike = parameter(
+        20.0,
+        kind=ParameterKind.ARRAY,
+        dimensions=(0, 1),
+        doc="speed gains, N m s/rad (N s/m for a prismatic joint)",
+    )
 
     def check(self) -> None:
         broadcast({"Kp": shape_of(self.Kp), "Kd": shape_of(self.Kd)})
@@ -102,8 +112,18 @@ class GravityCompensation(Block):
     )
 
     robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
-    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="position gains")
-    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="speed gains")
+    Kp: ArrayLike = parameter(
+        100.0,
+        kind=ParameterKind.ARRAY,
+        dimensions=(0, 1),
+        doc="position gains, N m/rad (N/m for a prismatic joint)",
+    )
+    Kd: ArrayLike = parameter(
+        20.0,
+        kind=ParameterKind.ARRAY,
+        dimensions=(0, 1),
+        doc="speed gains, N m s/rad (N s/m for a prismatic joint)",
+    )
 
     def check(self) -> None:
         _check_gains(self, self.robot)
@@ -188,8 +208,18 @@ class FeedForward(Block):
     robot: RobotField = parameter(
         kind=ParameterKind.ROBOT, of_type=Robot, doc="model of the robot in the controller"
     )
-    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="position gains")
-    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="speed gains")
+    Kp: ArrayLike = parameter(
+        100.0,
+        kind=ParameterKind.ARRAY,
+        dimensions=(0, 1),
+        doc="position gains, N m/rad (N/m for a prismatic joint)",
+    )
+    Kd: ArrayLike = parameter(
+        20.0,
+        kind=ParameterKind.ARRAY,
+        dimensions=(0, 1),
+        doc="speed gains, N m s/rad (N s/m for a prismatic joint)",
+    )
 
     def check(self) -> None:
         _check_gains(self, self.robot)
@@ -203,5 +233,5 @@ class FeedForward(Block):
         return (tau_port(self.robot, "torque or force at the joints"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        known = apply_traced(dynamics.trace_rne(self.robot), u["qr"], u["qdr"], u["qddr"])
-        return {"tau": known + p["Kp"] * (u["qr"] - u["q"]) + p["Kd"] * (u["qdr"] - u["qd"])}
+        feedforward = apply_traced(dynamics.trace_rne(self.robot), u["qr"], u["qdr"], u["qddr"])
+        return {"tau": feedforward + p["Kp"] * (u["qr"] - u["q"]) + p["Kd"] * (u["qdr"] - u["qd"])}

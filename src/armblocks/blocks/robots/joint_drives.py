@@ -29,10 +29,10 @@ from armblocks.diagram import (
 
 @dataclass(frozen=True, kw_only=True)
 class MotorDrive(Block):
-    """The torque u of a drive within its limits: current (peak) and voltage (stall (1 -+ w / w0)).
+    """The torque command u, limited by the current (peak) and the voltage (stall (1 -+ w / w0)) of a drive.
 
-    The voltage limit is the torque-speed line of a DC motor: ``stall`` at rest, 0 at ``no_load_speed`` w0,
-    for driving torques. Beyond w0 the drive can only brake.
+    The voltage limit is the torque-speed line of a DC motor: for torques in the direction of motion it falls
+    from ``stall`` at rest to 0 at ``no_load_speed`` w0. Beyond w0 the drive can only brake.
     """
 
     title: ClassVar[str] = "Motor Drive"
@@ -78,7 +78,7 @@ class MotorDrive(Block):
         return located(self, *(Condition(name, shape, doc, closed=False) for name, doc in docs.items()))
 
     def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        forwards, backwards = self._lines(u, p)
+        forwards, backwards = self._voltage_limits(u, p)
         upper, lower = self._limits(x, u, p)
         return {
             "fast": p["peak"] - forwards,
@@ -94,13 +94,13 @@ class MotorDrive(Block):
         return {"y": if_else(x["above"], upper, if_else(x["below"], lower, u["u"]))}
 
     @staticmethod
-    def _lines(u: Signals, p: Signals) -> tuple[SX, SX]:
+    def _voltage_limits(u: Signals, p: Signals) -> tuple[SX, SX]:
         """The voltage limits of both directions."""
         ratio = u["w"] / p["no_load_speed"]
         return p["stall"] * (1.0 - ratio), -p["stall"] * (1.0 + ratio)
 
     def _limits(self, x: Signals, u: Signals, p: Signals) -> tuple[SX, SX]:
-        forwards, backwards = self._lines(u, p)
+        forwards, backwards = self._voltage_limits(u, p)
         upper = if_else(x["overrun"], -p["peak"], if_else(x["fast"], forwards, p["peak"]))
         return upper, if_else(x["overrun_back"], p["peak"], if_else(x["fast_back"], backwards, -p["peak"]))
 
@@ -109,7 +109,7 @@ class MotorDrive(Block):
 class JointStops(Block):
     """Elastic end stops: tau = stiffness (lower - q) - damping qd below lower, likewise above upper.
 
-    A stop never pulls: where the damping term would pull, the torque is 0.
+    A stop only pushes: where this torque would point towards the stop, tau is 0.
     """
 
     title: ClassVar[str] = "Joint Stops"
@@ -154,7 +154,7 @@ class JointStops(Block):
         return located(self, *(Condition(name, shape, doc, closed=False) for name, doc in docs.items()))
 
     def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        up, down = self._pushes(u, p)
+        up, down = self._stop_torques(u, p)
         return {
             "low": p["lower"] - u["q"],
             "pushed_up": up,
@@ -163,12 +163,14 @@ class JointStops(Block):
         }
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        up, down = self._pushes(u, p)
+        up, down = self._stop_torques(u, p)
         low = if_else(logic_and(x["low"], x["pushed_up"]), up, 0.0)
         return {"tau": low + if_else(logic_and(x["high"], x["pushed_down"]), down, 0.0)}
 
     @staticmethod
-    def _pushes(u: Signals, p: Signals) -> tuple[SX, SX]:
+    def _stop_torques(u: Signals, p: Signals) -> tuple[SX, SX]:
         """The spring and damper torques of the lower and the upper stop in contact."""
-        drag = p["damping"] * u["qd"]
-        return p["stiffness"] * (p["lower"] - u["q"]) - drag, p["stiffness"] * (p["upper"] - u["q"]) - drag
+        damping_torque = p["damping"] * u["qd"]
+        return p["stiffness"] * (p["lower"] - u["q"]) - damping_torque, p["stiffness"] * (
+            p["upper"] - u["q"]
+        ) - damping_torque

@@ -30,7 +30,7 @@ from armblocks.diagram import (
 )
 from armblocks.diagram.signs import FaceSign, graph
 from armblocks.errors import InputError
-from armblocks.spatial.orientation import from_quaternion, part_of_turn, to_quaternion
+from armblocks.spatial.orientation import fraction_of_rotation, from_quaternion, to_quaternion
 from armblocks.trajectories import Quintic
 
 
@@ -51,10 +51,14 @@ class Trapezoidal(Block):
     )
     output_rates: ClassVar[Mapping[str, str]] = {"q": "qd"}
 
-    q0: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="start (n,)", unit="rad")
-    qf: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="end (n,)", unit="rad")
+    q0: ArrayLike = parameter(
+        0.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="coordinates at t = 0 (n,)", unit="rad"
+    )
+    qf: ArrayLike = parameter(
+        1.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="coordinates at t = tmax (n,)", unit="rad"
+    )
     tmax: float = parameter(10.0, above=0.0, doc="duration of the motion", unit="s")
-    cruise: float = parameter(1.5, above=1.0, maximum=2.0, doc="greatest speed over mean speed")
+    cruise: float = parameter(1.5, above=1.0, maximum=2.0, doc="ratio of greatest speed and mean speed")
 
     def check(self) -> None:
         parameters_shape(self, "q0", "qf")
@@ -72,17 +76,17 @@ class Trapezoidal(Block):
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         ramp, end, T = self.breakpoints(p)
         time = fmin(fmax(t, 0.0), T)
-        left = T - time
+        remaining = T - time
         speed = p["cruise"] / T
-        rise, distance = speed / ramp, p["qf"] - p["q0"]
+        acceleration, distance = speed / ramp, p["qf"] - p["q0"]
         first, last = time < ramp, time >= end
-        share = if_else(first, rise * time * time / 2.0, speed * (time - ramp / 2.0))
-        share = if_else(last, 1.0 - rise * left * left / 2.0, share)
+        fraction = if_else(first, acceleration * time * time / 2.0, speed * (time - ramp / 2.0))
+        fraction = if_else(last, 1.0 - acceleration * remaining * remaining / 2.0, fraction)
         moving = logic_and(t >= 0.0, t < T)
-        rate = if_else(moving, if_else(first, rise, 0.0) - if_else(last, rise, 0.0), 0.0)
+        rate = if_else(moving, if_else(first, acceleration, 0.0) - if_else(last, acceleration, 0.0), 0.0)
         return {
-            "q": p["q0"] + distance * share,
-            "qd": distance * fmin(speed, rise * fmin(time, left)),
+            "q": p["q0"] + distance * fraction,
+            "qd": distance * fmin(speed, acceleration * fmin(time, remaining)),
             "qdd": distance * rate,
         }
 
@@ -93,12 +97,12 @@ class Trapezoidal(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class MultiSegment(Block):
-    """Linear segments through points with blended corners; segment k lasts durations(k), a corner blend.
+    """Linear segments between points with parabolic blends: segment k takes durations(k), in s.
 
-    This is the toolbox's ``mstraj`` for given times. The speed of a segment is constant, and changes linearly
-    within blend / 2 of the time of each point. The path passes exactly through the first and last point and
-    close to the inner points. It begins at t = 0 and ends after the sum of durations plus one blend: q = p1 +
-    sum of (p(k+1) - p(k)) g_k(t), with each g_k going from 0 to 1.
+    Each blend takes ``blend``, in s. This is the toolbox's ``mstraj`` for given times. The speed of a segment
+    is constant, and changes linearly within blend / 2 of the time of each point. The path passes exactly
+    through the first and last point and close to the inner points. The motion begins at t = 0 and ends after
+    the sum of durations plus one blend: q = p1 + sum of (p(k+1) - p(k)) g_k(t). Each g_k rises from 0 to 1.
     """
 
     title: ClassVar[str] = "mstraj"
@@ -155,8 +159,8 @@ class MultiSegment(Block):
         for k in range(points.shape[0] - 1):
             velocity = (points[k + 1, :] - points[k, :]).T / p["durations"][k]
             ends = zip(ramps[k], ramps[k + 1])
-            position, speed, change = (begin - end for begin, end in ends)
-            q, qd, qdd = q + velocity * position, qd + velocity * speed, qdd + velocity * change
+            position, speed, acceleration = (begin - end for begin, end in ends)
+            q, qd, qdd = q + velocity * position, qd + velocity * speed, qdd + velocity * acceleration
         return {"q": q, "qd": qd, "qdd": qdd}
 
     def breakpoints(self, p: Signals) -> tuple[SX, ...]:
@@ -207,8 +211,8 @@ class CTraj(Block):
         else:
             s = Quintic(q0=SX(0.0), qf=SX(1.0), tmax=p["tmax"]).at(t).q
         T0, T1 = u["T0"], u["T1"]
-        whole = to_quaternion(mtimes(T0[:3, :3].T, T1[:3, :3]))
-        R = mtimes(T0[:3, :3], from_quaternion(part_of_turn(whole, s)))
+        rotation = to_quaternion(mtimes(T0[:3, :3].T, T1[:3, :3]))
+        R = mtimes(T0[:3, :3], from_quaternion(fraction_of_rotation(rotation, s)))
         return {"T": pose(R, T0[:3, 3] + s * (T1[:3, 3] - T0[:3, 3])), "s": s}
 
     def breakpoints(self, p: Signals) -> tuple[SX, ...]:
@@ -226,13 +230,13 @@ class CirclePath(Block):
 
     title: ClassVar[str] = "Circle Path"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A point with a period of ten seconds.",
+        shows="A point that moves around a circle in ten seconds.",
         parameters={"frequency": 0.1},
     )
 
     radius: float = parameter(1.0, minimum=0.0, doc="radius", unit="m")
     centre: ArrayLike = parameter((0.0, 0.0, 0.0), dimensions=(1,), doc="centre (3,)", unit="m")
-    frequency: float = parameter(1.0, doc="rounds per second", unit="Hz")
+    frequency: float = parameter(1.0, doc="revolutions per second", unit="Hz")
     phase: float = parameter(0.0, doc="angle at t = 0", unit="rad")
 
     def check(self) -> None:
@@ -253,7 +257,7 @@ class CirclePath(Block):
 
 
 def _rounded_ramp(t: SX, begin: SX, end: SX, blend: SX) -> tuple[SX, SX, SX]:
-    """A ramp whose slope rises from 0 to 1 within ``blend`` seconds, and its two derivatives."""
+    """A ramp whose rate rises linearly from 0 to 1 within ``blend`` (s), and its first two derivatives."""
     rising = fmin(fmax(t - begin, 0.0), blend)
     within = logic_and(t >= begin, t < end)
     value = rising * rising / (2.0 * blend) + fmax(t - end, 0.0)

@@ -36,7 +36,7 @@ _PORTS = (
     Port("q", "coordinates"),
     Port("qd", "speeds"),
 )
-_LOOP = {
+_EXAMPLE_LOOP = {
     "qr": driver("Constant", value=1.0),
     "qdr": driver("Constant", value=0.0),
     "q": driver("Integrator").named("angle").by(u=driver("Integrator").named("speed").by(u="tau")),
@@ -48,9 +48,24 @@ _LOOP = {
 class JointPidBlock(Block):
     """Base class of the PID controllers of joints; subclasses have ``lower``, ``upper`` and ``initial``."""
 
-    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="position gains")
-    Ki: ArrayLike = parameter(50.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="integral gains")
-    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="speed gains")
+    Kp: ArrayLike = parameter(
+        100.0,
+        kind=ParameterKind.ARRAY,
+        dimensions=(0, 1),
+        doc="position gains, N m/rad (N/m for a prismatic joint)",
+    )
+    Ki: ArrayLike = parameter(
+        50.0,
+        kind=ParameterKind.ARRAY,
+        dimensions=(0, 1),
+        doc="integral gains, N m/(rad s) (N/(m s) for a prismatic joint)",
+    )
+    Kd: ArrayLike = parameter(
+        20.0,
+        kind=ParameterKind.ARRAY,
+        dimensions=(0, 1),
+        doc="speed gains, N m s/rad (N s/m for a prismatic joint)",
+    )
 
     def check(self) -> None:
         limits_in_order(self, "lower", "upper")
@@ -78,15 +93,15 @@ class JointPID(JointPidBlock):
     """PID of joints: tau = limit(Kp (qr - q) + Kd (qdr - qd) + i), i' = Ki (qr - q) + Kb (tau - unlimited).
 
     Each joint has its own controller. The last term, back-calculation, prevents windup of the integral at the
-    torque limits; Kb = 0 disables it. Speeds are measured, not differentiated.
+    torque limits; Kb = 0 disables it. The speeds are inputs; the block does not differentiate q.
     """
 
     following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "PID Joint Controller"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="An inertia of 1 moves to 1 rad with a torque of at most 0.5.",
+        shows="An inertia of 1 kg m^2 moves to 1 rad with a torque of at most 0.5 N m.",
         parameters={"Kp": 10.0, "Ki": 5.0, "Kd": 5.0, "lower": -0.5, "upper": 0.5},
-        inputs=_LOOP,
+        inputs=_EXAMPLE_LOOP,
         shown=("q", "tau"),
     )
 
@@ -114,21 +129,21 @@ class JointPID(JointPidBlock):
         return {"tau": self._limited(x, u, p)}
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        excess = _free(x, u, p) - self._limited(x, u, p)
+        excess = _unlimited_torque(x, u, p) - self._limited(x, u, p)
         return {"integral": p["Ki"] * (u["qr"] - u["q"]) - p["Kb"] * excess}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        free = _free(x, u, p)
-        return {"upper": free - p["upper"], "lower": free - p["lower"]}
+        unlimited = _unlimited_torque(x, u, p)
+        return {"upper": unlimited - p["upper"], "lower": unlimited - p["lower"]}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"mode": zone(_free(x, u, p), p["lower"], p["upper"])}
+        return {"mode": zone(_unlimited_torque(x, u, p), p["lower"], p["upper"])}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         return {"mode": zone_after(x["mode"], e)}
 
     def _limited(self, x: Signals, u: Signals, p: Signals) -> SX:
-        below = if_else(x["mode"] < 0.0, p["lower"], _free(x, u, p))
+        below = if_else(x["mode"] < 0.0, p["lower"], _unlimited_torque(x, u, p))
         return if_else(x["mode"] > 0.0, p["upper"], below)
 
 
@@ -137,13 +152,13 @@ class SampledJointPID(JointPidBlock):
     """PID of joints at ticks: tau(k) = limit(Kp e + Kd (qdr - qd) + i(k)), i(k+1) = i(k) + T Ki e.
 
     e = qr - q. Each joint has its own controller. Clamping: the integral stops while the torque is at a limit
-    and e would drive it further beyond the limit.
+    and e drives it further beyond the limit.
     """
 
     title: ClassVar[str] = "Sampled PID Joint Controller"
     sampled: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="An inertia of 1 moves to 1 rad with a torque of at most 0.5 that changes every 0.1 s.",
+        shows="An inertia of 1 kg m^2 moves to 1 rad with a torque of at most 0.5 N m, sampled every 0.1 s.",
         parameters={
             "Kp": 10.0,
             "Ki": 5.0,
@@ -152,7 +167,7 @@ class SampledJointPID(JointPidBlock):
             "upper": 0.5,
             "sample_time": 0.1,
         },
-        inputs=_LOOP,
+        inputs=_EXAMPLE_LOOP,
         shown=("q", "tau"),
     )
 
@@ -165,16 +180,16 @@ class SampledJointPID(JointPidBlock):
         return (State("integral", self._shape(inputs), "the integral action"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"tau": fmin(fmax(_free(x, u, p), p["lower"]), p["upper"])}
+        return {"tau": fmin(fmax(_unlimited_torque(x, u, p), p["lower"]), p["upper"])}
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        free = _free(x, u, p)
-        excess = free - fmin(fmax(free, p["lower"]), p["upper"])
+        unlimited = _unlimited_torque(x, u, p)
+        excess = unlimited - fmin(fmax(unlimited, p["lower"]), p["upper"])
         rate = p["Ki"] * (u["qr"] - u["q"])
         outwards = logic_and(excess != 0.0, excess * rate > 0.0)
         return {"integral": x["integral"] + p["T"] * if_else(outwards, 0.0, rate)}
 
 
-def _free(x: Signals, u: Signals, p: Signals) -> SX:
+def _unlimited_torque(x: Signals, u: Signals, p: Signals) -> SX:
     """The torque without limits."""
     return p["Kp"] * (u["qr"] - u["q"]) + p["Kd"] * (u["qdr"] - u["qd"]) + x["integral"]

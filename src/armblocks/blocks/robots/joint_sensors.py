@@ -33,7 +33,7 @@ from armblocks.diagram import (
 from armblocks.equations import Shape
 from armblocks.robot import Robot
 
-_TURN = 2.0 * math.pi
+_TWO_PI = 2.0 * math.pi
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,7 +137,7 @@ class Encoder(Block):
         return (
             Port("y", "the measured angle", "rad"),
             Port("count", "the counter"),
-            Port("speed", "counts per second, as a joint angle", "rad/s"),
+            Port("speed", "joint speed from the counts of one period", "rad/s"),
         )
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
@@ -146,12 +146,12 @@ class Encoder(Block):
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         shape = self._shape(inputs)
         return State("before", shape, "the counter at the previous tick"), State(
-            "ticked", (), "1 after a tick"
+            "ticked", (), "1 after the first tick"
         )
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         count = self._count(u, p)
-        step = _TURN / (p["counts"] * p["gear_ratio"])
+        step = _TWO_PI / (p["counts"] * p["gear_ratio"])
         rate = (count - x["before"]) * step / p["T"]
         return {"y": count * step, "count": count, "speed": if_else(x["ticked"], rate, 0.0)}
 
@@ -162,7 +162,7 @@ class Encoder(Block):
         return {"before": SX(0.0), "ticked": SX(0.0)}
 
     def _count(self, u: Signals, p: Signals) -> SX:
-        return floor(p["gear_ratio"] * p["counts"] * u["u"] / _TURN)
+        return floor(p["gear_ratio"] * p["counts"] * u["u"] / _TWO_PI)
 
     def _shape(self, inputs: Shapes) -> Shape:
         return broadcast({**inputs, "counts": shape_of(self.counts), "gear_ratio": shape_of(self.gear_ratio)})
@@ -180,7 +180,7 @@ class Tachometer(Block):
         shown=("w", "y"),
     )
 
-    gain: ArrayLike = parameter(0.02, kind=ParameterKind.ARRAY, doc="volts per speed", unit="V s/rad")
+    gain: ArrayLike = parameter(0.02, kind=ParameterKind.ARRAY, doc="voltage per speed", unit="V s/rad")
     time_constant: ArrayLike = parameter(
         1e-3, kind=ParameterKind.ARRAY, above=0.0, doc="time constant of the filter", unit="s"
     )

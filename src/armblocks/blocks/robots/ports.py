@@ -11,30 +11,30 @@ from armblocks.robot import Robot
 
 
 def apply_traced(traced: TracedFunction, *values: SX) -> SX:
-    """Evaluates a traced robot function for other symbols, with arrays of natural shape."""
+    """The result of a traced robot function for other symbols, as an array of its natural shape."""
     flat = [flatten(value, slot.shape) for value, slot in zip(values, traced.inputs)]
     (result,) = traced.casadi_function().call(flat, True, False)
     return unflatten(result, traced.outputs.slots[0].shape)
 
 
 def coordinate_unit(robot: Robot) -> str:
-    """rad or m, or ``""`` if the robot has joints of both types."""
+    """The unit of the coordinates: rad or m, or ``""`` if the robot has joints of both types."""
     units = set(robot.joint_units)
     return units.pop() if len(units) == 1 else ""
 
 
 def q_port(robot: Robot, name: str = "q") -> Port:
-    """Joint coordinates (n,)."""
+    """A port of joint coordinates (n,)."""
     return Port(name, "joint coordinates", coordinate_unit(robot), (robot.n,), robot.joint_names)
 
 
 def qd_port(robot: Robot, name: str = "qd") -> Port:
-    """Joint speeds (n,)."""
+    """A port of joint speeds (n,)."""
     return Port(name, "joint speeds", rate_unit(coordinate_unit(robot)), (robot.n,), robot.joint_names)
 
 
 def qdd_port(robot: Robot, name: str = "qdd") -> Port:
-    """Joint accelerations (n,)."""
+    """A port of joint accelerations (n,)."""
     return Port(
         name,
         "joint accelerations",
@@ -45,7 +45,7 @@ def qdd_port(robot: Robot, name: str = "qdd") -> Port:
 
 
 def tau_port(robot: Robot, doc: str) -> Port:
-    """Joint forces (n,)."""
+    """A port of joint torques or forces (n,)."""
     unit = {"rad": "N m", "m": "N"}.get(coordinate_unit(robot), "")
     return Port("tau", doc, unit, (robot.n,), robot.joint_names)
 

@@ -26,10 +26,11 @@ from armblocks.diagram import (
 from armblocks.errors import InputError
 
 COUNTING = ("one-based", "zero-based")
+"""Index bases: whether the first index is 1 or 0."""
 
 
 def _positions(indices: ArrayLike, counting: str) -> list[int]:
-    """Indices, converted to zero-based ones."""
+    """The indices as zero-based integers."""
     first = 1 if counting == "one-based" else 0
     return [int(index) - first for index in np.atleast_1d(cast("Any", indices))]
 
@@ -61,7 +62,7 @@ def _check_vector(name: str, inputs: Shapes) -> None:
         raise InputError(
             f"'{name}' has shape {inputs[name]}",
             allowed="a vector or a scalar",
-            fix="use SubMatrix for matrices, or a Reshape block before it",
+            fix="use SubMatrix for matrices, or convert the signal to a vector with Reshape",
         )
 
 
@@ -69,7 +70,8 @@ def _check_vector(name: str, inputs: Shapes) -> None:
 class Selector(Block):
     """Selected elements of a vector, in the order of the indices: y(k) = u(indices(k)).
 
-    One index gives a scalar."""
+    One index gives a scalar.
+    """
 
     title: ClassVar[str] = "Selector"
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -107,7 +109,7 @@ class Selector(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class SubMatrix(Block):
-    """A submatrix: y = u(first_row:last_row, first_column:last_column), from 1.
+    """A submatrix: y = u(first_row:last_row, first_column:last_column). Indices start at 1.
 
     A last row or column of 0 means the end of the matrix. A vector counts as a column.
     """
@@ -153,11 +155,11 @@ class SubMatrix(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Assignment(Block):
-    """A vector with some elements replaced: y = y0, but y(indices(k)) = u(k); a scalar u is broadcast."""
+    """A vector with some elements replaced: y = y0, but y(indices(k)) = u(k). A scalar u is broadcast."""
 
     title: ClassVar[str] = "Assignment"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The second element of a vector of zeros is replaced by a sine.",
+        shows="The second element of a constant vector is replaced by a sine.",
         parameters={"indices": (2.0,)},
         inputs={"y0": driver("Constant", value=(1.0, 0.0, -1.0)), "u": driver("SineWave")},
     )
@@ -188,7 +190,7 @@ class Assignment(Block):
         if math.prod(inputs["u"]) not in (1, len(positions)):
             raise InputError(
                 f"{math.prod(inputs['u'])} new elements for {len(positions)} indices",
-                allowed="one for each index, or one for all",
+                allowed="one element for each index, or one element for all indices",
                 fix="correct the indices or the width of 'u'",
             )
         return {"y": inputs["y0"]}
@@ -207,12 +209,12 @@ class Assignment(Block):
 class IndexVector(Block):
     """The element of a vector at a variable index: y = u(index).
 
-    The index is truncated to an integer and limited to the range of the elements.
+    The index is rounded down to an integer and limited to the range of the elements.
     """
 
     title: ClassVar[str] = "Index Vector"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A counter selects three numbers in turn.",
+        shows="A counter selects three numbers, one after another.",
         inputs={"index": driver("CounterLimited", upper=2), "u": driver("Constant", value=(0.5, 2.0, 1.0))},
         shown=("index", "y"),
     )
@@ -238,7 +240,7 @@ class IndexVector(Block):
 
 
 def choose(index: SX, candidates: list[SX], counting: str = "zero-based") -> SX:
-    """The candidate at a symbolic index, which is truncated to an integer and limited to the list."""
+    """The candidate at a symbolic index, which is rounded down to an integer and limited to the list."""
     first = 1.0 if counting == "one-based" else 0.0
     position = fmin(fmax(floor(index) - first, 0.0), float(len(candidates) - 1))
     chosen = candidates[-1]

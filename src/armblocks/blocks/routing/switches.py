@@ -33,7 +33,10 @@ from armblocks.diagram import (
 
 @dataclass(frozen=True, kw_only=True)
 class Switch(Block):
-    """One of two signals: y = u1 where the control input meets the criterion, else u3."""
+    """One of two signals: y = u1 where the control input meets the criterion, else u3.
+
+    The criterion is u2 >= threshold or u2 > threshold.
+    """
 
     following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "Switch"
@@ -55,7 +58,7 @@ class Switch(Block):
     def input_ports(self) -> tuple[Port, ...]:
         return (
             Port("u1", "output where the criterion is met"),
-            Port("u2", "the control"),
+            Port("u2", "the control input"),
             Port("u3", "output where the criterion is not met"),
         )
 
@@ -95,13 +98,13 @@ class Switch(Block):
 class MultiportSwitch(Block):
     """The input at a variable index: y = u1 for index 1, u2 for index 2, …
 
-    The index is truncated to an integer and limited to the range of the inputs. All inputs have one shape;
-    scalars are broadcast.
+    The index is rounded down to an integer and limited to the range of the inputs. All inputs have the same
+    shape; scalars are broadcast.
     """
 
     title: ClassVar[str] = "Multiport Switch"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A counter selects the inputs in turn.",
+        shows="A counter selects the inputs, one after another.",
         parameters={"counting": "zero-based"},
         inputs={
             "index": driver("CounterLimited", upper=2),
@@ -141,9 +144,9 @@ class MultiportSwitch(Block):
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         _, *candidates = u.values()
         largest = reduce(lambda left, right: left if left.numel() > 1 else right, candidates)
-        full = [value * SX.ones(*largest.shape) for value in candidates]
-        chosen = full[0]
-        for k, value in enumerate(full[1:], 2):
+        broadcast_values = [value * SX.ones(*largest.shape) for value in candidates]
+        chosen = broadcast_values[0]
+        for k, value in enumerate(broadcast_values[1:], 2):
             chosen = if_else(x[f"from{k}"], value, chosen)
         return {"y": chosen}
 
@@ -152,7 +155,7 @@ class MultiportSwitch(Block):
 class ManualSwitch(Block):
     """A manual switch: y = u1 for position 1 and u2 for position 2.
 
-    The position is tunable, so that it can change without compiling again; values from 1.5 on count as 2.
+    The position is tunable, so that it can change without compiling again; values of at least 1.5 select u2.
     """
 
     title: ClassVar[str] = "Manual Switch"

@@ -33,7 +33,7 @@ class Scope(Block):
     title: ClassVar[str] = "Scope"
     card_size: ClassVar[tuple[float, float]] = (72.0, 60.0)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Two signals of one unit, in one panel.",
+        shows="Two signals with the same unit share one panel.",
         parameters={"inputs": 2},
         inputs={"u1": driver("SineWave"), "u2": driver("PulseGenerator")},
     )
@@ -71,7 +71,7 @@ class Display(Block):
 
     title: ClassVar[str] = "Display"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The value at the end of the run.",
+        shows="The value at the suffix of the run.",
         inputs={"u": driver("Ramp", slope=0.5)},
     )
 
@@ -112,8 +112,9 @@ class ToFile(Block):
     """Stores the signal in a separate file: CSV, NPZ, MAT or Parquet, by the file name extension.
 
     The run itself writes no file. ``write_report`` (and thus ``armblocks run``) writes the file into the
-    report's folder; ``write_files`` writes it into a given folder. The path must be inside that folder. Rows
-    are recorded sample times: every ``decimation``-th from the first on, of these the last ``limit``.
+    report's folder; ``write_files`` writes it into a given folder. The path must be inside that folder. The
+    file has one row for every ``decimation``-th recorded sample time, beginning with the first. Of more than
+    ``limit`` rows, the last ones are stored.
     """
 
     title: ClassVar[str] = "To File"
@@ -136,13 +137,13 @@ class ToFile(Block):
 
     def check(self) -> None:
         parts = self.file.split("/")
-        plain = all(part.strip(". ") and not set(part) & set('\\:*?"<>|') for part in parts)
-        if not plain or not self.file.isprintable() or parts[-1].rpartition(".")[2] not in FILE_SUFFIXES:
+        is_valid = all(part.strip(". ") and not set(part) & set('\\:*?"<>|') for part in parts)
+        if not is_valid or not self.file.isprintable() or parts[-1].rpartition(".")[2] not in FILE_SUFFIXES:
             raise InputError(
                 f"the file is '{self.file}'"[:120],
                 where="ToFile.file",
                 allowed="a path inside a folder that ends in "
-                + ", ".join("." + end for end in FILE_SUFFIXES),
+                + ", ".join("." + suffix for suffix in FILE_SUFFIXES),
                 fix="omit '..' and a leading '/'; the path is relative to the folder of the report",
             )
 
@@ -159,11 +160,11 @@ class Spectrum(Block):
     """The spectrum of a signal: amplitudes, or power spectral density by Welch's method.
 
     ``amplitude``: the amplitude of a sine at each frequency, A = 2 |X| / sum(w). ``power density``:
-    one-sided, 2 |X|^2 / (rate sum(w^2)); its integral over the frequency is the mean square of the signal. X
-    is the discrete Fourier transform of evenly spaced samples times the window w. Several half-overlapping
-    segments are averaged (Welch, IEEE Trans. Audio Electroacoustics 15, 1967). Signals are interpolated
-    linearly between the recorded sample times. There is no anti-aliasing filter: choose a sufficiently small
-    ``sample_time``.
+    one-sided, 2 |X|^2 / (fs sum(w^2)); its integral over the frequency is the mean square of the signal. X
+    is the discrete Fourier transform of evenly spaced samples times the window w, and fs the sampling rate in
+    Hz. Several half-overlapping segments are averaged (Welch, IEEE Trans. Audio Electroacoustics 15, 1967).
+    Signals are interpolated linearly between the recorded sample times. There is no anti-aliasing filter:
+    choose a sufficiently small ``sample_time``.
     """
 
     title: ClassVar[str] = "Spectrum"
@@ -171,7 +172,7 @@ class Spectrum(Block):
         (0, 0), (0.22, 0.1), (0.28, 1), (0.34, 0.1), (0.6, 0.06), (0.66, 0.5), (0.72, 0.06), (1, 0)
     )
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Two sines of 0.5 and 2 Hz, the second a tenth as large.",
+        shows="Two sines of 0.5 and 2 Hz with the amplitudes 1 and 0.1.",
         parameters={"decibels": False},
         inputs={
             "u": driver("Sum").by(

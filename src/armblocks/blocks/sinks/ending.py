@@ -1,4 +1,4 @@
-"""Blocks that monitor a condition: one ends the run when it is met, the other checks an assertion."""
+"""Blocks that monitor a signal: one ends the run, the other checks an assertion."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ class StopSimulation(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Assertion(Block):
-    """Asserts that its input is not 0: when it becomes 0, the run fails, or reports it at the end."""
+    """Asserts that its input is not 0. When it becomes 0, the run fails, or reports this at its end."""
 
     title: ClassVar[str] = "Assertion"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The assertion that the sine stays below 0.9 fails: the run continues, and its message "
-        "reports it.",
+        shows="The sine exceeds 0.9, so the assertion fails. The run continues, and its message reports the "
+        "failure.",
         parameters={"action": "warn"},
         inputs={"u": driver("CompareToConstant", relation="<", constant=0.9).by(u=driver("SineWave"))},
         shown=("u",),

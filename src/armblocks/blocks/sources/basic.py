@@ -59,7 +59,7 @@ class Clock(Block):
 class Step(Block):
     """A step at a given time: y = initial for t < time, y = final from there on.
 
-    The output of a Derivative block that follows has no impulse at the jump.
+    The output of a Derivative block after a Step has no impulse at the jump.
     """
 
     title: ClassVar[str] = "Step"
@@ -70,7 +70,7 @@ class Step(Block):
     )
 
     time: float = parameter(1.0, doc="time of the step", unit="s")
-    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="value before the start")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="value before the step")
     final: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="value from the step on")
 
     def check(self) -> None:
@@ -100,7 +100,7 @@ class Ramp(Block):
         parameters={"slope": 0.5, "start": 2.0},
     )
 
-    slope: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="slope", unit="1/s")
+    slope: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="slope of the ramp", unit="1/s")
     start: float = parameter(0.0, doc="start time of the ramp", unit="s")
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="value before the start")
 

@@ -77,12 +77,12 @@ class DigitalClock(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class CounterFreeRunning(Block):
-    """Counts the ticks and overflows as an unsigned integer does: y(k) = k mod 2^bits."""
+    """A counter of ticks that overflows like an unsigned integer: y(k) = k mod 2^bits."""
 
     title: ClassVar[str] = "Counter Free-Running"
     sign: ClassVar[FaceSign] = stairs((0.0, 0.33, 0.67, 1.0, 0.0))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A counter of two bits: after 3 comes 0.",
+        shows="A counter of two bits returns to 0 after 3.",
         parameters={"bits": 2},
     )
     sampled: ClassVar[bool] = True

@@ -30,12 +30,12 @@ class FromFile(Block):
     """A signal from a table: y = values of the rows around t, interpolated linearly or held.
 
     In the file of a diagram, ``data`` names a CSV, NPZ, MAT or Parquet file, relative to the diagram's file,
-    and the columns of the times and of the values. In the studio it is chosen in the block's dialog, with a
-    preview, or by dropping the file on the sheet. In Python it is the result of ``load_table``, or rows
+    and the columns of the times and of the values. In the studio the file is chosen in the block's dialog,
+    with a preview, or dropped on the sheet. In Python, ``data`` is the result of ``load_table``, or rows
     (time, value, …). Each row is an event, so that no step passes over a row. The cost of a row does not
-    depend on the length of the table. Before and after the table the first and the last row are held, or the
-    signal is ``zero`` (after the table, from the time of the last row on). Values are not converted: the unit
-    in a header such as ``q1 [deg]`` is that of the signal.
+    depend on the length of the table. Before the table the first row is held, and after it the last row; or
+    the signal is ``zero`` before the first row and from the time of the last row on. Values are not
+    converted: the unit in a header such as ``q1 [deg]`` is that of the signal.
     """
 
     following_modes: ClassVar[bool] = True
@@ -71,7 +71,7 @@ class FromFile(Block):
         )
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("row", (), "index of the last row in the past, from 0; -1 before the first row"),)
+        return (State("row", (), "index of the last row at or before t, from 0; -1 before the first row"),)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         return (Guard("next", (), "t - the time of the next row", 1),)
@@ -84,29 +84,29 @@ class FromFile(Block):
         if self.method == "linear":
             next_row = fmin(row + 1.0, count - 1.0)
             begin, end = self._entry(p, row, 0), self._entry(p, next_row, 0)
-            share = if_else(between, (t - begin) / if_else(between, end - begin, 1.0), 0.0)
+            fraction = if_else(between, (t - begin) / if_else(between, end - begin, 1.0), 0.0)
             next_values = vertcat(*(self._entry(p, next_row, k) for k in range(1, width)))
-            values = (1.0 - share) * values + share * next_values
+            values = (1.0 - fraction) * values + fraction * next_values
         if self.outside == "zero":
             values = if_else(between, values, 0.0)
         return {"y": values}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         last = self._size[0] - 1.0
-        coming = since(t, self._entry(p, fmin(x["row"] + 1.0, last), 0))
-        return {"next": if_else(x["row"] < last, coming, -1.0)}
+        next_row = since(t, self._entry(p, fmin(x["row"] + 1.0, last), 0))
+        return {"next": if_else(x["row"] < last, next_row, -1.0)}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         count, width = self._size
         row = last_at_or_below(p["data"].T, t, count=count, stride=width)
         passed = self.guard_values(t, x, u, p)["next"] > 0.0
-        return {"row": edge_count(row, if_else(self._early(t, x, p), -1.0, x["row"]), passed)}
+        return {"row": edge_count(row, if_else(self._is_before_table(t, x, p), -1.0, x["row"]), passed)}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         passed = self.guard_values(t, x, u, p)["next"] > 0.0
-        return {"row": logic_or(passed, self._early(t, x, p))}
+        return {"row": logic_or(passed, self._is_before_table(t, x, p))}
 
-    def _early(self, t: SX, x: Signals, p: Signals) -> SX:
+    def _is_before_table(self, t: SX, x: Signals, p: Signals) -> SX:
         """Whether t is before row 0, while the first row is held."""
         return logic_and(x["row"] == 0.0, since(t, self._entry(p, SX(0.0), 0)) < 0.0)
 
@@ -119,5 +119,5 @@ class FromFile(Block):
         return rows, width
 
     def _entry(self, p: Signals, row: SX, column: int) -> SX:
-        # row-major in the parameter vector, which is column-major in the transpose
+        # The parameter vector is row-major, which is the column-major order of the transpose.
         return read_entry(p["data"].T, self._size[1] * row + float(column))

@@ -35,8 +35,8 @@ from armblocks.diagram import (
 )
 from armblocks.diagram.signs import FaceSign, graph, stairs
 
-_LARGEST_SEED = float(2**SEED_BITS - 1)
-_SEED = f"seed, an integer from 0 to {_LARGEST_SEED:.0f}"
+_MAX_SEED = float(2**SEED_BITS - 1)
+_SEED = f"seed, an integer from 0 to {_MAX_SEED:.0f}"
 
 
 _NOISE = (0.5, 0.75, 0.3, 0.55, 0.05, 0.6, 1.0, 0.4, 0.65, 0.2, 0.45, 0.9, 0.35, 0.0, 0.6, 0.5)
@@ -55,7 +55,7 @@ class RandomNumber(Block):
 
     mean: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the mean")
     variance: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="the variance")
-    seed: float = parameter(0.0, minimum=0.0, maximum=_LARGEST_SEED, doc=_SEED)
+    seed: float = parameter(0.0, minimum=0.0, maximum=_MAX_SEED, doc=_SEED)
     sample_time: ArrayLike = sample_time_parameter(0.1)
 
     def check(self) -> None:
@@ -93,7 +93,7 @@ class UniformRandomNumber(Block):
 
     minimum: ArrayLike = parameter(-1.0, kind=ParameterKind.ARRAY, doc="the lower bound")
     maximum: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the upper bound")
-    seed: float = parameter(0.0, minimum=0.0, maximum=_LARGEST_SEED, doc=_SEED)
+    seed: float = parameter(0.0, minimum=0.0, maximum=_MAX_SEED, doc=_SEED)
     sample_time: ArrayLike = sample_time_parameter(0.1)
 
     def check(self) -> None:
@@ -122,8 +122,8 @@ class UniformRandomNumber(Block):
 class BandLimitedWhiteNoise(Block):
     """White noise for continuous systems: y(k) = sqrt(noise_power / T) n(k), n of N(0, 1), held for T.
 
-    The height of its two-sided power spectral density is ``noise_power`` well below the frequency 1 / T (Hz),
-    so that the variance of a system's response does not depend on T. Choose T as about 1/100 of the smallest
+    Well below the frequency 1 / T (Hz), its two-sided power spectral density is constant: ``noise_power``, so
+    that the variance of a system's response does not depend on T. Choose T as about 1/100 of the smallest
     time constant of the system, as Simulink's documentation of the block advises.
     """
 
@@ -137,9 +137,9 @@ class BandLimitedWhiteNoise(Block):
     sampled: ClassVar[bool] = True
 
     noise_power: ArrayLike = parameter(
-        0.1, kind=ParameterKind.ARRAY, minimum=0.0, doc="height of the spectral density, y squared per Hz"
+        0.1, kind=ParameterKind.ARRAY, minimum=0.0, doc="two-sided power spectral density, y squared per Hz"
     )
-    seed: float = parameter(23341.0, minimum=0.0, maximum=_LARGEST_SEED, doc=_SEED)
+    seed: float = parameter(23341.0, minimum=0.0, maximum=_MAX_SEED, doc=_SEED)
     sample_time: ArrayLike = sample_time_parameter(0.1)
 
     def output_ports(self) -> tuple[Port, ...]:

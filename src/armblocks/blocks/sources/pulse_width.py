@@ -77,11 +77,11 @@ class PWM(Block):
         return {**sampling_guards(t, x, p, _limited(u["D"]), x["duty"]), "edge": edge}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        _, samples, counted = sampled(t, x, p, e)
+        _, samples, sampling_states = sampled(t, x, p, e)
         duty = if_else(samples, _limited(u["D"]), x["duty"])
-        ends = logic_and(e["edge"] > 0.0, x["duty"] < 1.0)
-        high = if_else(samples, duty > 0.0, if_else(ends, 0.0, x["high"]))
-        return {**counted, "duty": duty, "high": high}
+        pulse_ends = logic_and(e["edge"] > 0.0, x["duty"] < 1.0)
+        high = if_else(samples, duty > 0.0, if_else(pulse_ends, 0.0, x["high"]))
+        return {**sampling_states, "duty": duty, "high": high}
 
 
 def _limited(duty: SX) -> SX:

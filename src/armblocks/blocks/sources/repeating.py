@@ -34,7 +34,8 @@ from armblocks.diagram import (
 from armblocks.diagram.signs import FaceSign, graph, pulses, sine_curve, stairs
 from armblocks.errors import InputError
 
-_ROUNDED = 1.0 + 1e-14  # k * period / period may be slightly less than k
+_ROUNDING_MARGIN = 1.0 + 1e-14
+"""A factor that compensates rounding: k * period / period may be slightly less than k."""
 
 
 _WAVES = {
@@ -49,20 +50,20 @@ class SignalGenerator(Block):
     """A periodic wave; s = f t - floor(f t): sine A sin(2 pi s), sawtooth A (1 - 2 s), or square.
 
     The square is -A in the first half of the period and A in the second, and the sawtooth falls from A to
-    -A, as with Simulink's block. Its fourth form, random numbers, is the block Uniform Random Number here,
-    which has a sample time.
+    -A, as with Simulink's block. The random waveform of Simulink's block is the block Uniform Random Number
+    here.
     """
 
     following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "Signal Generator"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A square wave of 0.5 Hz: 1 in the first half of every period, -1 in the second.",
+        shows="A square wave of 0.5 Hz: -1 in the first half of every period, 1 in the second.",
         parameters={"waveform": "square", "frequency": 0.5},
     )
 
     waveform: str = parameter("sine", choices=("sine", "square", "sawtooth"), doc="the form of the wave")
     amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="A, half the peak-to-peak value")
-    frequency: float = parameter(1.0, above=0.0, doc="f, in the chosen unit")
+    frequency: float = parameter(1.0, above=0.0, doc="frequency f, in the unit of units")
     units: str = parameter("Hz", choices=("Hz", "rad/s"), doc="unit of the frequency")
 
     def face_sign(self) -> FaceSign:
@@ -94,7 +95,7 @@ class SignalGenerator(Block):
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         if self.waveform == "sine":
             return {}
-        passed = floor(t / self._spacing(p) * _ROUNDED)
+        passed = floor(t / self._spacing(p) * _ROUNDING_MARGIN)
         return {"edges": edge_count(passed, x["edges"], self.contradictions(t, x, u, p)["edges"])}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
@@ -145,22 +146,22 @@ class RepeatingSequence(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         times = _numbers(self.times)
-        periods, piece = self._piece(x["pieces"])
-        gaps = SX([right - left for left, right in pairwise(times)])
-        since = t - (periods * times[-1] + dot(piece, SX(times[:-1])))
-        left, right = dot(piece, p["values"][:-1]), dot(piece, p["values"][1:])
-        return {"y": left + (right - left) * (since / dot(piece, gaps))}
+        periods, segment = self._segment(x["pieces"])
+        segment_durations = SX([right - left for left, right in pairwise(times)])
+        elapsed = t - (periods * times[-1] + dot(segment, SX(times[:-1])))
+        left, right = dot(segment, p["values"][:-1]), dot(segment, p["values"][1:])
+        return {"y": left + (right - left) * (elapsed / dot(segment, segment_durations))}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         times = _numbers(self.times)
-        periods, piece = self._piece(x["pieces"])
-        return {"corner": since(t, periods * times[-1] + dot(piece, SX(times[1:])))}
+        periods, segment = self._segment(x["pieces"])
+        return {"corner": since(t, periods * times[-1] + dot(segment, SX(times[1:])))}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         times = _numbers(self.times)
-        periods = floor(t / times[-1] * _ROUNDED)
-        into = (t - periods * times[-1]) + 1e-14 * t
-        passed = sum((into >= corner for corner in times[1:-1]), SX(0.0))
+        periods = floor(t / times[-1] * _ROUNDING_MARGIN)
+        time_in_period = (t - periods * times[-1]) + 1e-14 * t
+        passed = sum((time_in_period >= corner for corner in times[1:-1]), SX(0.0))
         passed = periods * (len(times) - 1) + passed
         return {"pieces": edge_count(passed, x["pieces"], self.contradictions(t, x, u, p)["pieces"])}
 
@@ -170,7 +171,7 @@ class RepeatingSequence(Block):
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         return {"pieces": x["pieces"] + (e["corner"] > 0.0)}
 
-    def _piece(self, pieces: SX) -> tuple[SX, SX]:
+    def _segment(self, pieces: SX) -> tuple[SX, SX]:
         """The number of past periods, and a vector that is 1 for the present segment and 0 for the others."""
         count = shape_of(self.times)[0] - 1
         periods = floor(pieces / count)
@@ -207,11 +208,11 @@ class RepeatingSequenceInterpolated(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         times = _numbers(self.times)
-        periods = floor(t / times[-1] * _ROUNDED)
-        into = fmax(t - periods * times[-1], 0.0)
+        periods = floor(t / times[-1] * _ROUNDING_MARGIN)
+        time_in_period = fmax(t - periods * times[-1], 0.0)
         if self.method == "flat":
-            into = into + 1e-14 * t
-        return {"y": dot(vertcat(*weights(into, times, self.method)), p["values"])}
+            time_in_period = time_in_period + 1e-14 * t
+        return {"y": dot(vertcat(*weights(time_in_period, times, self.method)), p["values"])}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -246,6 +247,7 @@ class RepeatingSequenceStair(Block):
 
 
 def _check_times(block: Block, times: ArrayLike, count: int) -> None:
+    """Raise ``InputError`` unless ``count`` times ascend from 0."""
     first = ascending_positions(block.type_name(), "times", times, count)[0]
     if first != 0.0:
         raise InputError(
@@ -257,4 +259,5 @@ def _check_times(block: Block, times: ArrayLike, count: int) -> None:
 
 
 def _numbers(values: ArrayLike) -> list[float]:
+    """The values as a flat list of numbers."""
     return [float(value) for value in np.ravel(cast("Any", values))]

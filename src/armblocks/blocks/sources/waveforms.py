@@ -118,9 +118,11 @@ class Chirp(Block):
         parameters={"target_time": 10.0},
     )
 
-    initial_frequency: ArrayLike = parameter(0.1, kind=ParameterKind.ARRAY, doc="f1, at t = 0", unit="Hz")
-    final_frequency: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="f2, at T", unit="Hz")
-    target_time: float = parameter(100.0, above=0.0, doc="T", unit="s")
+    initial_frequency: ArrayLike = parameter(
+        0.1, kind=ParameterKind.ARRAY, doc="frequency f1 at t = 0", unit="Hz"
+    )
+    final_frequency: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="frequency f2 at T", unit="Hz")
+    target_time: float = parameter(100.0, above=0.0, doc="time T at which the frequency is f2", unit="s")
 
     def check(self) -> None:
         parameters_shape(self, "initial_frequency", "final_frequency")
@@ -194,9 +196,9 @@ class FromTable(Block):
 
     def _read(self, t: SX, p: Signals) -> SX:
         """The signal, from the two rows around t."""
-        smooth = self.method == "cubic"
-        values = p["spline" if smooth else "values"].T  # row-major, as in the parameter vector
-        times = p["knots" if smooth else "times"]
+        is_cubic = self.method == "cubic"
+        values = p["spline" if is_cubic else "values"].T  # row-major, as in the parameter vector
+        times = p["knots" if is_cubic else "times"]
         first, last = times[0], times[times.numel() - 1]
         width = values.shape[0] if len(shape_of(self.values)) == 2 else 1
 
@@ -205,12 +207,12 @@ class FromTable(Block):
 
         if self.method == "flat":
             signal = row(fmax(last_at_or_below(times, t), 0.0))
-        elif smooth:
+        elif is_cubic:
             corners = spline_corners(t, times, None, straight=self.outside == "linear")
             signal = sum((weight * row(k) for k, weight in corners), SX(0.0))
         else:
-            inside = t if self.outside == "linear" else fmin(fmax(t, first), last)
-            signal = interpolated(inside, times, interval_of(t, times), row)
+            clipped = t if self.outside == "linear" else fmin(fmax(t, first), last)
+            signal = interpolated(clipped, times, interval_of(t, times), row)
         return if_else(logic_and(t >= first, t <= last), signal, 0.0) if self.outside == "zero" else signal
 
     @property

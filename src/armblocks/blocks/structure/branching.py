@@ -21,7 +21,7 @@ THRESHOLD_OFFSET = 1e-300
 class If(Block):
     """Activates the action subsystem of the first condition that is true, else the last subsystem.
 
-    The conditions are formulas over the inputs (``u``, or ``u1``, ``u2``, … where there are several), written
+    The conditions are formulas over the inputs (``u``; with several inputs ``u1``, ``u2``, …), written
     as in the Expression block and separated by semicolons: ``u > 0.5; u > 0``. The output of the active
     branch is 1, and the others are 0.
     """
@@ -81,6 +81,7 @@ class If(Block):
         )
 
     def _case(self, t: SX, u: Signals) -> SX:
+        """The number of the first true condition, from 1; the number of outputs if none is true."""
         texts = self._texts()
         case = SX(len(texts) + 1.0)
         for number in range(len(texts), 0, -1):
@@ -109,13 +110,13 @@ class SwitchCase(Block):
     """Activates the action subsystem whose case contains the integer part of u.
 
     Cases are separated by semicolons, and a case may have several numbers: ``1; 2 3; 4``. The output of the
-    case with that number is 1. If no case has it, the output ``default`` is 1.
+    case that contains the number is 1. If no case contains it, the output ``default`` is 1.
     """
 
     following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "Switch Case"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The ramp passes 1, 2 and 3, and activates the cases in turn.",
+        shows="The ramp passes 1, 2 and 3, and activates the cases one after another.",
         parameters={"cases": "1; 2 3"},
         inputs={"u": driver("Ramp", slope=0.5)},
     )
@@ -150,7 +151,7 @@ class SwitchCase(Block):
             Port(f"case{number}", f"1 where u is {' or '.join(case)}", "", ())
             for number, case in enumerate(self._texts(), start=1)
         ]
-        return (*chosen, Port("default", "1 where no case has the number", "", ()))
+        return (*chosen, Port("default", "1 where no case contains the integer part of u", "", ()))
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         return (State("case", (), "index of the output that is 1, from 1"),)
@@ -164,14 +165,15 @@ class SwitchCase(Block):
         return (Guard("borders", (2 * len(self._edges()),), "u passes an integer"),)
 
     def _case(self, u: SX) -> SX:
-        whole = if_else(u < 0.0, -floor(fabs(u)), floor(u))
+        """The number of the case that contains the integer part of u; the number of outputs if none does."""
+        integer_part = if_else(u < 0.0, -floor(fabs(u)), floor(u))
         texts = self._texts()
         case = SX(len(texts) + 1.0)
         for number in range(len(texts), 0, -1):
-            is_one = SX(0.0)
+            matches = SX(0.0)
             for text in texts[number - 1]:
-                is_one = logic_or(is_one, whole == float(text))
-            case = if_else(is_one, float(number), case)
+                matches = logic_or(matches, integer_part == float(text))
+            case = if_else(matches, float(number), case)
         return case
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
@@ -181,7 +183,7 @@ class SwitchCase(Block):
         }
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        # A positive boundary belongs to the number above it, a negative one to the number below.
+        # A positive boundary belongs to the integer above it, a negative boundary to the integer below it.
         return {
             "borders": vertcat(
                 *(

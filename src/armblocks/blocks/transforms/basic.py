@@ -20,7 +20,7 @@ class T2xyz(Block):
     title: ClassVar[str] = "T2xyz"
     sign: ClassVar[FaceSign] = Words("T→xyz")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The position of a pose that moves along a circle.",
+        shows="The position of a pose that moves along a helix.",
         inputs={"T": HELIX_POSE},
         shown=("x", "y", "z"),
     )

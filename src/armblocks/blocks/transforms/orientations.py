@@ -341,7 +341,7 @@ class QuaternionRate(Block):
         )
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "its rate", "1/s", (4,)),)
+        return (Port("y", "derivative of the quaternion", "1/s", (4,)),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         w = vertcat(0.0, u["w"])

@@ -244,8 +244,8 @@ class Tr2Delta(Block):
         T1, T2 = u["T1"], u["T2"]
         if self.frame == "body":
             step = mtimes(inverse(T1), T2)
-            turn = vertcat(step[2, 1] - step[1, 2], step[0, 2] - step[2, 0], step[1, 0] - step[0, 1])
-            return {"dx": vertcat(step[:3, 3], 0.5 * turn)}
+            rotation = vertcat(step[2, 1] - step[1, 2], step[0, 2] - step[2, 0], step[1, 0] - step[0, 1])
+            return {"dx": vertcat(step[:3, 3], 0.5 * rotation)}
         crosses = [cross(T1[:3, k], T2[:3, k]) for k in range(3)]
         return {"dx": vertcat(T2[:3, 3] - T1[:3, 3], 0.5 * (crosses[0] + crosses[1] + crosses[2]))}
 
@@ -331,10 +331,10 @@ class PoseIntegration(Block):
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         v, w, Q = u["V"][:3], vertcat(0.0, u["V"][3:]), x["Q"]
         body = self.axes == "body"
-        turning = 0.5 * quaternion_product(*((Q, w) if body else (w, Q)))
+        rotation_rate = 0.5 * quaternion_product(*((Q, w) if body else (w, Q)))
         return {
             "p": mtimes(from_quaternion(Q), v) if body else v,
-            "Q": turning + 0.5 * p["restoring"] * (1.0 - dot(Q, Q)) * Q,
+            "Q": rotation_rate + 0.5 * p["restoring"] * (1.0 - dot(Q, Q)) * Q,
         }
 
     def initial_states(self, p: Signals) -> Signals:

@@ -1,10 +1,10 @@
 """Elementary functions as IR, with identical operations for every number of lanes.
 
-Each is written once over a :class:`~armblocks.compiler.ir_text.Body` with additions, multiplications, fused
-multiply-adds, divisions, square roots, comparisons and bit operations only, all of which IEEE 754 defines to
-the bit. Results are therefore identical for every number of lanes and every processor, and no C library is
-called. Errors stay below 2 units in the last place (mostly below 1) over the whole range; the tests measure
-them. Signed zeros, infinities, NaN and subnormal numbers follow C99 (Annex F).
+Each function is written once over a :class:`~armblocks.compiler.ir_text.Body` with additions,
+multiplications, fused multiply-adds, divisions, square roots, comparisons and bit operations only, all of
+which IEEE 754 defines to the bit. Results are therefore identical for every number of lanes and every
+processor, and no C library is called. Errors stay below 2 units in the last place (mostly below 1) over the
+whole range; the tests measure them. Signed zeros, infinities, NaN and subnormal numbers follow C99 (Annex F).
 """
 
 from __future__ import annotations

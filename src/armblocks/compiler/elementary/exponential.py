@@ -12,7 +12,7 @@ from typing import NamedTuple
 from armblocks.compiler.elementary.coefficients import EXPONENTIAL, LN2, LOG2_E, ROUNDER
 from armblocks.compiler.ir_text import Body
 
-_BEYOND = 800.0  # exp overflows from 710 on and vanishes below -746
+_MAX_ARGUMENT = 800.0  # exp overflows from 710 on and vanishes below -746
 
 
 class _Power(NamedTuple):
@@ -29,7 +29,7 @@ def exponential(body: Body, x: str) -> str:
 
 
 def exponential_of_sum(body: Body, high: str, low: str) -> str:
-    """``exp(high + low)`` for ``|high| <= 800``, ``low`` of a rounding error's size."""
+    """``exp(high + low)`` for ``|high| <= 800``, where ``low`` has the size of a rounding error."""
     power = _reduce(body, high, low)
     one, rest = body.fast_two_sum(body.number(1.0), power.high)
     return _scaled(body, power, body.add(one, body.add(rest, power.low)))
@@ -42,9 +42,9 @@ def exponential_minus_one(body: Body, x: str) -> str:
     near = body.add(high, low)
     one, rest = body.fast_two_sum(body.number(1.0), power.high)
     far = _scaled(body, power, body.add(one, body.add(rest, power.low)))
-    # From 2**60 on subtracting 1 changes nothing, and the pair may overflow early.
+    # Where exp x exceeds 2**60, subtracting 1 has no effect, and the pair may overflow before the result.
     result = body.select(body.compare("ogt", x, body.number(42.0)), far, near)
-    # Tiny arguments are their own result, with the sign of zero and every subnormal bit.
+    # A tiny argument is the result, including signed zeros and subnormal numbers.
     tiny = body.compare("olt", body.absolute(x), body.number(2.0**-54))
     return body.select(tiny, x, result)
 
@@ -56,9 +56,9 @@ def hyperbolic_sine(body: Body, x: str) -> str:
     denominator, denominator_rest = body.two_sum(high, body.number(1.0))
     denominator_rest = body.add(denominator_rest, low)
     quotient = body.divide(high, denominator)
-    left = body.fma(body.negate(quotient), denominator, high)
-    left = body.add(left, body.fma(body.negate(quotient), denominator_rest, low))
-    quotient_rest = body.divide(left, denominator)
+    residual = body.fma(body.negate(quotient), denominator, high)
+    residual = body.add(residual, body.fma(body.negate(quotient), denominator_rest, low))
+    quotient_rest = body.divide(residual, denominator)
     total, rest = body.fast_two_sum(high, quotient)
     total = body.add(total, body.add(rest, body.add(low, quotient_rest)))
     near = body.multiply(total, body.number(0.5))
@@ -76,8 +76,8 @@ def hyperbolic_cosine(body: Body, x: str) -> str:
     base, base_rest = body.two_sum(high, body.number(1.0))
     base_rest = body.add(base_rest, low)
     inverse = body.divide(body.number(1.0), base)
-    left = body.fma(body.negate(inverse), base, body.number(1.0))
-    inverse_rest = body.multiply(inverse, body.fma(body.negate(inverse), base_rest, left))
+    residual = body.fma(body.negate(inverse), base, body.number(1.0))
+    inverse_rest = body.multiply(inverse, body.fma(body.negate(inverse), base_rest, residual))
     total, rest = body.fast_two_sum(base, inverse)
     total = body.add(total, body.add(rest, body.add(base_rest, inverse_rest)))
     near = body.multiply(total, body.number(0.5))
@@ -94,21 +94,22 @@ def hyperbolic_tangent(body: Body, x: str) -> str:
     denominator, denominator_rest = body.two_sum(high, body.number(2.0))
     denominator_rest = body.add(denominator_rest, low)
     quotient = body.divide(high, denominator)
-    left = body.fma(body.negate(quotient), denominator, high)
-    left = body.add(left, body.fma(body.negate(quotient), denominator_rest, low))
-    result = body.add(quotient, body.divide(left, denominator))
+    residual = body.fma(body.negate(quotient), denominator, high)
+    residual = body.add(residual, body.fma(body.negate(quotient), denominator_rest, low))
+    result = body.add(quotient, body.divide(residual, denominator))
     tiny = body.compare("olt", magnitude, body.number(2.0**-28))
     return body.intrinsic("copysign", body.select(tiny, magnitude, result), x)
 
 
 def _limited(body: Body, x: str) -> str:
     """``x`` limited to the range of the reduction; NaN stays NaN."""
-    beyond, below = body.number(_BEYOND), body.number(-_BEYOND)
-    x = body.select(body.compare("ogt", x, beyond), beyond, x)
-    return body.select(body.compare("olt", x, below), below, x)
+    upper, lower = body.number(_MAX_ARGUMENT), body.number(-_MAX_ARGUMENT)
+    x = body.select(body.compare("ogt", x, upper), upper, x)
+    return body.select(body.compare("olt", x, lower), lower, x)
 
 
 def _reduce(body: Body, high: str, low: str) -> _Power:
+    """``exp(high + low)`` by argument reduction."""
     rounder = body.number(ROUNDER)
     count = body.subtract(body.fma(high, body.number(LOG2_E), rounder), rounder)
     first = body.fma(count, body.number(-LN2[0]), high)
@@ -118,14 +119,14 @@ def _reduce(body: Body, high: str, low: str) -> _Power:
     square = body.multiply(angle, angle)
     tail = body.multiply(angle, body.polynomial(angle, EXPONENTIAL))
     curve = body.multiply(square, body.add(tail, body.number(0.5)))
-    # exp(angle + rest) - 1 to first order in the rest
+    # exp(angle + rest) - 1 to first order in rest
     total, error = body.fast_two_sum(angle, curve)
-    slope = body.fma(rest, total, rest)
+    first_order = body.fma(rest, total, rest)
     rounded_half = body.fma(count, body.number(0.5), rounder)
     half = body.subtract(rounded_half, rounder)
     rounded_other = body.add(body.subtract(count, half), rounder)
     scale = (_power_of_two(body, rounded_half), _power_of_two(body, rounded_other))
-    return _Power(total, body.add(error, slope), scale)
+    return _Power(total, body.add(error, first_order), scale)
 
 
 def _power_of_two(body: Body, rounded: str) -> str:
@@ -142,14 +143,14 @@ def _minus_one(body: Body, x: str) -> tuple[str, str, _Power]:
     """``exp x - 1`` as an unevaluated pair, valid up to 2**60, and the power that it is computed from."""
     power = _reduce(body, x, body.number(0.0))
     high, low = _scaled(body, power, power.high), _scaled(body, power, power.low)
-    whole = body.multiply(power.scale[0], power.scale[1])
-    base, base_rest = body.two_sum(whole, body.number(-1.0))
+    scale = body.multiply(power.scale[0], power.scale[1])
+    base, base_rest = body.two_sum(scale, body.number(-1.0))
     total, rest = body.two_sum(base, high)
     return (*body.fast_two_sum(total, body.add(rest, body.add(base_rest, low))), power)
 
 
 def _half_exponential(body: Body, x: str) -> str:
-    """``exp(x) / 2``, which overflows only where the result does."""
+    """``exp(x) / 2``; intermediate results overflow only if the result does."""
     power = _reduce(body, _limited(body, x), body.number(0.0))
     one, rest = body.fast_two_sum(body.number(1.0), power.high)
     value = body.add(one, body.add(rest, power.low))

@@ -1,7 +1,7 @@
-"""Inverse sine, cosine, tangent: one polynomial each on a small interval, the rest by exact identities.
+"""Inverse sine, cosine and tangent: a polynomial on a small interval, exact identities elsewhere.
 
-The parts (a multiple of pi/4 in two doubles, the reduced argument with its rounding error, the polynomial's
-share) are added smallest first.
+The parts (a multiple of pi/4 in two doubles, the reduced argument with its rounding error, the value
+of the polynomial) are added smallest first.
 """
 
 from __future__ import annotations
@@ -24,8 +24,10 @@ def arc_sine(body: Body, x: str) -> str:
 
 
 def arc_cosine(body: Body, x: str) -> str:
-    """``acos x``: ``pi/2 - asin x``; beyond one half ``2 asin sqrt((1 - |x|) / 2)``, or pi minus that for x <
-    0."""
+    """``acos x``: ``pi/2 - asin x`` for ``|x| <= 1/2``. NaN beyond 1.
+
+    Above one half it is ``2 asin sqrt((1 - |x|) / 2)``, for negative x pi minus this value.
+    """
     _, small, s, curve = _arc_sine_parts(body, x)
     negative = body.compare("olt", x, body.number(0.0))
 
@@ -43,14 +45,16 @@ def arc_cosine(body: Body, x: str) -> str:
 
 
 def _arc_sine_parts(body: Body, x: str) -> tuple[str, str, str, str]:
-    """``|x|``; whether it is below one half; s and c with ``s + c = asin`` of |x|, or of sqrt((1 - |x|) /
-    2)."""
+    """``|x|``, whether it is at most one half, and two parts s and c of an arc sine.
+
+    ``s + c`` is ``asin |x|``, or above one half ``asin sqrt((1 - |x|) / 2)``.
+    """
     magnitude = body.absolute(x)
     small = body.compare("ole", magnitude, body.number(0.5))
     outer = body.multiply(body.subtract(body.number(1.0), magnitude), body.number(0.5))
     root = body.intrinsic("sqrt", outer)
-    left = body.fma(body.negate(root), root, outer)
-    root_rest = body.divide(left, body.add(root, root))
+    residual = body.fma(body.negate(root), root, outer)
+    root_rest = body.divide(residual, body.add(root, root))
     at_end = body.compare("oeq", outer, body.number(0.0))
     unneeded = body.either(small, at_end)
     rest = body.select(unneeded, body.number(0.0), root_rest)
@@ -67,9 +71,9 @@ def arc_tangent(body: Body, x: str) -> str:
 
 def arc_tangent_of_quotient(body: Body, y: str, x: str) -> str:
     """``atan2(y, x)``: the angle of the point (x, y), by octants; zeros and infinities as in C99."""
-    across, along = body.absolute(y), body.absolute(x)
-    steep = body.compare("ogt", across, along)
-    numerator, denominator = body.select(steep, along, across), body.select(steep, across, along)
+    abs_y, abs_x = body.absolute(y), body.absolute(x)
+    steep = body.compare("ogt", abs_y, abs_x)
+    numerator, denominator = body.select(steep, abs_x, abs_y), body.select(steep, abs_y, abs_x)
     numerator, denominator = _safe_quotient(body, numerator, denominator)
 
     # In the upper half of the octant, rotate by pi/4: t = (numerator - denominator) / (numerator +
@@ -82,19 +86,19 @@ def arc_tangent_of_quotient(body: Body, y: str, x: str) -> str:
     bottom, bottom_rest = body.select(upper, total, denominator), body.select(upper, total_rest, zero)
     t = body.divide(top, bottom)
     minus = body.negate(t)
-    left = body.add(body.fma(minus, bottom, top), body.fma(minus, bottom_rest, top_rest))
-    t_rest = body.divide(left, bottom)
+    residual = body.add(body.fma(minus, bottom, top), body.fma(minus, bottom_rest, top_rest))
+    t_rest = body.divide(residual, bottom)
     z = body.multiply(t, t)
     curve = body.fma(body.multiply(t, z), body.polynomial(z, ARC_TANGENT), t_rest)
 
     # angle = eighths pi/4 + sign (t + curve)
-    backward = body.word_test("slt", body.bits(x), body.integer(0))
+    negative_x = body.word_test("slt", body.bits(x), body.integer(0))
     eighths = body.select(upper, body.number(1.0), zero)
     eighths = body.select(steep, body.subtract(body.number(2.0), eighths), eighths)
-    eighths = body.select(backward, body.subtract(body.number(4.0), eighths), eighths)
-    turned = body.let(f"xor {body.bit} {steep}, {backward}")
-    t = body.select(turned, body.negate(t), t)
-    curve = body.select(turned, body.negate(curve), curve)
+    eighths = body.select(negative_x, body.subtract(body.number(4.0), eighths), eighths)
+    negated = body.let(f"xor {body.bit} {steep}, {negative_x}")
+    t = body.select(negated, body.negate(t), t)
+    curve = body.select(negated, body.negate(curve), curve)
     base, base_rest = body.two_product(eighths, body.number(QUARTER_PI[0]))
     base_rest = body.fma(eighths, body.number(QUARTER_PI[1]), base_rest)
     total, error = body.fast_two_sum(base, t)
@@ -105,15 +109,17 @@ def arc_tangent_of_quotient(body: Body, y: str, x: str) -> str:
 
 
 def _safe_quotient(body: Body, numerator: str, denominator: str) -> tuple[str, str]:
-    """Scale a quotient (0 <= numerator <= denominator) so that 0/0, infinities, overflow and loss of digits
-    cannot occur."""
+    """An equal quotient (0 <= numerator <= denominator) that is safe to compute.
+
+    It has no 0/0, no infinities, no overflow and no loss of digits.
+    """
     infinity = body.number(float("inf"))
     one, zero = body.number(1.0), body.number(0.0)
-    endless = body.compare("oeq", denominator, infinity)
+    infinite = body.compare("oeq", denominator, infinity)
     both = body.compare("oeq", numerator, infinity)
-    numerator = body.select(endless, body.select(both, one, zero), numerator)
-    void = body.compare("oeq", denominator, zero)
-    denominator = body.select(body.either(endless, void), one, denominator)
+    numerator = body.select(infinite, body.select(both, one, zero), numerator)
+    zero_denominator = body.compare("oeq", denominator, zero)
+    denominator = body.select(body.either(infinite, zero_denominator), one, denominator)
     large = body.compare("ogt", denominator, body.number(2.0**1000))
     small = body.compare("olt", denominator, body.number(2.0**-800))
     scale = body.select(large, body.number(2.0**-100), body.select(small, body.number(2.0**200), one))

@@ -12,19 +12,19 @@ from armblocks.compiler.ir_text import Body
 
 _INFINITY = float("inf")
 _SQRT_HALF_BITS = 0x3FE6A09E667F3BCD
-_SMALLEST_NORMAL = 2.0**-1022
+_MIN_NORMAL = 2.0**-1022
 
 
 def logarithm(body: Body, x: str) -> str:
     """``ln x``; -inf at zero, NaN below."""
-    return _ends(body, x, body.add(*logarithm_of_pair(body, x, None)))
+    return _with_special_values(body, x, body.add(*logarithm_of_pair(body, x, None)))
 
 
 def logarithm_of_one_plus(body: Body, x: str) -> str:
     """``ln(1 + x)``; -inf at -1, NaN below."""
     total, rest = body.two_sum(body.number(1.0), x)
     rest = _finite_or_zero(body, rest)
-    result = _ends(body, total, body.add(*logarithm_of_pair(body, total, rest)))
+    result = _with_special_values(body, total, body.add(*logarithm_of_pair(body, total, rest)))
     tiny = body.compare("olt", body.absolute(x), body.number(2.0**-54))
     return body.select(tiny, x, result)
 
@@ -40,7 +40,7 @@ def inverse_hyperbolic_sine(body: Body, x: str) -> str:
     huge = body.compare("ogt", magnitude, body.number(2.0**500))
     total, rest = body.select(huge, magnitude, total), body.select(huge, body.number(0.0), rest)
     high, low = logarithm_of_pair(body, *body.fast_two_sum(total, rest), doubled=huge)
-    result = _ends(body, magnitude, body.add(high, low))
+    result = _with_special_values(body, magnitude, body.add(high, low))
     # asinh x = x - x**3 / 6 + …
     cubed = body.multiply(body.multiply(magnitude, magnitude), magnitude)
     near = body.fma(cubed, body.number(-1.0 / 6.0), magnitude)
@@ -59,7 +59,7 @@ def inverse_hyperbolic_cosine(body: Body, x: str) -> str:
     huge = body.compare("ogt", x, body.number(2.0**500))
     total, rest = body.select(huge, x, total), body.select(huge, body.number(0.0), rest)
     high, low = logarithm_of_pair(body, *body.fast_two_sum(total, rest), doubled=huge)
-    result = _ends(body, x, body.add(high, low))
+    result = _with_special_values(body, x, body.add(high, low))
     outside = body.compare("olt", x, body.number(1.0))
     return body.select(outside, body.number(float("nan")), result)
 
@@ -71,12 +71,12 @@ def inverse_hyperbolic_tangent(body: Body, x: str) -> str:
     denominator, denominator_rest = body.two_sum(body.number(1.0), body.negate(magnitude))
     quotient = body.divide(numerator, denominator)
     minus = body.negate(quotient)
-    left = body.fma(minus, denominator, numerator)
-    left = body.add(left, body.fma(minus, denominator_rest, numerator_rest))
-    rest = _finite_or_zero(body, body.divide(left, denominator))
+    residual = body.fma(minus, denominator, numerator)
+    residual = body.add(residual, body.fma(minus, denominator_rest, numerator_rest))
+    rest = _finite_or_zero(body, body.divide(residual, denominator))
     high, low = logarithm_of_pair(body, *body.fast_two_sum(quotient, rest))
     half = body.multiply(body.add(high, low), body.number(0.5))
-    result = _ends(body, quotient, half)
+    result = _with_special_values(body, quotient, half)
     cubed = body.multiply(body.multiply(magnitude, magnitude), magnitude)
     near = body.fma(cubed, body.number(1.0 / 3.0), magnitude)
     small = body.compare("olt", magnitude, body.number(2.0**-18))
@@ -89,19 +89,19 @@ def inverse_hyperbolic_tangent(body: Body, x: str) -> str:
 def logarithm_of_pair(
     body: Body, high: str, low: str | None, *, doubled: str | None = None
 ) -> tuple[str, str]:
-    """``ln(high + low)`` of a positive finite sum as a pair; of twice it where ``doubled`` holds.
+    """``ln(high + low)`` of a positive finite sum as a pair; where ``doubled`` holds, of twice the sum.
 
     Without ``low`` the argument is ``high`` alone. A subnormal ``high`` must be alone.
     """
-    subnormal = body.compare("olt", high, body.number(_SMALLEST_NORMAL))
-    raised = body.select(subnormal, body.multiply(high, body.number(2.0**54)), high)
-    bits = body.bits(raised)
+    subnormal = body.compare("olt", high, body.number(_MIN_NORMAL))
+    normal = body.select(subnormal, body.multiply(high, body.number(2.0**54)), high)
+    bits = body.bits(normal)
     # The exponent of the number divided by sqrt(1/2) leaves m between sqrt(1/2) and sqrt(2).
     offset = body.word_op("sub", bits, body.integer(_SQRT_HALF_BITS))
     exponent = body.word_op("ashr", offset, body.integer(52))
-    removed = body.word_op("shl", exponent, body.integer(52))
-    m = body.from_bits(body.word_op("sub", bits, removed))
-    m_low = None if low is None else _scaled_low(body, high, low, removed)
+    exponent_bits = body.word_op("shl", exponent, body.integer(52))
+    m = body.from_bits(body.word_op("sub", bits, exponent_bits))
+    m_low = None if low is None else _scaled_low(body, high, low, exponent_bits)
     count = body.let(f"sitofp {body.word} {exponent} to {body.real}")
     count = body.select(subnormal, body.subtract(count, body.number(54.0)), count)
     if doubled is not None:
@@ -116,10 +116,10 @@ def logarithm_of_pair(
         denominator_rest = body.add(denominator_rest, m_low)
     s = body.divide(numerator, denominator)
     minus = body.negate(s)
-    left = body.add(
+    residual = body.add(
         body.fma(minus, denominator, numerator), body.fma(minus, denominator_rest, numerator_rest)
     )
-    s_low = body.divide(left, denominator)
+    s_low = body.divide(residual, denominator)
     z, z_low = body.two_product(s, s)
     z_low = body.fma(body.add(s, s), s_low, z_low)
 
@@ -132,20 +132,24 @@ def logarithm_of_pair(
 
     # k ln 2 + 2 s + 2 s curve
     doubled_s, doubled_s_low = body.add(s, s), body.add(s_low, s_low)
-    bend, bend_low = body.two_product(doubled_s, curve)
-    bend_low = body.fma(doubled_s, curve_low, body.fma(doubled_s_low, curve, bend_low))
-    shift, shift_low = body.two_product(count, body.number(LN2[0]))
-    shift_low = body.fma(count, body.number(LN2[1]), shift_low)
-    total, error = body.two_sum(shift, doubled_s)
-    total, bend_error = body.two_sum(total, bend)
-    small = body.add(body.add(error, bend_error), body.add(body.add(shift_low, doubled_s_low), bend_low))
+    correction, correction_low = body.two_product(doubled_s, curve)
+    correction_low = body.fma(doubled_s, curve_low, body.fma(doubled_s_low, curve, correction_low))
+    exponent_term, exponent_term_low = body.two_product(count, body.number(LN2[0]))
+    exponent_term_low = body.fma(count, body.number(LN2[1]), exponent_term_low)
+    total, error = body.two_sum(exponent_term, doubled_s)
+    total, correction_error = body.two_sum(total, correction)
+    small = body.add(
+        body.add(error, correction_error),
+        body.add(body.add(exponent_term_low, doubled_s_low), correction_low),
+    )
     return body.fast_two_sum(total, small)
 
 
-def _scaled_low(body: Body, high: str, low: str, removed: str) -> str:
+def _scaled_low(body: Body, high: str, low: str, exponent_bits: str) -> str:
     """``low`` divided by the power of two that ``high`` was divided by."""
-    inverse = body.from_bits(body.word_op("sub", body.integer(1023 << 52), removed))
-    # The power has no reciprocal at the top of the range, where a low part does not matter.
+    inverse = body.from_bits(body.word_op("sub", body.integer(1023 << 52), exponent_bits))
+    # Near the largest double the reciprocal of the power is not a normal number. The low part is negligible
+    # there.
     large = body.compare("ogt", high, body.number(2.0**1000))
     return body.select(large, body.number(0.0), body.multiply(low, inverse))
 
@@ -153,8 +157,8 @@ def _scaled_low(body: Body, high: str, low: str, removed: str) -> str:
 def _square_root(body: Body, high: str, low: str) -> tuple[str, str]:
     """Square root of an unevaluated pair, as such a pair."""
     root = body.intrinsic("sqrt", high)
-    left = body.add(body.fma(body.negate(root), root, high), low)
-    rest = body.divide(left, body.add(root, root))
+    residual = body.add(body.fma(body.negate(root), root, high), low)
+    rest = body.divide(residual, body.add(root, root))
     return root, body.select(body.compare("oeq", high, body.number(0.0)), body.number(0.0), rest)
 
 
@@ -164,11 +168,11 @@ def _finite_or_zero(body: Body, x: str) -> str:
     return body.select(finite, x, body.number(0.0))
 
 
-def _ends(body: Body, argument: str, result: str) -> str:
+def _with_special_values(body: Body, argument: str, result: str) -> str:
     """Replace the result by the logarithm's values at zero, infinity, NaN and below zero."""
     zero = body.compare("oeq", argument, body.number(0.0))
     result = body.select(zero, body.number(-_INFINITY), result)
-    endless = body.compare("oeq", argument, body.number(_INFINITY))
-    result = body.select(endless, body.number(_INFINITY), result)
+    infinite = body.compare("oeq", argument, body.number(_INFINITY))
+    result = body.select(infinite, body.number(_INFINITY), result)
     valid = body.compare("oge", argument, body.number(0.0))
     return body.select(valid, result, body.number(float("nan")))

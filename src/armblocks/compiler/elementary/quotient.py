@@ -13,7 +13,7 @@ from armblocks.routines.routine import Program, Routine
 from armblocks.routines.values import Boolean, Integer, Real
 
 _INFINITY = float("inf")
-_SMALLEST = 5e-324
+_MIN_SUBNORMAL = 5e-324
 _LARGE, _LONG_DIVISION = "armblocks_modulo_of_large", "armblocks_long_division"
 
 
@@ -23,9 +23,9 @@ def modulo(body: Body, x: str, y: str) -> str:
 
 
 def remainder(body: Body, x: str, y: str) -> str:
-    """IEEE 754 remainder: of division to the nearest integer, ties to even. NaN for y = 0 or infinite x."""
+    """The IEEE 754 remainder x - n y, n = x / y to the nearest even integer. NaN for y = 0, infinite x."""
     a, b = body.absolute(x), body.absolute(y)
-    rest = _modulo(body, a, body.add(b, b))  # a divisor that overflows leaves a unchanged
+    rest = _modulo(body, a, body.add(b, b))  # if 2 b overflows, the result is a
     first_step = body.select(_exceeds_half(body, rest, b, "ogt"), body.subtract(rest, b), rest)
     second_step = body.select(
         _exceeds_half(body, first_step, b, "oge"), body.subtract(first_step, b), first_step
@@ -64,7 +64,7 @@ def _modulo(body: Body, a: str, b: str) -> str:
 
 
 def _define_large(module: Module) -> None:
-    """Add a function that selects the usual remainder or long division."""
+    """Add a function that selects the remainder for a quotient below 2**53, or long division."""
 
     def modulo_of_large(r: Routine, rest: Real, large: Boolean, a: Real, b: Real) -> Real:
         with r.when(large, rarely=True):
@@ -89,10 +89,10 @@ def long_division(r: Routine, a: Real, b: Real) -> Real:
         step = select(remaining < 11, remaining, 11)
         rest.value = (rest.value << step).unsigned_remainder(divisor)
         left.value = remaining - step
-    # rest 2**unit, exact: a multiple of the smallest number, times a power of two in two halves
+    # rest 2**unit, exactly: a multiple of the smallest subnormal number, times a power of two in two halves
     power = unit - 1
     half = power >> 1
-    return rest.value.to_real() * _SMALLEST * _power_of_two(half) * _power_of_two(power - half)
+    return rest.value.to_real() * _MIN_SUBNORMAL * _power_of_two(half) * _power_of_two(power - half)
 
 
 def _mantissa_and_exponent(x: Real) -> tuple[Integer, Integer]:

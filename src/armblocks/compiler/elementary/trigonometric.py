@@ -2,8 +2,9 @@
 
 The argument is reduced to ``|r| <= pi/4`` by subtracting ``k pi/2`` in three parts with fused multiply-adds
 (Cody and Waite). The first difference is exact, and the rounding error of the second is kept beside ``r``.
-This is valid up to ``|x| = 2**31``. Larger angles are multiplied by those bits of ``2/pi`` that matter (Payne
-and Hanek 1983), in one lane; a block of samples with such an angle is evaluated again with one lane.
+This is valid up to ``|x| = 2**31``. Larger angles are multiplied by the bits of ``2/pi`` that affect the
+result (Payne and Hanek 1983), in one lane. A block of samples with such an angle is evaluated again with one
+lane.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from armblocks.compiler.program_text import add_program
 from armblocks.routines.routine import Program, Routine, external
 from armblocks.routines.values import Boolean, Integer, Real
 
-_MODERATE = 2.0**31
+_MAX_MODERATE_ANGLE = 2.0**31
 _SIGN_BIT = 1 << 63
 _HUGE = "armblocks_reduce_huge_angle"
 _REDUCTION = "armblocks_reduce_angle"
@@ -73,9 +74,9 @@ def tangent(body: Body, x: str) -> str:
     denominator, denominator_rest = body.select(odd, sine, cosine), body.select(odd, sine_rest, cosine_rest)
     quotient = body.divide(numerator, denominator)
     minus = body.negate(quotient)
-    left = body.fma(minus, denominator, numerator)
-    left = body.add(left, body.fma(minus, denominator_rest, numerator_rest))
-    result = body.add(quotient, body.divide(left, denominator))
+    residual = body.fma(minus, denominator, numerator)
+    residual = body.add(residual, body.fma(minus, denominator_rest, numerator_rest))
+    result = body.add(quotient, body.divide(residual, denominator))
     flipped = body.word_op("shl", reduced.quarter, body.integer(63))
     return _signed(body, result, body.word_op("xor", flipped, _sign_of(body, x)))
 
@@ -88,7 +89,7 @@ def _reduce(body: Body, magnitude: str) -> _Reduced:
     rest = body.fma(count, body.number(-HALF_PI[1]), body.subtract(first, angle))
     rest = body.fma(count, body.number(-HALF_PI[2]), rest)
     quarter = body.bits(rounded)
-    huge = body.compare("ogt", magnitude, body.number(_MODERATE))
+    huge = body.compare("ogt", magnitude, body.number(_MAX_MODERATE_ANGLE))
     if body.lanes > 1:
         body.mark_undecided(huge)
         return _Reduced(angle, rest, quarter)
@@ -100,7 +101,7 @@ def _reduce(body: Body, magnitude: str) -> _Reduced:
 
 
 def _define_reduction(module: Module) -> None:
-    """Add a function that selects the usual reduction or that of huge angles."""
+    """Add a function that selects the reduction of moderate or of huge angles."""
 
     def reduction(
         r: Routine, magnitude: Real, huge: Boolean, angle: Real, rest: Real, quarter: Integer
@@ -128,8 +129,8 @@ def _sine_parts(body: Body, reduced: _Reduced, squared: str) -> tuple[str, str]:
 
 def _cosine_parts(body: Body, reduced: _Reduced, squared: str) -> tuple[str, str]:
     factor = body.fma(squared, body.polynomial(squared, COSINE), body.number(-0.5))
-    slope = body.negate(body.multiply(reduced.angle, reduced.rest))
-    return body.number(1.0), body.fma(squared, factor, slope)
+    first_order = body.negate(body.multiply(reduced.angle, reduced.rest))
+    return body.number(1.0), body.fma(squared, factor, first_order)
 
 
 def _is_odd(body: Body, quarter: str) -> str:
@@ -197,13 +198,15 @@ def _huge_text(module: Module) -> str:
     negative = body.word_op("ashr", upper, "63")
     quarter = body.word_op("sub", body.word_op("lshr", high, "62"), negative)
     upper, lower = body.word_op("xor", upper, negative), body.word_op("xor", lower, negative)
-    turn, rest = _sum_of_words(body, upper, lower)
-    angle, error = body.two_product(turn, body.number(HALF_PI[0]))
-    error = body.fma(turn, body.number(HALF_PI[1]), body.fma(rest, body.number(HALF_PI[0]), error))
+    fraction_of_quarter, rest = _sum_of_words(body, upper, lower)
+    angle, error = body.two_product(fraction_of_quarter, body.number(HALF_PI[0]))
+    error = body.fma(
+        fraction_of_quarter, body.number(HALF_PI[1]), body.fma(rest, body.number(HALF_PI[0]), error)
+    )
     angle, error = body.fast_two_sum(angle, error)
     sign = body.word_op("and", negative, str(-(1 << 63)))
-    endless = body.compare("oeq", "%x", body.number(float("inf")))
-    angle = body.select(endless, body.number(float("nan")), _signed(body, angle, sign))
+    infinite = body.compare("oeq", "%x", body.number(float("inf")))
+    angle = body.select(infinite, body.number(float("nan")), _signed(body, angle, sign))
     error = _signed(body, error, sign)
     value = body.let(f"insertvalue {_PARTS} poison, double {angle}, 0")
     value = body.let(f"insertvalue {_PARTS} {value}, double {error}, 1")
@@ -236,14 +239,14 @@ def _low_192_bits(body: Body, factor: str, words: list[str]) -> tuple[str, str, 
 
 def _sum_of_words(body: Body, upper: str, lower: str) -> tuple[str, str]:
     """``(upper 2**64 + lower) / 2**128`` as an unevaluated pair of doubles."""
-    pieces: list[str] = []
+    parts: list[str] = []
     for word, exponent in ((upper, -32), (lower, -96)):
         for part, scale in (
             (body.word_op("lshr", word, "32"), 2.0**exponent),
             (body.word_op("and", word, str((1 << 32) - 1)), 2.0 ** (exponent - 32)),
         ):
             number = body.let(f"uitofp i64 {part} to double")
-            pieces.append(body.multiply(number, body.number(scale)))
-    total, error = body.fast_two_sum(pieces[0], pieces[1])
-    total, second_error = body.two_sum(total, pieces[2])
-    return body.fast_two_sum(total, body.add(body.add(error, second_error), pieces[3]))
+            parts.append(body.multiply(number, body.number(scale)))
+    total, error = body.fast_two_sum(parts[0], parts[1])
+    total, second_error = body.two_sum(total, parts[2])
+    return body.fast_two_sum(total, body.add(body.add(error, second_error), parts[3]))

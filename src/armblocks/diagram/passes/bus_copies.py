@@ -1,4 +1,4 @@
-"""Pass: a block that passes signals on unchanged is copied for each signal of a bus.
+"""Pass: a block that selects, delays or holds signals is copied for each signal of a bus.
 
 A Switch between two buses selects each pair of their signals; a Unit Delay delays each signal. The elements
 of a bus are propagated along the connections from Bus Creators and commented blocks; in a loop through a
@@ -6,9 +6,9 @@ delay they come from the bus that enters the loop.
 
 Input: blocks with ``bus_inputs`` that may receive buses; replacements for all virtual blocks.
 
-Result: in place of each such block with a bus a copy for every signal, such as ``switch.motor.speed``. All
+Result: each block with a bus at an input is copied for every signal, such as ``switch.motor.speed``. All
 copies share the parameters of the original (``Diagram.shares``). The original becomes virtual: each of its
-bus inputs selects the signals for the copies, each output is the bus of the copies' outputs.
+bus inputs selects the signals for the copies, and each output is the bus of the copies' outputs.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from armblocks.errors import DiagramError
 
 
 def copy_for_buses(net: Netlist) -> Netlist:
-    """The netlist with a copy of every block with a bus for each signal of the bus.
+    """The netlist in which every block with a bus at an input is copied for each signal of the bus.
 
     The replacements of the originals raise ``DiagramError`` where the buses at two inputs differ.
     """
@@ -45,8 +45,8 @@ def copy_for_buses(net: Netlist) -> Netlist:
             if path in net.gates:
                 gates[copy] = net.gates[path]
             for port, source in original.sources.items():
-                alone = port in original.block.bus_inputs()
-                drivers[PortRef(copy, port)] = PortRef(path, f"{port}.{element}") if alone else source
+                per_signal = port in original.block.bus_inputs()
+                drivers[PortRef(copy, port)] = PortRef(path, f"{port}.{element}") if per_signal else source
     blocks |= {path: original.block for path, original in copied.items()}
     resolved = net.with_replaced({path: original.replacements() for path, original in copied.items()})
     return dataclasses.replace(
@@ -55,7 +55,7 @@ def copy_for_buses(net: Netlist) -> Netlist:
 
 
 def _copied(net: Netlist) -> dict[str, _CopiedBlock]:
-    """All blocks with a bus input that are copied for each signal."""
+    """The blocks that receive a bus, by path, with the structure of the bus."""
     copied: dict[str, _CopiedBlock] = {}
     replaced = dict(net.replaced)
     contents = Contents(replaced, net.where)
@@ -88,12 +88,12 @@ def _copied(net: Netlist) -> dict[str, _CopiedBlock]:
 
 @dataclass(frozen=True, kw_only=True)
 class _CopiedBlock:
-    """A block with bus inputs, and the paths of the signals, in the order of its first bus input."""
+    """A block with a bus at an input; it is copied for each signal of this bus."""
 
     path: str
     block: Block
     structure_input: str
-    """The input that determines the elements."""
+    """The first input that receives a bus; it determines the elements."""
     structure: Bus
     """The bus at this input."""
     sources: dict[str, PortRef]
@@ -145,10 +145,10 @@ class _CopiedBlock:
         )
 
 
-def _renamed(bus: Bus, above: str, source: Callable[[str], PortRef]) -> Bus:
+def _renamed(bus: Bus, prefix: str, source: Callable[[str], PortRef]) -> Bus:
     elements: dict[str, Carried] = {}
     for name, carried in bus.elements.items():
-        path = f"{above}{name}"
+        path = f"{prefix}{name}"
         inner = isinstance(carried, Bus)
         elements[name] = _renamed(carried, f"{path}.", source) if inner else source(path)
     return Bus(elements)

@@ -31,7 +31,7 @@ def resolve_buses(net: Netlist) -> Netlist:
                 where = net.label(path)
                 names = (port.name for port in block.output_ports())
                 contents = {
-                    name: _selection(where, wanted) for name, wanted in zip(names, listed(block.elements))
+                    name: _selection(where, element) for name, element in zip(names, listed(block.elements))
                 }
             case BusAssignment():
                 contents = {"bus": _assignment(net.label(path), listed(block.elements))}

@@ -1,9 +1,9 @@
-"""Pass: commented blocks are replaced by zeros or by wires.
+"""Pass: commented blocks are replaced by zeros or by connections.
 
 Input: the outermost commented blocks (``Netlist.commented``), and the signals of the model without comments.
 
-Result: for a block that is commented out zeros with the shapes that its outputs have without comments; for
-one that is commented through replacements of its outputs by the signals at its inputs. The blocks inside a
+Result: zeros replace a block that is commented out, with the shapes that its outputs have without comments.
+For a block that is commented through, the signals at its inputs replace its outputs. The blocks inside a
 commented subsystem are removed."""
 
 from __future__ import annotations
@@ -25,8 +25,7 @@ from armblocks.errors import DiagramError
 def resolve_comments(net: Netlist) -> Netlist:
     """The netlist without commented blocks.
 
-    Raises ``DiagramError`` for a block that is commented through although the shapes of an input and of its
-    output differ.
+    Raises ``DiagramError`` for a block that is commented through whose input and output differ in shape.
     """
     if not net.commented:
         return net
@@ -79,7 +78,7 @@ class _Comments:
             return
         self.blocks[path] = Bypass.of((), tuple(contents))
         self.replaced[path] = {
-            port.name: Replacement((), _always(self._zeros(path, port, contents[port.name])))
+            port.name: Replacement((), _constant_content(self._zeros(path, port, contents[port.name])))
             for port in ports
         }
 
@@ -101,12 +100,13 @@ class _Comments:
     def _shape(self, path: str, port: Port) -> Shape:
         """The shape of an output without comments.
 
-        If that model has an error, it is the shape of an input that the output drives, or a scalar.
+        If the model without comments has an error, this is the shape of an input that the output drives, or a
+        scalar.
         """
         ref = PortRef(path, port.name)
-        stated = port.shape if port.shape is not None else self.known.shape(ref)
-        if stated is not None:
-            return stated
+        declared = port.shape if port.shape is not None else self.known.shape(ref)
+        if declared is not None:
+            return declared
         input_shapes = (
             entry.shape
             for target, source in self.net.drivers.items()
@@ -117,22 +117,22 @@ class _Comments:
         return next(input_shapes, ())
 
     def pass_through(self, path: str) -> None:
-        """Replace a block by wires from its inputs to its outputs."""
+        """Replace a block by connections from its inputs to its outputs."""
         block, net = self.net.blocks[path], self.net
-        wires = passed_ports(block)
-        for into, out in wires:
+        pairs = passed_ports(block)
+        for into, out in pairs:
             self._check_equal(path, into, out)
-        self.blocks[path] = Bypass.of([into for into, _ in wires], [out for _, out in wires])
-        self.replaced[path] = {out: Replacement((net.drivers[PortRef(path, into)],)) for into, out in wires}
+        self.blocks[path] = Bypass.of([into for into, _ in pairs], [out for _, out in pairs])
+        self.replaced[path] = {out: Replacement((net.drivers[PortRef(path, into)],)) for into, out in pairs}
 
     def _check_equal(self, path: str, into: str, out: str) -> None:
         driver = self.net.drivers[PortRef(path, into)]
-        before = _described(self.known, self.known.at(driver))
-        after = _described(self.known, self.known.at(PortRef(path, out)))
-        if before is not None and after is not None and not _agree(before, after):
+        before = _description_of(self.known, self.known.at(driver))
+        after = _description_of(self.known, self.known.at(PortRef(path, out)))
+        if before is not None and after is not None and not _shapes_fit(before, after):
             raise DiagramError(
-                f"the block is commented through, but its input '{into}' is {_words(before)} "
-                f"and its output '{out}' is {_words(after)}",
+                f"the block is commented through, but its input '{into}' is {_text(before)} "
+                f"and its output '{out}' is {_text(after)}",
                 where=self.net.label(path),
                 allowed="an input and an output of the same shape",
                 fix="comment the block out, or remove the comment",
@@ -143,13 +143,13 @@ _Description = Shape | dict[str, Shape | None]
 """The shape of a signal, or the shapes of the elements of a bus."""
 
 
-def _described(known: KnownSignals, carried: Carried) -> _Description | None:
+def _description_of(known: KnownSignals, carried: Carried) -> _Description | None:
     if isinstance(carried, PortRef):
         return known.shapes.get(carried)
     return {element: known.shapes.get(source) for element, source in carried.leaves()}
 
 
-def _agree(one: _Description, other: _Description) -> bool:
+def _shapes_fit(one: _Description, other: _Description) -> bool:
     if isinstance(one, dict) and isinstance(other, dict):
         return one.keys() == other.keys() and all(
             first is None or second is None or shapes_agree(first, second)
@@ -158,11 +158,11 @@ def _agree(one: _Description, other: _Description) -> bool:
     return not isinstance(one, dict) and not isinstance(other, dict) and shapes_agree(one, other)
 
 
-def _words(description: _Description) -> str:
+def _text(description: _Description) -> str:
     return (
         f"a bus with {', '.join(description)}" if isinstance(description, dict) else f"of shape {description}"
     )
 
 
-def _always(carried: Carried) -> Callable[[Sequence[Carried]], Carried]:
+def _constant_content(carried: Carried) -> Callable[[Sequence[Carried]], Carried]:
     return lambda _: carried

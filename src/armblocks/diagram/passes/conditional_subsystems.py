@@ -1,9 +1,9 @@
-"""Pass: conditional subsystems become plain ones with gated blocks.
+"""Pass: conditional subsystems become plain subsystems with gated blocks.
 
 Input: subsystems that are enabled, triggered, resettable, or activated by an If or Switch Case block.
 
-Result: the control blocks that compute when such a subsystem is active (``diagram.controls``), named after
-its control ports; the gates of the blocks inside; blocks that hold the outputs in place of its Out blocks.
+Result: control blocks (``diagram.controls``), named after the control ports, that compute when a subsystem is
+active; gates for the blocks inside; blocks that hold the outputs, in place of the Out blocks.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from armblocks.errors import DiagramError
 def resolve_conditional_subsystems(net: Netlist) -> Netlist:
     """The netlist with control blocks, gates and held outputs.
 
-    Raises ``DiagramError`` for a conditional subsystem inside a triggered one.
+    Raises ``DiagramError`` for a conditional subsystem inside a triggered subsystem.
     """
     if not any(isinstance(net.blocks[level], Conditional) for level in net.levels if level):
         return net
@@ -65,7 +65,7 @@ class _Controls:
         self.gate_of: dict[str, Gate] = {"": {}}
 
     def resolve(self, level: str) -> None:
-        """The gate of the blocks of a level, and the control blocks of a conditional level."""
+        """Add the gate of the blocks of a level, and the control blocks of a conditional level."""
         outer, block = self.gate_of[level_of(level)], self.blocks[level]
         if not isinstance(block, Conditional):
             self.gate_of[level] = outer
@@ -74,7 +74,7 @@ class _Controls:
             raise DiagramError(
                 "a conditional subsystem is inside a triggered one",
                 where=f"block '{level}' ({block.title})",
-                allowed="conditional subsystems inside plain, enabled, action and resettable ones",
+                allowed="conditional subsystems inside plain, enabled, action and resettable subsystems",
                 fix="put the condition outside, as the trigger or the enable signal",
             )
         match block:
@@ -95,7 +95,7 @@ class _Controls:
 
     def _enabled(self, level: str, port: str, outer: Gate, *, restarts: bool) -> Gate:
         control = self._enable(level, port, outer, restarts=restarts)
-        self._hold(level, PortRef(control, "works"), outer, fires=False)
+        self._hold(level, PortRef(control, "works"), outer, pulsed=False)
         gate = {ON: PortRef(control, "on")}
         if restarts or RESTART in outer:
             gate[RESTART] = PortRef(control, "restart")
@@ -103,19 +103,19 @@ class _Controls:
 
     def _triggered(self, level: str, outer: Gate, edge: str, trigger_gate: Gate) -> Gate:
         control = self._trigger(level, "trigger", trigger_gate, edge)
-        fires = PortRef(control, "fire")
-        self._hold(level, fires, outer, fires=True)
-        gate = {FIRE: fires, ELAPSED: PortRef(control, "elapsed")}
+        fire = PortRef(control, "fire")
+        self._hold(level, fire, outer, pulsed=True)
+        gate = {FIRE: fire, ELAPSED: PortRef(control, "elapsed")}
         if RESTART in outer:
             gate[RESTART] = outer[RESTART]
         return gate
 
     def _enable(self, level: str, port: str, outer: Gate, *, restarts: bool) -> str:
-        block = EnableControl(outer=ON in outer, anew=RESTART in outer, restarts=restarts)
+        block = EnableControl(outer=ON in outer, resettable=RESTART in outer, restarts=restarts)
         return self._add(level, port, block, outer)
 
     def _trigger(self, level: str, port: str, outer: Gate, edge: str) -> str:
-        block = TriggerControl(outer=ON in outer, anew=RESTART in outer, edge=edge)
+        block = TriggerControl(outer=ON in outer, resettable=RESTART in outer, edge=edge)
         return self._add(level, port, block, outer)
 
     def _add(self, level: str, port: str, block: Block, outer: Gate) -> str:
@@ -125,22 +125,22 @@ class _Controls:
         self.drivers[PortRef(path, "u")] = self.drivers[PortRef(level, port)]
         if ON in outer:
             self.drivers[PortRef(path, "outer")] = outer[ON]
-        self._take_reset(path, outer)
+        self._connect_reset(path, outer)
         return path
 
-    def _hold(self, level: str, works: PortRef, outer: Gate, *, fires: bool) -> None:
+    def _hold(self, level: str, active: PortRef, outer: Gate, *, pulsed: bool) -> None:
         """Replace the Out blocks by outputs that hold their values while the subsystem is inactive."""
         for name, block in self.levels[level].blocks.items():
             if isinstance(block, Outport):
                 path = joined(level, name)
                 self.blocks[path] = HeldOutput(
-                    anew=RESTART in outer, fires=fires, when_off=block.when_off, initial=block.initial
+                    resettable=RESTART in outer, pulsed=pulsed, when_off=block.when_off, initial=block.initial
                 )
-                self.drivers[PortRef(path, "works")] = works
-                self._take_reset(path, outer)
+                self.drivers[PortRef(path, "works")] = active
+                self._connect_reset(path, outer)
                 self.held.add(path)
 
-    def _take_reset(self, path: str, outer: Gate) -> None:
-        """Connect the resets of the subsystem around a control."""
+    def _connect_reset(self, path: str, outer: Gate) -> None:
+        """Connect the reset of the enclosing subsystem to a control or held output."""
         if RESTART in outer:
             self.drivers[PortRef(path, "anew")] = outer[RESTART]

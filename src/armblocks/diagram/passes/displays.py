@@ -2,8 +2,8 @@
 
 Input: the contents of all ports.
 
-Result: the views (``Netlist.views``), by path. Displays with a bus at an input become virtual, because their
-views read the signals themselves.
+Result: the views (``Netlist.views``), by path. Displays with a bus at an input become virtual: their views
+read the signals of the bus directly.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Pass: Merge blocks become blocks that follow the outputs of conditional subsystems.
+"""Pass: Merge blocks become blocks that select the outputs of active conditional subsystems.
 
 Input: Merge blocks whose inputs are held outputs of conditional subsystems.
 
@@ -31,23 +31,23 @@ def resolve_merges(net: Netlist) -> Netlist:
     carried = dict(net.carried)
     for path, block in merges.items():
         outer: Gate = gates.pop(path, {})
-        anew = RESTART in outer
-        blocks[path] = MergedOutput(anew=anew, inputs=block.inputs, initial=block.initial)
-        if anew:
+        resettable = RESTART in outer
+        blocks[path] = MergedOutput(resettable=resettable, inputs=block.inputs, initial=block.initial)
+        if resettable:
             drivers[PortRef(path, "anew")] = outer[RESTART]
         for number in range(1, block.inputs + 1):
-            works = _works(net, path, f"u{number}")
-            if works is None:  # a subsystem that is commented out
+            active = _active_signal(net, path, f"u{number}")
+            if active is None:  # a subsystem that is commented out
                 inactive = f"{path}.works{number}"
                 blocks[inactive], origins[inactive] = Grounded.of({"y": ()}), path
-                works = carried[PortRef(inactive, "y")] = PortRef(inactive, "y")
-            drivers[PortRef(path, f"works{number}")] = works
+                active = carried[PortRef(inactive, "y")] = PortRef(inactive, "y")
+            drivers[PortRef(path, f"works{number}")] = active
     return dataclasses.replace(
         net, blocks=blocks, drivers=drivers, gates=gates, origins=origins, carried=carried
     )
 
 
-def _works(net: Netlist, path: str, port: str) -> PortRef | None:
+def _active_signal(net: Netlist, path: str, port: str) -> PortRef | None:
     """The signal that is 1 while the subsystem of an input is active; ``None`` if it never is."""
     carried = net.at(path, port)
     if isinstance(carried, PortRef) and isinstance(net.blocks[carried.block], Grounded):

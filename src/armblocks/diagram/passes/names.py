@@ -1,9 +1,9 @@
-"""Pass: the names that signals have in the hierarchy, and the shapes that it declares for them.
+"""Pass: the names of signals in the hierarchy, and the shapes that In and Out blocks declare.
 
 Input: the contents of all ports.
 
 Result: other names of signals (``Netlist.aliases``): input ports, ports of virtual blocks, elements of buses;
-and the signals at In and Out blocks with a declared shape (``Netlist.stated``).
+and the signals at In and Out blocks with a declared shape (``Netlist.declared_shapes``).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from armblocks.diagram.bus import Carried
 from armblocks.diagram.levels import level_of, name_of
 from armblocks.diagram.passes.netlist import Netlist
 from armblocks.diagram.port import PortRef
-from armblocks.diagram.structure import Inport, Outport, stated_shape
+from armblocks.diagram.structure import Inport, Outport, declared_shape
 from armblocks.equations import Shape
 
 
@@ -23,7 +23,7 @@ def resolve_names(net: Netlist) -> Netlist:
 
     Raises ``DiagramError`` for a bus at an In or Out block with a declared shape.
     """
-    return dataclasses.replace(net, aliases=_aliases(net), stated=_stated(net))
+    return dataclasses.replace(net, aliases=_aliases(net), declared_shapes=_declared_shapes(net))
 
 
 def _aliases(net: Netlist) -> dict[str, PortRef]:
@@ -51,14 +51,14 @@ def _aliases(net: Netlist) -> dict[str, PortRef]:
     return aliases
 
 
-def _stated(net: Netlist) -> dict[PortRef, tuple[PortRef, Shape]]:
-    stated: dict[PortRef, tuple[PortRef, Shape]] = {}
+def _declared_shapes(net: Netlist) -> dict[PortRef, tuple[PortRef, Shape]]:
+    declared: dict[PortRef, tuple[PortRef, Shape]] = {}
     for path, block in net.blocks.items():
         if path not in net.replaced or not isinstance(block, Inport | Outport):
             continue
-        shape = stated_shape(block)
+        shape = declared_shape(block)
         if shape is not None:
             inside = isinstance(block, Inport)
             target = PortRef(level_of(path), name_of(path)) if inside else PortRef(path, "u")
-            stated[target] = (net.one_signal(target.block, target.port), shape)
-    return stated
+            declared[target] = (net.one_signal(target.block, target.port), shape)
+    return declared

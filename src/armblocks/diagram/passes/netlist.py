@@ -1,8 +1,8 @@
 """The netlist: all blocks of a hierarchy and the connections of their ports, the form that passes transform.
 
-A netlist begins as a copy of the hierarchy: the blocks of all levels by path, virtual ones included, and the
-connections of all levels. A pass resolves one kind of virtual block: it gives a *replacement* for each output
-port of such a block: the contents of the port. The last pass removes all replaced blocks.
+A netlist begins as a copy of the hierarchy: the blocks of all levels by path, including virtual blocks, and
+the connections of all levels. A pass resolves one kind of virtual block. It adds a *replacement* for each
+output port of these blocks: a rule for the contents of the port. The last pass removes all replaced blocks.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ def _first(contents: Sequence[Carried]) -> Carried:
 class Replacement:
     """The contents of an output port of a virtual block.
 
-    ``sources`` are output ports; ``content`` computes a signal or bus from their contents. By default it
-    returns that of the first source.
+    ``sources`` are output ports; ``content`` computes a signal or bus from their contents. By default,
+    this is the content of the first source.
     """
 
     sources: tuple[PortRef, ...]
@@ -42,7 +42,7 @@ Replacements = Mapping[str, Replacement]
 
 @dataclass(frozen=True, kw_only=True)
 class KnownSignals:
-    """Contents and shapes of the signals of the model without comments, as far as they are known."""
+    """Known contents and shapes of the signals in the model without comments."""
 
     carried: Mapping[PortRef, Carried] = field(default_factory=dict[PortRef, Carried])
     shapes: Mapping[PortRef, Shape] = field(default_factory=dict[PortRef, Shape])
@@ -59,10 +59,10 @@ class KnownSignals:
 
 @dataclass(frozen=True, kw_only=True)
 class Netlist:
-    """Blocks by path and their connections, in any state between the hierarchy and the flat diagram.
+    """Blocks by path and their connections, before, between or after the passes.
 
-    Paths are those of the user's hierarchy. A block that a pass adds is named after the block that it comes
-    from, and ``origins`` names that one.
+    Paths are those of the user's hierarchy. A block that a pass adds is named after a block of the
+    hierarchy, its origin; ``origins`` has the path of the origin.
     """
 
     top: Diagram
@@ -82,16 +82,16 @@ class Netlist:
     gates: Mapping[str, Gate] = field(default_factory=dict[str, Gate])
     """Hidden inputs of blocks in conditional subsystems: see ``Diagram.gates``."""
     shares: Mapping[str, str] = field(default_factory=dict[str, str])
-    """Blocks that share the parameters of another one: see ``Diagram.shares``."""
+    """Blocks that share the parameters of another block: see ``Diagram.shares``."""
     origins: Mapping[str, str] = field(default_factory=dict[str, str])
-    """For every block that a pass has added, the path of the block of the hierarchy that it comes from."""
+    """For every block that a pass has added, the path of its origin in the hierarchy."""
     carried: Mapping[PortRef, Carried] = field(default_factory=dict[PortRef, Carried])
     """The signal or bus at every output port; empty before the pass ``signals``."""
     views: tuple[tuple[str, View], ...] = ()
     """The views, each with its block; empty before the pass ``displays``."""
     aliases: Mapping[str, PortRef] = field(default_factory=dict[str, PortRef])
     """Other names of signals; empty before the pass ``names``."""
-    stated: Mapping[PortRef, tuple[PortRef, Shape]] = field(
+    declared_shapes: Mapping[PortRef, tuple[PortRef, Shape]] = field(
         default_factory=dict[PortRef, tuple[PortRef, Shape]]
     )
     """Signals at ports with a declared shape; empty before the pass ``names``."""
@@ -116,7 +116,7 @@ class Netlist:
         return f"block '{path}' ({self.blocks[path].title})"
 
     def with_replaced(self, replaced: Mapping[str, Replacements]) -> Netlist:
-        """A netlist in which these blocks are replaced, too."""
+        """A copy of the netlist with replacements for further blocks."""
         return dataclasses.replace(self, replaced={**self.replaced, **replaced})
 
     def at(self, path: str, port: str) -> Carried:
@@ -141,7 +141,7 @@ def netlist(
     commented: Mapping[str, str] | None = None,
     without_comments: KnownSignals | None = None,
 ) -> Netlist:
-    """The netlist of a hierarchy before all passes; ``levels`` has the top first."""
+    """The netlist of a hierarchy before all passes; the first of ``levels`` is the top."""
     blocks: dict[str, Block] = {}
     drivers: dict[PortRef, PortRef] = {}
     for level, diagram in levels.items():

@@ -1,8 +1,8 @@
 """The passes that make a hierarchy flat, in their order.
 
 A pass is a function from a :class:`~armblocks.diagram.passes.netlist.Netlist` to a netlist, in a separate
-file, whose docstring names the input and the result of the pass. A new pass is such a file and an entry of
-``PASSES``. Each kind of virtual block is resolved by one pass, which gives replacements for its output ports.
+file, whose docstring names the input and the result of the pass. A new pass needs a file and an entry in
+``PASSES``. One pass resolves each kind of virtual block and adds replacements for its output ports.
 A pass that reads signals comes after ``resolve_signals``.
 """
 

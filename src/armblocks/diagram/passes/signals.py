@@ -2,9 +2,9 @@
 
 Input: replacements for the output ports of all virtual blocks.
 
-Result: the signal or bus at every output port (``Netlist.carried``); and every input port with a single
-signal driven by the block that computes it. A port with a bus is driven by the virtual block that makes the
-bus."""
+Result: the signal or bus at every output port (``Netlist.carried``); the
+driver of every input port with a single signal is the block that computes the signal. The driver of an input
+port with a bus is the virtual block that creates the bus."""
 
 from __future__ import annotations
 

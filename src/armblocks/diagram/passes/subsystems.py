@@ -2,8 +2,8 @@
 
 Input: subsystems, In and Out blocks; conditional subsystems have held outputs in place of their Out blocks.
 
-Result: replacements: an In block has the contents of the driver of the subsystem's input; an output of a
-subsystem has those of the input of its Out block, or the held output.
+Result: replacements. An In block has the contents of the driver of the subsystem's input. An output of a
+subsystem has the contents of its Out block's input, or of the held output.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from armblocks.diagram.structure import DiagramBlock, Inport, Outport
 
 
 def resolve_subsystems(net: Netlist) -> Netlist:
-    """The netlist with replacements for all subsystems and their ends; those of the top level stay."""
+    """The netlist with replacements for subsystems and for In and Out blocks below the top level."""
     replaced: dict[str, Replacements] = {}
     for path, block in net.blocks.items():
         level = level_of(path)
@@ -29,6 +29,7 @@ def resolve_subsystems(net: Netlist) -> Netlist:
 
 
 def _output(net: Netlist, subsystem: str, port: str) -> Replacement:
-    end = joined(subsystem, port)
-    source = net.drivers[PortRef(end, "u")] if isinstance(net.blocks[end], Outport) else PortRef(end, "y")
-    return Replacement((source,))
+    inner_block = joined(subsystem, port)
+    if isinstance(net.blocks[inner_block], Outport):
+        return Replacement((net.drivers[PortRef(inner_block, "u")],))
+    return Replacement((PortRef(inner_block, "y"),))

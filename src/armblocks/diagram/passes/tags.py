@@ -2,7 +2,7 @@
 
 Input: Goto and From blocks.
 
-Result: replacements: a From has the contents of the input of the nearest visible Goto with its tag.
+Result: replacements. A From has the contents of the input of the nearest visible Goto with its tag.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class _Tags:
             if not isinstance(block, Goto):
                 continue
             level = "" if block.visibility == "global" else level_of(path)
-            # Local and scoped tags of one diagram look the same to a reader.
+            # A reader of a diagram cannot distinguish local and scoped Goto blocks of one tag.
             scopes = [(level, block.tag, block.visibility)]
             if block.visibility != "global":
                 scopes.append((level, block.tag, "scoped" if block.visibility == "local" else "local"))
@@ -54,7 +54,7 @@ class _Tags:
             self._known[scopes[0]] = path
 
     def goto(self, path: str, block: From) -> str:
-        """The path of the Goto of a From: the nearest visible one."""
+        """The path of the nearest visible Goto with the tag of a From."""
         level = level_of(path)
         nearest = self._known.get((level, block.tag, "local"))
         outer = level
@@ -66,7 +66,11 @@ class _Tags:
         nearest = nearest or self._known.get(("", block.tag, "global"))
         if nearest is None:
             visible = sorted(
-                {tag for goto_level, tag, sight in self._known if self._sees(level, goto_level, sight)}
+                {
+                    tag
+                    for goto_level, tag, visibility in self._known
+                    if self._is_visible(level, goto_level, visibility)
+                }
             )
             hidden = [goto for (_, tag, _), goto in self._known.items() if tag == block.tag]
             raise DiagramError(
@@ -77,7 +81,7 @@ class _Tags:
             )
         return nearest
 
-    def _sees(self, level: str, goto_level: str, visibility: str) -> bool:
+    def _is_visible(self, level: str, goto_level: str, visibility: str) -> bool:
         if visibility == "local":
             return level == goto_level
         return (

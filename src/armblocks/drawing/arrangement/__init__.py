@@ -16,4 +16,4 @@ structures*, 1981, with lines that reverse their direction as in Sander's *Graph
 through the VCG tool*, 1994.
 """
 
-from armblocks.drawing.arrangement.arranged import arranged_boxes as arranged_boxes
+from armblocks.drawing.arrangement.boxes import arranged_boxes as arranged_boxes

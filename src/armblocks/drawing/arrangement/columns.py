@@ -18,26 +18,26 @@ _PASSES = 4
 _MAX_PATHS = 40
 _SINK_BONUS = 1000.0
 """Value of a path that ends at a sink, in blocks."""
-_FURTHER_TERM = 1.4
+_FURTHER_TERM_PENALTY = 1.4
 """Reduction of the value of a path that does not enter a sum by its first port, in blocks."""
-_ABOVE, _BELOW = -0.3, 0.3
-"""Heights of the ports of a round sum relative to its middle, as a share of its height."""
+_UPPER_PORT, _LOWER_PORT = -0.3, 0.3
+"""Heights of the ports of a round sum relative to its middle, as a fraction of its height."""
 
 
 @dataclass(frozen=True)
 class End:
     """An end of a line: the node, whether it is on the node's right side, and the height of the port.
 
-    ``share``: height relative to the node's middle as a share of its height, less than 1/2 up or down.
+    ``relative_height``: height below the node's middle as a fraction of its height, between -1/2 and 1/2.
     """
 
     node: int
     right: bool
-    share: float
+    relative_height: float
     port: float
     """Height of the port below the upper edge, px."""
-    level: bool = True
-    """Whether the line may run straight into the port."""
+    can_be_straight: bool = True
+    """Whether the line may reach the port without a bend."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class Segment:
     b: End
 
     @property
-    def turns(self) -> bool:
+    def is_reversal(self) -> bool:
         """Whether the line reverses its direction: both ends are in one column."""
         return self.a.right == self.b.right
 
@@ -77,7 +77,7 @@ class Columns:
     """Mirrored blocks."""
 
 
-def in_columns(network: Network, flow: Flow, exchanged: frozenset[int] = frozenset()) -> Columns:
+def assign_columns(network: Network, flow: Flow, exchanged: frozenset[int] = frozenset()) -> Columns:
     """The columns of a connected network.
 
     ``exchanged``: round sums whose upper and lower lines are exchanged.
@@ -95,19 +95,19 @@ def _constraints(network: Network, flow: Flow) -> list[tuple[int, int, int]]:
         if source in local or target in local:
             continue
         if target in flow.mirrored:
-            pair, least = (target, source), int(source in flow.mirrored)
+            pair, min_columns = (target, source), int(source in flow.mirrored)
         elif source in flow.mirrored:
-            pair, least = (target, source), 1
+            pair, min_columns = (target, source), 1
         elif k in flow.cut:
             continue
         else:
-            pair, least = (source, target), 1
-        distances[pair] = max(distances.get(pair, 0), least)
-    return [(a, b, least) for (a, b), least in distances.items()]
+            pair, min_columns = (source, target), 1
+        distances[pair] = max(distances.get(pair, 0), min_columns)
+    return [(a, b, min_columns) for (a, b), min_columns in distances.items()]
 
 
 def _local_feedback(network: Network, flow: Flow) -> dict[int, int]:
-    """Maps each mirrored block that feeds one block's output back to that block's input to that block."""
+    """The mirrored blocks whose only source is also their only target, with the number of that block."""
     sources: dict[int, set[int]] = {}
     targets: dict[int, set[int]] = {}
     for link in network.links:
@@ -126,20 +126,20 @@ def _column_numbers(network: Network, flow: Flow) -> list[int]:
     rules = _constraints(network, flow)
     left: list[list[tuple[int, int]]] = [[] for _ in range(count)]
     right: list[list[tuple[int, int]]] = [[] for _ in range(count)]
-    for a, b, least in rules:
-        right[a].append((b, least))
-        left[b].append((a, least))
+    for a, b, min_columns in rules:
+        right[a].append((b, min_columns))
+        left[b].append((a, min_columns))
     order = forward_order(count, [Link(a, 0, b, 0, 0.0) for a, b, _ in rules])
     column = [0] * count
     for node in order:
-        column[node] = max((column[a] + least for a, least in left[node]), default=0)
+        column[node] = max((column[a] + min_columns for a, min_columns in left[node]), default=0)
     for _ in range(_PASSES):
         for node in reversed(order):
             if right[node] and len(right[node]) >= len(left[node]):
-                column[node] = min(column[b] - least for b, least in right[node])
+                column[node] = min(column[b] - min_columns for b, min_columns in right[node])
         for node in order:
             if len(left[node]) > len(right[node]):
-                column[node] = max(column[a] + least for a, least in left[node])
+                column[node] = max(column[a] + min_columns for a, min_columns in left[node])
     for node, partner in _local_feedback(network, flow).items():
         column[node] = column[partner]
     first = min(column, default=0)
@@ -168,7 +168,7 @@ def _paths(network: Network, flow: Flow) -> tuple[tuple[int, ...], ...]:
 def _best_path(
     network: Network, links: Sequence[Link], blocks: set[int], *, sink_bonus: float
 ) -> tuple[int, ...]:
-    """The longest path through ``blocks`` along the flow; of several branches, that through first ports.
+    """The longest path through ``blocks`` along the flow. Of several branches, first ports are preferred.
 
     ``sink_bonus``: value of a path that ends at a sink, in blocks.
     """
@@ -184,7 +184,7 @@ def _best_path(
         for link in leaving[node]:
             bonus = 0.4 * (link.input == 0) + 0.2 * (link.output == 0)
             if link.input and network.is_sum(link.target):
-                bonus -= _FURTHER_TERM
+                bonus -= _FURTHER_TERM_PENALTY
             value = best[link.target][0] + 1.0 + bonus
             if best[node][1] is None or value > best[node][0] + 1e-9:
                 best[node] = (value, link)
@@ -218,7 +218,9 @@ class _LineSplitter:
         self._nets: list[int] = []
         self._sides = _sum_ports(network, flow, paths, column)
         for node in exchanged:
-            self._sides[node] = {port: -share for port, share in self._sides[node].items()}
+            self._sides[node] = {
+                port: -relative_height for port, relative_height in self._sides[node].items()
+            }
 
     def columns(self) -> Columns:
         """All nodes and segments."""
@@ -255,17 +257,17 @@ class _LineSplitter:
             self._nets.append(net)
             return End(len(column) - 1, True, 0.0, 0.0)
 
-        def ahead(gap: int, target: int) -> End:
+        def forward_end(gap: int, target: int) -> End:
             """The left end of the segment in a gap. Lines to several targets have separate dummy nodes."""
             end = start
             for at in range(source_column + 1, gap + 1):
                 before, end = end, dummy(at)
                 if (source, target) in self._steps:
                     self._path[end.node] = self._steps[source, target]
-                self._join(net, at - 1, before, _on(end, right=False))
+                self._join(net, at - 1, before, _with_side(end, right=False))
             return end
 
-        def back(at: int) -> End:
+        def backward_end(at: int) -> End:
             """The dummy node of the line to the left in a column."""
             if at not in backward:
                 if source in mirrored and at == source_column:
@@ -275,9 +277,9 @@ class _LineSplitter:
                     backward[at] = dummy(at)
                     self._join(net, at, start, backward[at])
                 else:
-                    after = back(at + 1)
+                    after = backward_end(at + 1)
                     backward[at] = dummy(at)
-                    self._join(net, at, backward[at], _on(after, right=False))
+                    self._join(net, at, backward[at], _with_side(after, right=False))
             return backward[at]
 
         for link in links:
@@ -287,19 +289,21 @@ class _LineSplitter:
                 if target_column == source_column and source not in mirrored:
                     self._join(net, source_column, start, end)
                 else:
-                    self._join(net, target_column, end, _on(back(target_column + 1), right=False))
+                    self._join(
+                        net, target_column, end, _with_side(backward_end(target_column + 1), right=False)
+                    )
             elif source not in mirrored and target_column > source_column:
                 self._join(
                     net,
                     target_column - 1,
-                    ahead(target_column - 1, target),
+                    forward_end(target_column - 1, target),
                     self._end(target, False, link.input),
                 )
             else:
                 self._join(
                     net,
                     target_column - 1,
-                    _on(back(target_column), right=False),
+                    _with_side(backward_end(target_column), right=False),
                     self._end(target, False, link.input),
                 )
 
@@ -311,22 +315,22 @@ class _LineSplitter:
         box = self._network.boxes[block]
         port = (box.inputs if inputs else box.outputs)[number]
         if inputs and block in self._sides:
-            share = self._sides[block][number]
-            return End(block, right, share, box.height / 2, level=share == 0.0)
+            relative_height = self._sides[block][number]
+            return End(block, right, relative_height, box.height / 2, can_be_straight=relative_height == 0.0)
         if port.dy:
-            return End(block, right, -0.48, 0.0, level=False)
+            return End(block, right, -0.48, 0.0, can_be_straight=False)
         height = port.y - box.y
         return End(block, right, 0.9 * (height / box.height - 0.5), height)
 
 
-def _on(end: End, *, right: bool) -> End:
-    return End(end.node, right, end.share, end.port, end.level)
+def _with_side(end: End, *, right: bool) -> End:
+    return End(end.node, right, end.relative_height, end.port, end.can_be_straight)
 
 
 def _sum_ports(
     network: Network, flow: Flow, paths: Sequence[Sequence[int]], column: Sequence[int]
 ) -> dict[int, dict[int, float]]:
-    """Heights of the inputs of round sums: one from behind, feedback from below, others from above.
+    """Heights of the inputs of round sums: one at the rear side, feedback below, the others above.
 
     Of two feedback lines to one sum, the line over more columns comes from above.
     """
@@ -336,42 +340,42 @@ def _sum_ports(
             entering.setdefault(link.target, []).append((k, link))
     before = {after: node for path in paths for node, after in pairwise(path)}
     main = set(paths[0])
-    port_shares: dict[int, dict[int, float]] = {}
+    port_heights: dict[int, dict[int, float]] = {}
     for node, links in entering.items():
-        back = node in flow.mirrored
+        is_backward = node in flow.mirrored
 
-        def is_feedback(k: int, link: Link, back: bool = back) -> bool:
-            return not back and (k in flow.cut or link.source in flow.mirrored)
+        def is_feedback(k: int, link: Link, is_backward: bool = is_backward) -> bool:
+            return not is_backward and (k in flow.cut or link.source in flow.mirrored)
 
         links.sort(
             key=lambda entry: (
                 is_feedback(*entry),
                 before.get(entry[1].target) != entry[1].source,
-                back and entry[1].source not in flow.mirrored,
-                abs(column[entry[1].source] - column[node]) if not back else -column[entry[1].source],
+                is_backward and entry[1].source not in flow.mirrored,
+                abs(column[entry[1].source] - column[node]) if not is_backward else -column[entry[1].source],
                 entry[1].source in main,
                 network.is_minus(entry[1].target, entry[1].input),
                 entry[1].input,
             )
         )
-        shares = {links[0][1].input: 0.0}
+        heights = {links[0][1].input: 0.0}
         rest = sorted(links[1:], key=lambda entry: _length(network, entry[1], column))
-        used_shares: set[float] = set()
+        used_heights: set[float] = set()
         for k, link in rest:
             below = is_feedback(k, link)
-            share = _BELOW if below else _ABOVE
-            if share in used_shares:
-                share = -share
-            used_shares.add(share)
-            shares[link.input] = share
-        port_shares[node] = shares
-    return port_shares
+            relative_height = _LOWER_PORT if below else _UPPER_PORT
+            if relative_height in used_heights:
+                relative_height = -relative_height
+            used_heights.add(relative_height)
+            heights[link.input] = relative_height
+        port_heights[node] = heights
+    return port_heights
 
 
 def _length(network: Network, link: Link, column: Sequence[int]) -> tuple[int, int]:
-    """Number of columns that a feedback line spans, also through a mirrored block; then the port."""
-    far = column[link.source]
+    """Number of columns that a feedback line spans, including those through a mirrored block; the port."""
+    farthest = column[link.source]
     for other in network.links:
         if other.target == link.source:
-            far = max(far, column[other.source])
-    return abs(far - column[link.target]), link.input
+            farthest = max(farthest, column[other.source])
+    return abs(farthest - column[link.target]), link.input

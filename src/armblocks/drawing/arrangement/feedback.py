@@ -1,7 +1,8 @@
 """The signal flow of a diagram: the links that run backwards, and the blocks that are mirrored.
 
-A block is in the feedback path if all its output paths lead to backward links and if its inputs come from the
-loop that these links close. Such a block is mirrored: its inputs are on the right.
+A block is in the feedback path under two conditions: all its output paths lead to backward links, and its
+inputs come from the loop that these links close. Blocks in feedback paths are mirrored: their inputs are on
+the right.
 """
 
 from __future__ import annotations
@@ -24,28 +25,28 @@ class Flow:
 def signal_flow(network: Network) -> Flow:
     """The links at which the loops of a network are cut, and the blocks that are mirrored."""
     cut = cut_links(network)
-    return Flow(cut, _Feedback(network, cut).blocks())
+    return Flow(cut, _FeedbackBlocks(network, cut).blocks())
 
 
 def forward_order(count: int, links: Sequence[Link]) -> list[int]:
     """The blocks in an order in which every link runs forward; the links have no loops."""
     after: list[list[int]] = [[] for _ in range(count)]
-    waiting = [0] * count
+    open_inputs = [0] * count
     for link in links:
         after[link.source].append(link.target)
-        waiting[link.target] += 1
-    ready = [k for k in range(count) if not waiting[k]]
+        open_inputs[link.target] += 1
+    ready = [k for k in range(count) if not open_inputs[k]]
     order: list[int] = []
     for node in ready:
         order.append(node)
         for target in after[node]:
-            waiting[target] -= 1
-            if not waiting[target]:
+            open_inputs[target] -= 1
+            if not open_inputs[target]:
                 ready.append(target)
     return order
 
 
-class _Feedback:
+class _FeedbackBlocks:
     def __init__(self, network: Network, cut: frozenset[int]) -> None:
         self._network, self._links, self._cut = network, network.links, cut
         count = len(network.names)
@@ -55,31 +56,31 @@ class _Feedback:
         for k, link in enumerate(network.links):
             self._leaving[link.source].append(k)
             self._entering[link.target].append(k)
-        self._ahead = [0] * count
-        """Sets of the blocks that forward links lead to, as bits."""
+        self._reachable = [0] * count
+        """For each block the set of blocks that forward links lead to, as the bits of an integer."""
         for node in reversed(self._order):
             for k in self._leaving[node]:
                 if k not in cut:
                     target = network.links[k].target
-                    self._ahead[node] |= self._ahead[target] | 1 << target
+                    self._reachable[node] |= self._reachable[target] | 1 << target
 
     def blocks(self) -> frozenset[int]:
         """The blocks in feedback paths."""
         ends = sum(1 << end for end in self._ends())
-        chosen = {
+        candidates = {
             node
             for node in self._order
-            if not (self._ahead[node] | 1 << node) & ends
+            if not (self._reachable[node] | 1 << node) & ends
             and (self._entering[node] or self._network.may_be_mirrored(node))
         }
         while True:
-            goals = self._goals(chosen)
-            remaining = {node for node in chosen if self._belongs(node, goals)}
-            if remaining == chosen:
-                remaining = chosen - self._parallel_models(chosen)
-            if remaining == chosen:
-                return frozenset(chosen)
-            chosen = remaining
+            goals = self._goals(candidates)
+            remaining = {node for node in candidates if self._belongs(node, goals)}
+            if remaining == candidates:
+                remaining = candidates - self._parallel_models(candidates)
+            if remaining == candidates:
+                return frozenset(candidates)
+            candidates = remaining
 
     def _ends(self) -> list[int]:
         """The blocks to which the forward path leads: sinks, else integrators at the end of the path."""
@@ -90,14 +91,14 @@ class _Feedback:
         memory = self._network.memory()
         return [node for node in last if memory[node]] or last
 
-    def _goals(self, chosen: set[int]) -> dict[int, frozenset[int]]:
-        """For every chosen block, the targets of the backward links to which its paths lead.
+    def _goals(self, candidates: set[int]) -> dict[int, frozenset[int]]:
+        """For every candidate, the targets of the backward links to which its paths lead.
 
-        -1: a block that is not chosen.
+        -1: a block that is not a candidate.
         """
         goals: dict[int, frozenset[int]] = {}
         for node in reversed(self._order):
-            if node in chosen:
+            if node in candidates:
                 targets: set[int] = set()
                 for k in self._leaving[node]:
                     target = self._links[k].target
@@ -118,23 +119,23 @@ class _Feedback:
             is_local = len(self._entering[node]) == 1 and goals[node] == frozenset([source])
             if is_local and all(link in self._cut for link in self._leaving[node]):
                 continue
-            if not all(self._ahead[goal] >> source & 1 for goal in goals[node]):
+            if not all(self._reachable[goal] >> source & 1 for goal in goals[node]):
                 return False
         return True
 
-    def _parallel_models(self, chosen: set[int]) -> set[int]:
+    def _parallel_models(self, candidates: set[int]) -> set[int]:
         """Models parallel to the forward path, and the blocks that compare their outputs with the path."""
         memory = self._network.memory()
         parallel: set[int] = set()
-        for node in sorted(chosen):
+        for node in sorted(candidates):
             sources = [self._links[k].source for k in self._entering[node]]
-            outside = [source for source in sources if source not in chosen]
+            outside = [source for source in sources if source not in candidates]
             for source in sources:
                 chain: list[int] = []
-                while source in chosen and len(self._entering[source]) == 1:
+                while source in candidates and len(self._entering[source]) == 1:
                     chain.append(source)
                     source = self._links[self._entering[source][0]].source
-                modelled = any(memory[k] for k in chain)
-                if modelled and any(self._ahead[source] >> other & 1 for other in outside):
+                has_state = any(memory[k] for k in chain)
+                if has_state and any(self._reachable[source] >> other & 1 for other in outside):
                     parallel |= {node, *chain}
         return parallel

@@ -10,15 +10,15 @@ from armblocks.diagram import Block, Diagram, DiagramBlock, Inport
 from armblocks.diagram.signs import Outline
 from armblocks.drawing.block_boxes import Box
 
-_INTO_MEMORY = 30.0
-"""Weight of a cut in front of an integrator, a filter or a plant."""
-_INTO_FUNCTION = 5.0
-_INTO_FURTHER_PORT = 2.0
-_INTO_SUM = 3.0
-_INTO_FURTHER_TERM = 1.5
-_FED_BACK = 1.0
-"""Weight of a cut in front of a further input of a sum: with a plus, and with a minus."""
-_OUT_OF_MEMORY = 0.5
+_MEMORY_WEIGHT = 30.0
+"""Weight of a cut before an integrator, a filter or a plant."""
+_FUNCTION_WEIGHT = 5.0
+_FURTHER_PORT_WEIGHT = 2.0
+_SUM_WEIGHT = 3.0
+_PLUS_TERM_WEIGHT = 1.5
+_MINUS_TERM_WEIGHT = 1.0
+"""Weights of a cut before a further input of a sum, with a plus and with a minus."""
+_STATE_OUTPUT_FACTOR = 0.5
 """Factor of the weight of a link that leaves a block with a state, because states are usually fed back."""
 
 
@@ -43,12 +43,12 @@ class Network:
     links: tuple[Link, ...]
 
     @classmethod
-    def of(cls, diagram: Diagram, sized: Mapping[str, Box]) -> Network:
-        """The network of a sheet; ``sized``: its blocks with sizes and ports, at any position."""
+    def of(cls, diagram: Diagram, unplaced: Mapping[str, Box]) -> Network:
+        """The network of a sheet; ``unplaced``: the boxes of its blocks, at any position."""
         names = tuple(sorted(diagram.blocks))
         number = {name: k for k, name in enumerate(names)}
-        inputs = {name: {p.name: k for k, p in enumerate(sized[name].inputs)} for name in names}
-        outputs = {name: {p.name: k for k, p in enumerate(sized[name].outputs)} for name in names}
+        inputs = {name: {p.name: k for k, p in enumerate(unplaced[name].inputs)} for name in names}
+        outputs = {name: {p.name: k for k, p in enumerate(unplaced[name].outputs)} for name in names}
         memory = {name: has_memory(diagram.blocks[name]) for name in names}
         state = {name: memory[name] and not _is_filter(diagram.blocks[name]) for name in names}
         links: list[Link] = []
@@ -58,21 +58,21 @@ class Network:
                 target.block, {}
             ):
                 continue  # an incomplete diagram
-            into = inputs[target.block][target.port]
-            weight = _weight(sized[target.block], into, memory[target.block])
-            weight *= _OUT_OF_MEMORY if state[source.block] else 1.0
+            input_number = inputs[target.block][target.port]
+            weight = _weight(unplaced[target.block], input_number, memory[target.block])
+            weight *= _STATE_OUTPUT_FACTOR if state[source.block] else 1.0
             links.append(
                 Link(
                     number[source.block],
                     outputs[source.block][source.port],
                     number[target.block],
-                    into,
+                    input_number,
                     weight,
                 )
             )
-        return cls(names, tuple(sized[name] for name in names), tuple(links))
+        return cls(names, tuple(unplaced[name] for name in names), tuple(links))
 
-    def part(self, members: Sequence[int]) -> Network:
+    def subnetwork(self, members: Sequence[int]) -> Network:
         """Some of the blocks, and the links between them."""
         number = {member: k for k, member in enumerate(members)}
         return Network(
@@ -130,7 +130,7 @@ class Network:
         return isinstance(block, kinds.Sum) and block.signs[port] == "-"
 
     def memory(self) -> list[bool]:
-        """Which blocks have states or delays."""
+        """For each block, whether it has states or delays."""
         return [has_memory(box.block) for box in self.boxes]
 
 
@@ -163,8 +163,8 @@ def _is_filter(block: Block) -> bool:
 def _weight(target: Box, port: int, memory: bool) -> float:
     if isinstance(target.block, kinds.Sum):
         if port == 0:
-            return _INTO_SUM
-        return _FED_BACK if target.block.signs[port] == "-" else _INTO_FURTHER_TERM
+            return _SUM_WEIGHT
+        return _MINUS_TERM_WEIGHT if target.block.signs[port] == "-" else _PLUS_TERM_WEIGHT
     if memory:
-        return _INTO_MEMORY if port == 0 else _INTO_MEMORY / 3
-    return _INTO_FUNCTION if port == 0 else _INTO_FURTHER_PORT
+        return _MEMORY_WEIGHT if port == 0 else _MEMORY_WEIGHT / 3
+    return _FUNCTION_WEIGHT if port == 0 else _FURTHER_PORT_WEIGHT

@@ -10,15 +10,15 @@ from collections.abc import Mapping, Sequence
 
 from armblocks.drawing.arrangement.links import Link, Network
 
-_BEGINNING = 2.0
-_MIRRORED_STATE = 1.5
+_START_WEIGHT = 2.0
+_MIRRORED_STATE_WEIGHT = 1.5
 """Weight of a block that only backward links feed, and of a plant that feeds only backward links."""
-_ENTRY = 0.2
+_ENTRY_WEIGHT = 0.2
 """Weight of a block before the one at which signals enter a loop from outside."""
 _PASSES = 8
-_FEW = 40
+_MAX_EXHAUSTIVE_BLOCKS = 40
 """A search starts from every block of a loop with at most this number of blocks."""
-_MANY = 150
+_MAX_FULL_PASS_BLOCKS = 150
 """A loop with more blocks is improved in fewer passes."""
 
 
@@ -52,7 +52,7 @@ def _strong_components(count: int, links: Sequence[Link]) -> list[list[int]]:
     for link in links:
         after[link.source].append(link.target)
     components: list[list[int]] = []
-    index, low, open_, path = [-1] * count, [0] * count, [False] * count, list[int]()
+    index, low, on_stack, path = [-1] * count, [0] * count, [False] * count, list[int]()
     number = 0
     for root in range(count):
         if index[root] >= 0:
@@ -64,8 +64,8 @@ def _strong_components(count: int, links: Sequence[Link]) -> list[list[int]]:
                 index[node] = low[node] = number
                 number += 1
                 path.append(node)
-                open_[node] = True
-            elif open_[after[node][k - 1]]:
+                on_stack[node] = True
+            elif on_stack[after[node][k - 1]]:
                 low[node] = min(low[node], low[after[node][k - 1]])
             if k < len(after[node]):
                 stack.append((node, k + 1))
@@ -76,7 +76,7 @@ def _strong_components(count: int, links: Sequence[Link]) -> list[list[int]]:
                 members: list[int] = []
                 while not members or members[-1] != node:
                     members.append(path.pop())
-                    open_[members[-1]] = False
+                    on_stack[members[-1]] = False
                 components.append(sorted(members))
     return components
 
@@ -101,29 +101,31 @@ def _cheapest_order(members: Sequence[int], network: Network) -> list[int]:
             entries.append(link.target)
     _protect_inputs(weight, network)
     after = {member: list(weights) for member, weights in weight.items()}
-    if len(members) <= _MANY:
+    if len(members) <= _MAX_FULL_PASS_BLOCKS:
         for entry in entries:
             for member in members:
                 if member != entry:
-                    weight[entry][member] = weight[entry].get(member, 0.0) + _ENTRY
+                    weight[entry][member] = weight[entry].get(member, 0.0) + _ENTRY_WEIGHT
     before: dict[int, dict[int, float]] = {member: {} for member in members}
     for source, weights in weight.items():
         for target, value in weights.items():
             before[target][source] = value
-    inward = frozenset(link.target for link in links if link.target in inside and link.source not in inside)
+    fed_from_outside = frozenset(
+        link.target for link in links if link.target in inside and link.source not in inside
+    )
     best: list[int] = []
-    least = float("inf")
-    for start in ([], *([member] for member in members if len(members) <= _FEW)):
+    lowest_cost = float("inf")
+    for start in ([], *([member] for member in members if len(members) <= _MAX_EXHAUSTIVE_BLOCKS)):
         order = _depth_first([*start, *sorted(entries), *members], after)
-        for _ in range(_PASSES if len(members) <= _MANY else 2):
+        for _ in range(_PASSES if len(members) <= _MAX_FULL_PASS_BLOCKS else 2):
             moved = False
             for member in list(order):
-                moved |= _moved(order, member, weight[member], before[member])
+                moved |= _move_block(order, member, weight[member], before[member])
             if not moved:
                 break
-        cost = _cost(order, weight, network, inward)
-        if cost < least - 1e-6:
-            best, least = order, cost
+        cost = _cost(order, weight, network, fed_from_outside)
+        if cost < lowest_cost - 1e-6:
+            best, lowest_cost = order, cost
     return best
 
 
@@ -135,32 +137,35 @@ def _protect_inputs(weight: Mapping[int, dict[int, float]], network: Network) ->
             sources[target].append(source)
     for member, feeding in sources.items():
         if len(feeding) == 1 == len(network.boxes[member].inputs) and not network.is_state(member):
-            behind = sum(weight[member].values()) + _ENTRY
-            weight[feeding[0]][member] = max(weight[feeding[0]][member], behind)
+            output_weight = sum(weight[member].values()) + _ENTRY_WEIGHT
+            weight[feeding[0]][member] = max(weight[feeding[0]][member], output_weight)
 
 
 def _cost(
-    order: Sequence[int], weight: Mapping[int, Mapping[int, float]], network: Network, inward: frozenset[int]
+    order: Sequence[int],
+    weight: Mapping[int, Mapping[int, float]],
+    network: Network,
+    fed_from_outside: frozenset[int],
 ) -> float:
     """The weight of the backward links, and of blocks with no other input or no other output.
 
-    ``inward``: the blocks with an input from outside the loop.
+    ``fed_from_outside``: the blocks with an input from outside the loop.
     """
     rank = {member: k for k, member in enumerate(order)}
-    fed: set[int] = set(inward)
+    fed: set[int] = set(fed_from_outside)
     feeding: set[int] = set()
     cost = 0.0
     for source, weights in weight.items():
         for target, value in weights.items():
             if rank[target] < rank[source]:
                 cost += value
-            elif value > _ENTRY:
+            elif value > _ENTRY_WEIGHT:
                 fed.add(target)
                 feeding.add(source)
     outside = {link.source for link in network.links if link.target not in rank}
-    cost += _BEGINNING * sum(member not in fed for member in order)
+    cost += _START_WEIGHT * sum(member not in fed for member in order)
     states = {member for member in order if network.is_state(member)}
-    return cost + _MIRRORED_STATE * len(states - feeding - outside)
+    return cost + _MIRRORED_STATE_WEIGHT * len(states - feeding - outside)
 
 
 def _depth_first(roots: Sequence[int], after: Mapping[int, Sequence[int]]) -> list[int]:
@@ -185,7 +190,7 @@ def _depth_first(roots: Sequence[int], after: Mapping[int, Sequence[int]]) -> li
     return order[::-1]
 
 
-def _moved(order: list[int], member: int, after: dict[int, float], before: dict[int, float]) -> bool:
+def _move_block(order: list[int], member: int, after: dict[int, float], before: dict[int, float]) -> bool:
     """Move one block to the index where its backward links are cheapest; return whether it has moved."""
     old_index = order.index(member)
     others = [other for other in order if other != member]

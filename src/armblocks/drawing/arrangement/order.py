@@ -14,60 +14,62 @@ import numpy as np
 
 from armblocks.drawing.arrangement.columns import Columns, Segment
 
-_CROSSING = 1.0
-_PATHS_CROSS = 4.0
+_CROSSING_COST = 1.0
+_PATH_CROSSING_COST = 4.0
 """Cost of a crossing of two paths from a source to a sink."""
-_BETWEEN = 0.3
+_ENCLOSED_NODE_COST = 0.3
 """Cost of a node between the two ends of a line that reverses its direction."""
-_TURNED_SUM = 0.2
+_SUM_CROSSING_COST = 0.2
 """Cost of a crossing of two lines into one sum with two inputs, whose ports can be exchanged."""
-_FEEDBACK_ABOVE = 0.9
+_FEEDBACK_ABOVE_COST = 0.9
 """Cost of a feedback line above its loop that could be below it."""
 _SWEEPS = 8
 _PASSES = 10
-_MANY_NODES = 120
+_MAX_CHAIN_NODES = 120
 """In a sheet with more nodes, lines are not moved as a whole."""
-_FEW_LINES = 60
+_MAX_WEIGHTED_LINES = 60
 """Between two columns with more lines, all crossings have the same cost."""
 _MAX_NODES = 1000
 """In a sheet with more nodes, only one start order is tried."""
-_MANY = 30
+_MAX_SIFTED_NODES = 30
 """In a column with more nodes, a node is only exchanged with its neighbours."""
 
 
-def ordered(columns: Columns) -> tuple[float, list[list[int]]]:
+def node_order(columns: Columns) -> tuple[float, list[list[int]]]:
     """The nodes of every column from top to bottom, and the cost of this order."""
     return _Ordering(columns).best()
 
 
-def _threads(columns: Columns, *, strict: bool) -> list[list[int]]:
-    """Chains of connected nodes over several columns; ``strict``: without branches."""
+def _chains(columns: Columns, *, strict: bool) -> list[list[int]]:
+    """Chains of connected nodes over several columns; ``strict``: only chains without branches."""
     main = {node for node, path in columns.path.items() if path == 0}
-    beside: dict[tuple[int, bool], set[int]] = {}
+    neighbours: dict[tuple[int, bool], set[int]] = {}
     for segment in columns.segments:
-        if not segment.turns:
-            beside.setdefault((segment.a.node, segment.a.right), set()).add(segment.b.node)
-            beside.setdefault((segment.b.node, segment.b.right), set()).add(segment.a.node)
-    threads: list[list[int]] = []
+        if not segment.is_reversal:
+            neighbours.setdefault((segment.a.node, segment.a.right), set()).add(segment.b.node)
+            neighbours.setdefault((segment.b.node, segment.b.right), set()).add(segment.a.node)
+    chains: list[list[int]] = []
     visited: set[int] = set()
     for first in range(len(columns.column)):
         if first in visited or first in main:
             continue
-        thread = [first]
+        chain = [first]
         visited.add(first)
         for right in (True, False):
             node = first
-            while others := sorted(beside.get((node, right), set()) - main - (set() if strict else visited)):
+            while others := sorted(
+                neighbours.get((node, right), set()) - main - (set() if strict else visited)
+            ):
                 node = others[0]
-                if node in visited or (strict and (len(others) > 1 or len(beside[node, not right]) > 1)):
+                if node in visited or (strict and (len(others) > 1 or len(neighbours[node, not right]) > 1)):
                     break
-                thread.append(node)
+                chain.append(node)
                 visited.add(node)
-        threads.append(thread)
-    return threads
+        chains.append(chain)
+    return chains
 
 
-Drawn: TypeAlias = tuple[Segment, int, float, float]
+DrawnLine: TypeAlias = tuple[Segment, int, float, float]
 """A line, whether it reverses its direction at its left (1) or right (-1), and the heights of its ends."""
 
 
@@ -83,7 +85,7 @@ class _Ordering:
         self._position = [0.0] * len(columns.column)
         self._sides: list[dict[bool, list[Segment]]] = [{True: [], False: []} for _ in columns.column]
         """The segments at each node, by the side of the node on which they are."""
-        self._turning: list[list[Segment]] = [[] for _ in columns.column]
+        self._reversals: list[list[Segment]] = [[] for _ in columns.column]
         self._blocks = columns.blocks
         self._two_input_sums = columns.two_input_sums
         self._on_path = {
@@ -94,29 +96,31 @@ class _Ordering:
         self._gaps: dict[int, list[Segment]] = {}
         for segment in self._segments:
             self._gaps.setdefault(segment.gap, []).append(segment)
-        self._threads = [*_threads(columns, strict=True), *_threads(columns, strict=False)]
+        self._chains = [*_chains(columns, strict=True), *_chains(columns, strict=False)]
         for segment in self._segments:
             for end in {segment.a.node, segment.b.node}:
                 side = (
                     segment.a.right
-                    if segment.turns
+                    if segment.is_reversal
                     else (segment.a.right if segment.a.node == end else segment.b.right)
                 )
                 self._sides[end][side].append(segment)
-            if segment.turns and segment.a.node != segment.b.node:
-                self._turning[segment.a.node].append(segment)
-                self._turning[segment.b.node].append(segment)
+            if segment.is_reversal and segment.a.node != segment.b.node:
+                self._reversals[segment.a.node].append(segment)
+                self._reversals[segment.b.node].append(segment)
 
     def best(self) -> tuple[float, list[list[int]]]:
         """The cost and the order of the better result from two start orders."""
         results: list[tuple[float, int, list[list[int]]]] = []
-        starts = (self._with_feedback_last, self._as_numbered)[: 1 if len(self._position) > _MAX_NODES else 2]
+        starts = (self._start_with_feedback_last, self._start_as_numbered)[
+            : 1 if len(self._position) > _MAX_NODES else 2
+        ]
         for k, start in enumerate(starts):
             start()
             self._sweep(feedback=k == 1)
             self._sift()
-            for _ in range(_PASSES if len(self._position) <= _MANY_NODES else 0):
-                if not self._move_threads():
+            for _ in range(_PASSES if len(self._position) <= _MAX_CHAIN_NODES else 0):
+                if not self._move_chains():
                     break
                 self._sift()
             results.append((self.cost(), k, [list(column) for column in self._columns]))
@@ -125,21 +129,21 @@ class _Ordering:
 
     # -- starts ----------------------------------------------------------------------------------------------
 
-    def _with_feedback_last(self) -> None:
+    def _start_with_feedback_last(self) -> None:
         for column in self._columns:
             column.sort(
                 key=lambda node: (self._is_reversal(node), self._path.get(node, len(self._path)), node)
             )
         self._renumber()
 
-    def _as_numbered(self) -> None:
+    def _start_as_numbered(self) -> None:
         for column in self._columns:
             column.sort(key=lambda node: (self._path.get(node, len(self._path)), node))
         self._renumber()
 
     def _is_reversal(self, node: int) -> bool:
         """Whether a node is a dummy node at which a line reverses its direction."""
-        return node >= self._blocks and bool(self._turning[node])
+        return node >= self._blocks and bool(self._reversals[node])
 
     def _renumber(self) -> None:
         for column in self._columns:
@@ -166,17 +170,19 @@ class _Ordering:
         self._renumber()
 
     def _barycentre(self, node: int, *, right: bool) -> float:
-        """The mean position of the other ends of the node's lines on one side, as a share of their column."""
+        """The mean position of the other ends of the node's lines on one side, relative to their column."""
         heights: list[float] = []
         for segment in self._sides[node][right]:
             for end, other in ((segment.a, segment.b), (segment.b, segment.a)):
                 if end.node != node or other.node == node:
                     continue
-                many = max(len(self._columns[self._column_of[other.node]]), 1)
-                height = (self._position[other.node] + 0.5 + other.share - end.share) / many
-                heights.append(height + 0.6 / many if segment.turns else height)
-        own = (self._position[node] + 0.5) / max(len(self._columns[self._column_of[node]]), 1)
-        return sum(heights) / len(heights) if heights else own
+                node_count = max(len(self._columns[self._column_of[other.node]]), 1)
+                height = (
+                    self._position[other.node] + 0.5 + other.relative_height - end.relative_height
+                ) / node_count
+                heights.append(height + 0.6 / node_count if segment.is_reversal else height)
+        own_height = (self._position[node] + 0.5) / max(len(self._columns[self._column_of[node]]), 1)
+        return sum(heights) / len(heights) if heights else own_height
 
     # -- sifting ---------------------------------------------------------------------------------------------
 
@@ -186,19 +192,19 @@ class _Ordering:
             for column in [*self._columns, *self._columns[::-1]]:
                 if len(column) < 2:
                     continue
-                if len(column) > _MANY:
+                if len(column) > _MAX_SIFTED_NODES:
                     improved |= self._exchange(column)
                 else:
                     for node in sorted(column):
-                        improved |= self._sift_one(column, node)
+                        improved |= self._sift_node(column, node)
             if not improved:
                 return
 
-    def _move_threads(self) -> bool:
+    def _move_chains(self) -> bool:
         """Move whole lines to the top, the bottom or beside the main path; return whether this helps."""
         improved = False
-        for thread in self._threads:
-            columns = sorted({self._column_of[node] for node in thread})
+        for chain in self._chains:
+            columns = sorted({self._column_of[node] for node in chain})
             gaps = sorted({gap for k in columns for gap in (k - 1, k)})
             before = {k: list(self._columns[k]) for k in columns}
             cost = best = sum(self._gap_cost(gap) for gap in gaps)
@@ -206,7 +212,7 @@ class _Ordering:
             for target in range(4):
                 for k in columns:
                     self._columns[k] = list(before[k])
-                for node in thread:
+                for node in chain:
                     column = self._columns[self._column_of[node]]
                     column.remove(node)
                     main = next((k for k, other in enumerate(column) if other in self._main), None)
@@ -232,7 +238,7 @@ class _Ordering:
                 improved = True
         return improved
 
-    def _sift_one(self, column: list[int], node: int) -> bool:
+    def _sift_node(self, column: list[int], node: int) -> bool:
         """Move a node to the position of least cost in its column; return whether the cost is lower."""
         start = column.index(node)
         cost, best, goal = 0.0, 0.0, start
@@ -270,45 +276,45 @@ class _Ordering:
         for side in (True, False):
             ones, others = self._sides[one][side], self._sides[other][side]
             if ones and others:
-                drawn = [self._drawn(segment) for segment in others]
+                drawn_lines = [self._drawn_line(segment) for segment in others]
                 for segment in ones:
-                    a = self._drawn(segment)
-                    for b in drawn:
+                    a = self._drawn_line(segment)
+                    for b in drawn_lines:
                         if _cross(a, b):
                             cost += self._crossing_cost(a[0], b[0])
         for node, passed in ((one, other), (other, one)):
-            for segment in self._turning[node]:
+            for segment in self._reversals[node]:
                 partner = segment.b.node if segment.a.node == node else segment.a.node
                 low, high = sorted((self._position[node], self._position[partner]))
                 if low < self._position[passed] < high:
-                    cost += _BETWEEN
+                    cost += _ENCLOSED_NODE_COST
                 if partner == passed and node < passed:
                     cost += self._above(segment)
         return cost
 
     def _crossing_cost(self, a: Segment, b: Segment) -> float:
         """The cost of a crossing; low for lines into a sum with two inputs, whose ports follow the lines."""
-        if a.turns or b.turns:
-            return _CROSSING
+        if a.is_reversal or b.is_reversal:
+            return _CROSSING_COST
         if a.b.node == b.b.node and a.b.node in self._two_input_sums:
-            return _TURNED_SUM
-        return _PATHS_CROSS if a in self._on_path and b in self._on_path else _CROSSING
+            return _SUM_CROSSING_COST
+        return _PATH_CROSSING_COST if a in self._on_path and b in self._on_path else _CROSSING_COST
 
     def _above(self, segment: Segment) -> float:
         """The cost of a feedback line whose dummy node or mirrored block is above the other end."""
         block, dummy = (segment.a, segment.b) if segment.a.node < self._blocks else (segment.b, segment.a)
         if dummy.node < self._blocks and segment.a.right:
             block, dummy = segment.a, segment.b
-        if block.share < -0.2 and not block.level:
+        if block.relative_height < -0.2 and not block.can_be_straight:
             return 0.0
-        return _FEEDBACK_ABOVE if self._position[dummy.node] < self._position[block.node] else 0.0
+        return _FEEDBACK_ABOVE_COST if self._position[dummy.node] < self._position[block.node] else 0.0
 
-    def _drawn(self, segment: Segment) -> Drawn:
+    def _drawn_line(self, segment: Segment) -> DrawnLine:
         a, b = (
-            self._position[segment.a.node] + segment.a.share,
-            self._position[segment.b.node] + segment.b.share,
+            self._position[segment.a.node] + segment.a.relative_height,
+            self._position[segment.b.node] + segment.b.relative_height,
         )
-        if segment.turns:
+        if segment.is_reversal:
             return segment, 1 if segment.a.right else -1, min(a, b), max(a, b)
         return segment, 0, a, b
 
@@ -319,25 +325,25 @@ class _Ordering:
     def _gap_cost(self, gap: int) -> float:
         """The cost of the lines between two columns."""
         cost = 0.0
-        drawn = [self._drawn(segment) for segment in self._gaps.get(gap, ())]
-        if len(drawn) > _FEW_LINES:
-            cost = _crossings(drawn)
+        drawn_lines = [self._drawn_line(segment) for segment in self._gaps.get(gap, ())]
+        if len(drawn_lines) > _MAX_WEIGHTED_LINES:
+            cost = _crossings(drawn_lines)
         else:
-            for k, a in enumerate(drawn):
-                for b in drawn[:k]:
+            for k, a in enumerate(drawn_lines):
+                for b in drawn_lines[:k]:
                     if _cross(a, b):
                         cost += self._crossing_cost(a[0], b[0])
-        for segment, turns, _, _ in drawn:
+        for segment, turns, _, _ in drawn_lines:
             if turns and segment.a.node != segment.b.node:
                 between = abs(self._position[segment.a.node] - self._position[segment.b.node]) - 1
-                cost += _BETWEEN * between + self._above(segment)
+                cost += _ENCLOSED_NODE_COST * between + self._above(segment)
         return cost
 
 
-def _crossings(drawn: Sequence[Drawn]) -> float:
+def _crossings(drawn_lines: Sequence[DrawnLine]) -> float:
     """The number of crossings between lines of different nets, for many lines."""
-    net, turns = np.array([line[0].net for line in drawn]), np.array([line[1] for line in drawn])
-    a, b = np.array([line[2] for line in drawn]), np.array([line[3] for line in drawn])
+    net, turns = np.array([line[0].net for line in drawn_lines]), np.array([line[1] for line in drawn_lines])
+    a, b = np.array([line[2] for line in drawn_lines]), np.array([line[3] for line in drawn_lines])
     foreign = net[:, None] != net
     through = turns == 0
     straight = (a[:, None] < a) & (b[:, None] > b) & through[:, None] & through & foreign
@@ -348,10 +354,10 @@ def _crossings(drawn: Sequence[Drawn]) -> float:
         count += int(np.count_nonzero(inside & reversal[:, None] & through & foreign))
         both = (inside_a != inside_b) & reversal[:, None] & reversal & foreign
         count += int(np.count_nonzero(both)) // 2
-    return _CROSSING * count
+    return _CROSSING_COST * count
 
 
-def _cross(one: Drawn, other: Drawn) -> bool:
+def _cross(one: DrawnLine, other: DrawnLine) -> bool:
     """Whether two lines of different nets between the same two columns cross."""
     if one[0].net == other[0].net:
         return False

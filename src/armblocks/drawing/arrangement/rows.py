@@ -54,9 +54,11 @@ class _Rows:
         self._below: dict[int, dict[int, float]] = {row: {} for row in rows}
         for column in order:
             for upper, lower in pairwise(column):
-                least = self._minimum_distance(upper, lower) + self._offset[upper] - self._offset[lower]
+                min_distance = (
+                    self._minimum_distance(upper, lower) + self._offset[upper] - self._offset[lower]
+                )
                 a, b = self._leader[upper], self._leader[lower]
-                self._above[b][a] = max(self._above[b].get(a, least), least)
+                self._above[b][a] = max(self._above[b].get(a, min_distance), min_distance)
                 self._below[a][b] = self._above[b][a]
         self._lines: dict[int, list[tuple[int, float, float]]] = {row: [] for row in rows}
         """For every row: a connected row, the distance below it for a straight line, and a weight."""
@@ -69,9 +71,9 @@ class _Rows:
     def _align(self) -> None:
         aligned: set[tuple[int, bool]] = set()
         straight_pairs: dict[int, list[tuple[int, int]]] = {}
-        for segment in sorted((p for p in self._segments if not p.turns), key=self._rank):
+        for segment in sorted((p for p in self._segments if not p.is_reversal), key=self._rank):
             left, right = (segment.a, segment.b) if segment.a.right else (segment.b, segment.a)
-            if not (left.level and right.level):
+            if not (left.can_be_straight and right.can_be_straight):
                 continue
             if (left.node, True) in aligned or (right.node, False) in aligned:
                 continue
@@ -121,13 +123,13 @@ class _Rows:
 
     def _add_line(self, segment: Segment) -> None:
         shift = segment.a.port - segment.b.port + self._offset[segment.a.node] - self._offset[segment.b.node]
-        for end, other, way in ((segment.a, segment.b, -1.0), (segment.b, segment.a, 1.0)):
-            if not end.level:  # from above or below
-                shift -= way * (_SUM_GAP if self._from_below(end, other) else -_SUM_GAP)
+        for end, other, direction in ((segment.a, segment.b, -1.0), (segment.b, segment.a, 1.0)):
+            if not end.can_be_straight:  # from above or below
+                shift -= direction * (_SUM_GAP if self._from_below(end, other) else -_SUM_GAP)
         a, b = self._leader[segment.a.node], self._leader[segment.b.node]
         if a == b:
             return
-        weight = 0.5 if segment.turns else 1.0
+        weight = 0.5 if segment.is_reversal else 1.0
         self._lines[b].append((a, shift, weight))
         self._lines[a].append((b, -shift, weight))
 
@@ -136,7 +138,7 @@ class _Rows:
         straight = self._straight.get((end.node, end.right))
         if end.node in self._two_input_sums and end.right != other.right and straight is not None:
             return self._position[other.node] > self._position[straight]
-        return end.share > 0
+        return end.relative_height > 0
 
     def place(self) -> None:
         """Place all rows, then move each between its neighbours to where its lines are shortest."""
@@ -183,12 +185,12 @@ class _Rows:
                 return min(max(self._y.get(row, (y + following) / 2), y), following)
         return heights[-1][0]
 
-    def _bound(self, row: int, beside: dict[int, dict[int, float]], way: float) -> float:
-        """The bound of a row's height by the placed rows on one side, also through rows without a height."""
+    def _bound(self, row: int, neighbours: dict[int, dict[int, float]], direction: float) -> float:
+        """The bound on a row's height from the placed rows on one side, also through unplaced rows."""
         # Longest paths through rows without a height, in the order of a depth-first search.
         order: list[int] = []
         visited = {row}
-        stack = [(row, iter(beside[row]))]
+        stack = [(row, iter(neighbours[row]))]
         while stack:
             node, others = stack[-1]
             other = next((o for o in others if o not in visited and o not in self._y), None)
@@ -197,16 +199,20 @@ class _Rows:
                 order.append(node)
             else:
                 visited.add(other)
-                stack.append((other, iter(beside[other])))
+                stack.append((other, iter(neighbours[other])))
         distance = {row: 0.0}
-        bound = -way * float("inf")
+        bound = -direction * float("inf")
         for node in reversed(order):
-            for other, least in beside[node].items():
-                far = distance[node] + least
+            for other, min_distance in neighbours[node].items():
+                total = distance[node] + min_distance
                 if other in self._y:
-                    bound = max(bound, self._y[other] + far) if way > 0 else min(bound, self._y[other] - far)
+                    bound = (
+                        max(bound, self._y[other] + total)
+                        if direction > 0
+                        else min(bound, self._y[other] - total)
+                    )
                 else:
-                    distance[other] = max(distance.get(other, far), far)
+                    distance[other] = max(distance.get(other, total), total)
         return bound
 
     def tops(self) -> list[float]:

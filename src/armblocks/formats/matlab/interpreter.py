@@ -10,7 +10,7 @@ from armblocks.formats.matlab.link_fields import VECTORS, link_field, set_link_f
 from armblocks.formats.matlab.records import LinkRecord, RobotRecord
 from armblocks.formats.matlab.robot_records import robot_field, set_robot_field
 from armblocks.formats.matlab.script_values import ScriptValues, single_index
-from armblocks.formats.matlab.values import MAX_LINKS, Cell, LinkArray, Value, copied
+from armblocks.formats.matlab.values import MAX_LINKS, Cell, LinkArray, Value, copy_of_value
 from armblocks.matlab.arrays import Budget, empty, kind_of, number_of, with_element
 from armblocks.matlab.evaluation import Evaluator
 from armblocks.matlab.lexer import COMMANDS
@@ -30,14 +30,14 @@ from armblocks.matlab.syntax import (
     Target,
 )
 
-QUIET = ("disp",)
+PRINT_FUNCTIONS = ("disp",)
 """Functions that only print: their arguments are evaluated, but nothing is printed."""
 
 
 class Interpreter:
     """The variables of one run of one script.
 
-    ``joined_lines``: the numbers of the lines whose vector continues on the next line (see ``_joined``).
+    ``joined_lines``: the numbers of the lines whose vector continues on the next line (see ``_joined_rows``).
     """
 
     def __init__(self, source: Source) -> None:
@@ -68,7 +68,7 @@ class Interpreter:
         """The value of an expression statement; ``None`` for a command that is written as a call."""
         match value:
             case Postfix(base=Name(name=name), steps=(Parentheses(arguments=arguments),), at=at) if (
-                name not in self.variables and name in (*COMMANDS, *QUIET)
+                name not in self.variables and name in (*COMMANDS, *PRINT_FUNCTIONS)
             ):
                 location = self.source.location(at)
                 values = [self._evaluator.value(argument) for argument in arguments]
@@ -79,7 +79,7 @@ class Interpreter:
             case Name(name=name) if name in self.variables:
                 return None  # showing a variable does not set ans
             case _:
-                return copied(self._evaluator.value(value))
+                return copy_of_value(self._evaluator.value(value))
 
     def _command(self, location: Location, words: tuple[str, ...]) -> None:
         if words[0] not in ("clear", "clearvars"):
@@ -97,10 +97,10 @@ class Interpreter:
         location = self.source.location(statement.at)
         last = statement.steps[-1] if statement.steps else None
         if isinstance(last, Field) and last.name in VECTORS and isinstance(statement.value, Matrix):
-            value = self._evaluator.value(self._joined(statement.value))
+            value = self._evaluator.value(self._joined_rows(statement.value))
         else:
             value = self._evaluator.value(statement.value)
-        copy = copied(value)
+        copy = copy_of_value(value)
         old = self.variables.get(statement.name)
         if not statement.steps:
             self.variables[statement.name] = copy
@@ -113,8 +113,8 @@ class Interpreter:
             )
         self.variables[statement.name] = self._stored(location, old, statement.steps, copy)
 
-    def _joined(self, matrix: Matrix) -> Matrix:
-        """The matrix; a vector that a printed page had broken into two lines becomes one row.
+    def _joined_rows(self, matrix: Matrix) -> Matrix:
+        """The matrix; a vector that a printed page splits into two lines becomes one row.
 
         MATLAB reads ``[ .13`` and ``.524 .539]`` on the next line as two rows and rejects them, because their
         lengths differ. In an assignment to a vector field they can only be one row. Three lines are not

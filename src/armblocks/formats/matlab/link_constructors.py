@@ -25,7 +25,7 @@ _COLUMNS = {
     Release.UP_TO_8: ("alpha", "a", "theta", "d", "sigma", "offset"),
     Release.FROM_9: ("theta", "d", "a", "alpha", "sigma", "offset"),
 }
-_SHORTEST_DYN, _MAX_DYN_LENGTH = 15, 20
+_MIN_DYN_LENGTH, _MAX_DYN_LENGTH = 15, 20
 
 
 def link_from_row(
@@ -34,16 +34,16 @@ def link_from_row(
     """A link from 4 to 6 D-H numbers, or from a DYN row of 15 to 20. Raises ``FormatError``."""
     columns = _COLUMNS[release]
     count = len(row)
-    if not (4 <= count <= 6 or _SHORTEST_DYN <= count <= _MAX_DYN_LENGTH) or count == _MAX_DYN_LENGTH - 1:
+    if not (4 <= count <= 6 or _MIN_DYN_LENGTH <= count <= _MAX_DYN_LENGTH) or count == _MAX_DYN_LENGTH - 1:
         order = " ".join(columns)
         raise location.error(
             f"a row of {count} numbers is not a link",
             allowed=f"4 to 6 numbers {order}, or a legacy row with m r I Jm G B Tc behind the first 5: "
-            f"{_SHORTEST_DYN} to 18 or {_MAX_DYN_LENGTH} numbers",
+            f"{_MIN_DYN_LENGTH} to 18 or {_MAX_DYN_LENGTH} numbers",
         )
     link = LinkRecord(location=location, release=release, modified=modified)
-    kinematic = count if count <= 6 else 5
-    for name, number in zip(columns, row[:kinematic]):
+    dh_count = count if count <= 6 else 5
+    for name, number in zip(columns, row[:dh_count]):
         set_link_field(location, link, name, np.array([[number]]))
     if count <= 6:
         return link
@@ -72,7 +72,7 @@ def is_modified(location: Location, word: str) -> bool:
 def make_link(location: Location, arguments: list[Value]) -> LinkRecord:
     """``link([alpha A theta D sigma offset], convention)`` of releases up to 8."""
     if len(arguments) == 1 and isinstance(arguments[0], LinkRecord):
-        return arguments[0].assigned()
+        return arguments[0].copy_on_assignment()
     if not 1 <= len(arguments) <= 2:
         raise location.error(
             f"link is called with {len(arguments)} arguments", allowed="link(row), link(row, convention)"
@@ -139,16 +139,16 @@ _KEYS = ("theta", "d", "a", "alpha", "sigma", "offset", "qlim", "m", "r", "I", "
 
 def _check_joint(location: Location, link: LinkRecord, assigned: set[str], *, fixed: bool, name: str) -> None:
     """Set the joint type if it is not given, and check that the joint variable, d or theta, is not given."""
-    unstated = not fixed and not assigned & {"sigma", "revolute", "prismatic"}
-    if unstated and {"d", "theta"} <= assigned:
+    is_type_open = not fixed and not assigned & {"sigma", "revolute", "prismatic"}
+    if is_type_open and {"d", "theta"} <= assigned:
         raise location.error(
             f"{name} is given both 'd' and 'theta'",
             allowed="'d' of a revolute joint or 'theta' of a prismatic one: the other is the joint variable",
         )
-    if unstated:
+    if is_type_open:
         link.sigma = int("theta" in assigned)
     variable = "d" if link.sigma else "theta"
-    if variable in assigned and (fixed or not unstated):
+    if variable in assigned and (fixed or not is_type_open):
         raise location.error(
             f"'{variable}' is the variable of this joint and cannot be given",
             allowed="'theta' of a prismatic, 'd' of a revolute joint",

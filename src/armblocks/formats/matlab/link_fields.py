@@ -70,7 +70,7 @@ def inertia_from(location: Location, value: Value) -> tuple[Vector3, Vector3, Ve
 
 
 def coulomb_from(location: Location, value: Value) -> tuple[float, float]:
-    """``Tc``: one number t stands for [t -t]."""
+    """``Tc``: one number t means [t -t]."""
     array = array_of(location, value, "Tc")
     if array.size == 1:
         t = finite_number(location, array, "Tc")

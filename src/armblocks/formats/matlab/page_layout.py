@@ -27,7 +27,9 @@ _REST_FROM_EQUALS = re.compile(r"\s*=(?!=)")
 
 
 def without_page_breaks(source: Source) -> tuple[Source, tuple[int, ...]]:
-    """The source with such comments blanked up to their first statement, and the numbers of those lines.
+    """The source with merged statements restored, and the numbers of the restored lines.
+
+    The comment text before the first statement of such a line is replaced by spaces.
 
     Line and column numbers do not change.
     """

@@ -48,8 +48,8 @@ class LinkRecord:
         """The name of this kind of value in messages."""
         return "a link"
 
-    def assigned(self) -> LinkRecord:
-        """The object that another variable gets by an assignment."""
+    def copy_on_assignment(self) -> LinkRecord:
+        """The object that an assignment to another variable stores: a copy up to release 8."""
         return replace(self) if self.release is Release.UP_TO_8 else self
 
 
@@ -72,8 +72,8 @@ class RobotRecord:
         """The name of this kind of value in messages."""
         return "a robot"
 
-    def assigned(self) -> RobotRecord:
-        """The object that another variable gets by an assignment."""
+    def copy_on_assignment(self) -> RobotRecord:
+        """The object that an assignment to another variable stores: a copy up to release 8."""
         if self.release is Release.FROM_9:
             return self
-        return replace(self, links=[link.assigned() for link in self.links])
+        return replace(self, links=[link.copy_on_assignment() for link in self.links])

@@ -1,4 +1,4 @@
-"""``robot`` of releases up to 8, ``SerialLink`` of 9 and later, their fields, and the finished ``Robot``."""
+"""``robot`` of releases up to 8, ``SerialLink`` of 9 and later: fields, and conversion to ``Robot``."""
 
 from __future__ import annotations
 
@@ -43,11 +43,13 @@ def make_robot(location: Location, arguments: list[Value], variable: str) -> Rob
     first, *words = arguments
     match first:
         case RobotRecord():
-            record = first.assigned()
+            record = first.copy_on_assignment()
         case Cell():
             links = [_link_of(location, element, i) for i, element in enumerate(first.elements, start=1)]
             record = RobotRecord(
-                location=location, release=Release.UP_TO_8, links=[link.assigned() for link in links]
+                location=location,
+                release=Release.UP_TO_8,
+                links=[link.copy_on_assignment() for link in links],
             )
         case _ if isinstance(first, np.ndarray) and first.size:
             links = _links_of_matrix(location, Release.UP_TO_8, first, modified=False)
@@ -116,7 +118,7 @@ def _links_of_matrix(
     location: Location, release: Release, matrix: Array, *, modified: bool
 ) -> list[LinkRecord]:
     if matrix.shape[0] > MAX_LINKS:
-        raise location.error(f"a robot of {matrix.shape[0]} links", allowed=f"at most {MAX_LINKS}")
+        raise location.error(f"the robot has {matrix.shape[0]} links", allowed=f"at most {MAX_LINKS}")
     return [link_from_row(location, release, row, modified=modified) for row in rows_of(matrix)]
 
 
@@ -207,7 +209,7 @@ def _set_joint_rows(location: Location, robot: RobotRecord, name: str, value: Va
     if robot.release is Release.UP_TO_8:
         raise location.error(
             f"releases up to 8 ignore an assignment to '{name}' of a robot",
-            allowed=f"the links' own {name}",
+            allowed=f"'{name}' of each link",
             fix=f"write L{{i}}.{name} = … before robot(L, …)",
         )
     n = len(robot.links)
@@ -222,14 +224,14 @@ def _set_joint_rows(location: Location, robot: RobotRecord, name: str, value: Va
         set_link_field(location, link, "qlim", row.reshape(1, 2))
 
 
-def finished_robot(record: RobotRecord, friction_model: FrictionModel) -> Robot:
+def robot_from_record(record: RobotRecord, friction_model: FrictionModel) -> Robot:
     """The ``Robot`` of a script's record. Links are named ``link1``, ``link2`` … from the base.
 
     Raises ``FormatError`` at the line that created the robot.
     """
     _check_convention(record.location, record)
     try:
-        links = [_finished_link(i, link) for i, link in enumerate(record.links, start=1)]
+        links = [_link_from_record(i, link) for i, link in enumerate(record.links, start=1)]
         gx, gy, gz = record.gravity
         return Robot(
             name=record.name,
@@ -246,7 +248,7 @@ def finished_robot(record: RobotRecord, friction_model: FrictionModel) -> Robot:
         raise record.location.error(str(error).rstrip("."), allowed=error.allowed, fix=error.fix) from error
 
 
-def _finished_link(number: int, link: LinkRecord) -> Link:
+def _link_from_record(number: int, link: LinkRecord) -> Link:
     zero = (0.0, 0.0, 0.0)
     convention = DhConvention.MODIFIED if link.modified else DhConvention.STANDARD
     dh = DhRow(

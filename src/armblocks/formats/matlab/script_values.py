@@ -9,7 +9,7 @@ from armblocks.formats.matlab.link_constructors import CONSTRUCTORS
 from armblocks.formats.matlab.link_fields import link_field
 from armblocks.formats.matlab.records import LinkRecord, RobotRecord
 from armblocks.formats.matlab.robot_records import make_robot, make_serial_link, robot_field
-from armblocks.formats.matlab.values import MAX_LINKS, Cell, LinkArray, Value, copied, join_links
+from armblocks.formats.matlab.values import MAX_LINKS, Cell, LinkArray, Value, copy_of_value, join_links
 from armblocks.matlab.arrays import Budget, index_of, kind_of, number_of, scalar
 from armblocks.matlab.functions import TABLE
 from armblocks.matlab.numbers import Numbers
@@ -33,11 +33,11 @@ class ScriptValues:
         return value
 
     def negative(self, location: Location, value: Value) -> Value:
-        """``-value``"""
+        """The negative ``-value``."""
         return self._numbers.negative(location, value)
 
     def logical_not(self, location: Location, value: Value) -> Value:
-        """``~value``"""
+        """The logical negation ``~value``."""
         return self._numbers.logical_not(location, value)
 
     def operate(self, location: Location, operator: str, left: Value, right: Value) -> Value:
@@ -56,7 +56,7 @@ class ScriptValues:
         return self._numbers.matrix(location, rows)
 
     def cell(self, location: Location, elements: Sequence[Value]) -> Value:
-        """``{a, b}``"""
+        """The cell array ``{a, b}``."""
         if len(elements) > MAX_LINKS:
             raise location.error(
                 f"{len(elements)} elements in one cell array", allowed=f"at most {MAX_LINKS}"
@@ -65,21 +65,21 @@ class ScriptValues:
             raise location.error(
                 "a cell array inside a cell array is not supported", allowed="links, numbers, text"
             )
-        return Cell([copied(element) for element in elements])
+        return Cell([copy_of_value(element) for element in elements])
 
     def range(self, location: Location, parts: Sequence[Value]) -> Value:
-        """``first:last`` or ``first:step:last``"""
+        """The range ``first:last`` or ``first:step:last``."""
         return self._numbers.range(location, parts)
 
     def transposed(self, location: Location, value: Value) -> Value:
-        """``value'``"""
+        """The transpose ``value'``."""
         return value if isinstance(value, LinkArray) else self._numbers.transposed(location, value)
 
-    def index(self, location: Location, value: Value, written: Expression) -> Value:
+    def index(self, location: Location, value: Value, expression: Expression) -> Value:
         """The value of an index: positions, or a logical array that selects elements."""
         return value
 
-    def element(self, location: Location, value: Value, indices: Sequence[Value | None], shown: str) -> Value:
+    def element(self, location: Location, value: Value, indices: Sequence[Value | None], label: str) -> Value:
         """``value(indices)`` of a matrix or of an array of links."""
         if isinstance(value, LinkRecord):
             value = LinkArray([value])
@@ -91,7 +91,7 @@ class ScriptValues:
                     f"link {index + 1} of the array is not set", allowed="links that are set"
                 )
             return link
-        return self._numbers.element(location, value, indices, shown)
+        return self._numbers.element(location, value, indices, label)
 
     def last_index(self, location: Location, value: Value, position: int, count: int) -> Value:
         """``end`` as index ``position`` of ``count`` indices."""
@@ -100,7 +100,7 @@ class ScriptValues:
         return self._numbers.last_index(location, value, position, count)
 
     def cell_element(self, location: Location, value: Value, indices: Sequence[Value | None]) -> Value:
-        """``value{indices}``"""
+        """The element ``value{indices}`` of a cell array."""
         if not isinstance(value, Cell):
             raise location.error(f"{{}} is used on {kind_of(value)}", allowed="cell arrays")
         index = single_index(location, indices, MAX_LINKS)
@@ -112,7 +112,7 @@ class ScriptValues:
         return element
 
     def field(self, location: Location, value: Value, name: str) -> Value:
-        """``value.name``"""
+        """The field ``value.name`` of a link or robot."""
         if isinstance(value, LinkRecord):
             return link_field(location, value, name)
         if isinstance(value, RobotRecord):
@@ -124,19 +124,20 @@ class ScriptValues:
         callable_names = ["robot", "SerialLink", *CONSTRUCTORS, *TABLE]
         if name in callable_names:
             return
-        near = difflib.get_close_matches(name, [*self._variables, *callable_names], n=1, cutoff=0.6)
+        matches = difflib.get_close_matches(name, [*self._variables, *callable_names], n=1, cutoff=0.6)
         raise location.error(
             f"'{name}' is neither a variable nor a supported function",
             allowed=f"straight-line robot scripts, with {', '.join(callable_names)}",
-            fix=f"did you mean '{near[0]}'?" if near else "define it, or remove the line",
+            fix=f"did you mean '{matches[0]}'?" if matches else "define it, or remove the line",
         )
 
     def call(
-        self, location: Location, name: str, arguments: Sequence[Value], written: Sequence[Expression]
+        self, location: Location, name: str, arguments: Sequence[Value], expressions: Sequence[Expression]
     ) -> Value:
         """``name(arguments)`` of a constructor of the toolbox, or of a function in the table."""
         if name == "robot":
-            variable = written[0].name if written and isinstance(written[0], Name) else ""
+            first = expressions[0] if expressions else None
+            variable = first.name if isinstance(first, Name) else ""
             return make_robot(location, list(arguments), variable)
         if name == "SerialLink":
             return make_serial_link(location, list(arguments))
@@ -146,7 +147,7 @@ class ScriptValues:
             value = arguments[0]
             if isinstance(value, Cell | LinkArray | str):
                 return scalar(float(_length(value)))
-        return self._numbers.call(location, name, arguments, written)
+        return self._numbers.call(location, name, arguments, expressions)
 
 
 def single_index(location: Location, indices: Sequence[Value | None], maximum: int) -> int:

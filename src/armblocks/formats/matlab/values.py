@@ -42,15 +42,15 @@ class LinkArray:
 Value = Array | str | Cell | LinkRecord | LinkArray | RobotRecord
 
 
-def copied(value: Value) -> Value:
+def copy_of_value(value: Value) -> Value:
     """The value that an assignment stores: a copy, except for the handle objects of releases 9 and later."""
     match value:
         case Cell():
-            return Cell([None if element is None else copied(element) for element in value.elements])
+            return Cell([None if element is None else copy_of_value(element) for element in value.elements])
         case LinkArray():
-            return LinkArray([None if link is None else link.assigned() for link in value.links])
+            return LinkArray([None if link is None else link.copy_on_assignment() for link in value.links])
         case LinkRecord() | RobotRecord():
-            return value.assigned()
+            return value.copy_on_assignment()
         case str():
             return value
         case _:

@@ -18,4 +18,12 @@ def _read(data: bytes, name: str) -> Mapping[str, Robot]:
     return {robot.name: robot}
 
 
-ROBOT_JSON = RobotFormat(name="armblocks robot", suffixes=(".json",), most_bytes=16 * 2**20, read=_read)
+def _write(robot: Robot) -> bytes:
+    from armblocks.formats.robot_json import write_robot
+
+    return write_robot(robot)
+
+
+ROBOT_JSON = RobotFormat(
+    name="armblocks robot", suffixes=(".json",), max_bytes=16 * 2**20, read=_read, write=_write
+)

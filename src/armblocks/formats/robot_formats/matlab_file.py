@@ -17,4 +17,4 @@ def _read(data: bytes, name: str) -> Mapping[str, Robot]:
     return read_script(data, name).robots
 
 
-MATLAB_SCRIPT = RobotFormat(name="MATLAB robot script", suffixes=(".m",), most_bytes=2**20, read=_read)
+MATLAB_SCRIPT = RobotFormat(name="MATLAB robot script", suffixes=(".m",), max_bytes=2**20, read=_read)

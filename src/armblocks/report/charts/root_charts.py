@@ -18,12 +18,12 @@ from armblocks.report.charts.axes import (
     LEFT,
     RIGHT,
     TOP,
-    Field,
-    clipped_to,
-    equal_box,
-    straight_field,
+    PlotArea,
+    clip_line,
+    equal_scale_ranges,
+    linear_area,
 )
-from armblocks.report.charts.scale import padded
+from armblocks.report.charts.scale import padded_range
 
 _Array = NDArray[np.float64]
 _Complex = NDArray[np.complex128]
@@ -34,10 +34,10 @@ _DAMPINGS = (0.2, 0.4, 0.6, 0.8)
 def pole_zero_picture(system: LinearSystem, *, width: float = 560.0) -> Picture:
     """Poles as crosses and zeros as rings, with lines of constant damping and constant frequency."""
     poles, zeros = shown_poles(system), shown_zeros(system)
-    field, box = _plane(np.concatenate([poles, zeros]), system, width)
-    picture = _framed(system, field, box, width, "Poles and zeros")
+    area, box = _plane(np.concatenate([poles, zeros]), system, width)
+    picture = _plane_picture(system, area, box, width, "Poles and zeros")
     picture.description = f"{len(poles)} poles (crosses) and {len(zeros)} zeros (rings)."
-    picture.extend(_roots(field, poles, zeros))
+    picture.extend(_roots(area, poles, zeros))
     return picture
 
 
@@ -48,25 +48,25 @@ def root_locus_picture(system: LinearSystem, *, gains: _Array | None = None, wid
     loop, poles = locus.system, locus.roots[0]
     reach = extent(loop, locus.zeros)
     visible = locus.roots[np.abs(locus.roots) < reach]
-    field, box = _plane(np.concatenate([visible, poles, locus.zeros]), loop, width)
-    picture = _framed(loop, field, box, width, "Root locus")
+    area, box = _plane(np.concatenate([visible, poles, locus.zeros]), loop, width)
+    picture = _plane_picture(loop, area, box, width, "Root locus")
     picture.description = (
         f"{locus.roots.shape[1]} branches for gains up to {axis_number(float(locus.gains[-1]), 3)}; crosses "
         "are poles of the open loop, rings its zeros."
     )
     for branch in range(locus.roots.shape[1]):
         values = locus.roots[:, branch]
-        points = field.points(values.real, values.imag)
-        picture.add(Polyline(clipped_to(points, box), trace_tone(branch), 1.8))
-        picture.extend(_head(points, box, branch))
-    picture.extend(_roots(field, poles, locus.zeros))
-    picture.extend(_crossings(locus.gains, locus.roots, loop, field, box))
+        points = area.points(values.real, values.imag)
+        picture.add(Polyline(clip_line(points, box), trace_tone(branch), 1.8))
+        picture.extend(_arrow_head(points, box, branch))
+    picture.extend(_roots(area, poles, locus.zeros))
+    picture.extend(_crossings(locus.gains, locus.roots, loop, area, box))
     return picture
 
 
 def _plane(
     roots: _Complex, system: LinearSystem, width: float
-) -> tuple[Field, tuple[float, float, float, float]]:
+) -> tuple[PlotArea, tuple[float, float, float, float]]:
     height = width * 0.86
     box = (LEFT, TOP, width - RIGHT, height - BOTTOM)
     if system.is_discrete:
@@ -74,52 +74,54 @@ def _plane(
         x, y = (-reach, reach), (-reach, reach)
     else:
         size = max(float(np.abs(roots).max(initial=0.0)), 1e-12)
-        x = padded(np.concatenate([roots.real, [0.0, -0.3 * size, 0.12 * size]]), 0.1)
-        tall = max(1.12 * float(np.abs(roots.imag).max(initial=0.0)), 0.3 * size)
-        y = (-tall, tall)
-    return straight_field(*equal_box(x, y, box), box), box
+        x = padded_range(np.concatenate([roots.real, [0.0, -0.3 * size, 0.12 * size]]), 0.1)
+        y_max = max(1.12 * float(np.abs(roots.imag).max(initial=0.0)), 0.3 * size)
+        y = (-y_max, y_max)
+    return linear_area(*equal_scale_ranges(x, y, box), box), box
 
 
-def _framed(
+def _plane_picture(
     system: LinearSystem,
-    field: Field,
+    area: PlotArea,
     box: tuple[float, float, float, float],
     width: float,
     what: str,
 ) -> Picture:
     picture = Picture(width=width, height=width * 0.86, title=f"{what} of {system.name or 'a linear system'}")
     unit = "" if system.is_discrete else ", rad/s"
-    picture.extend(field.frame(x_label=f"Real part{unit}", y_label=f"Imaginary part{unit}"))
-    picture.extend(_edge(system, field, box))
-    picture.extend(_damping_grid(system, field, box))
+    picture.extend(area.frame(x_label=f"Real part{unit}", y_label=f"Imaginary part{unit}"))
+    picture.extend(_stability_boundary(system, area, box))
+    picture.extend(_damping_grid(system, area, box))
     return picture
 
 
-def _edge(system: LinearSystem, field: Field, box: tuple[float, float, float, float]) -> list[Mark]:
+def _stability_boundary(
+    system: LinearSystem, area: PlotArea, box: tuple[float, float, float, float]
+) -> list[Mark]:
     """Draw the stability boundary: the imaginary axis, or the unit circle."""
     if system.is_discrete:
-        turn = np.linspace(0.0, 2.0 * math.pi, 361, dtype=np.float64)
-        return [Polyline(clipped_to(field.points(np.cos(turn), np.sin(turn)), box), Tone.MUTED, 1.2)]
-    x = field.across(0.0)
+        angle = np.linspace(0.0, 2.0 * math.pi, 361, dtype=np.float64)
+        return [Polyline(clip_line(area.points(np.cos(angle), np.sin(angle)), box), Tone.MUTED, 1.2)]
+    x = area.x_scale(0.0)
     return [Polyline([(x, box[1]), (x, box[3])], Tone.MUTED, 1.2, sharp=True)]
 
 
-def _damping_grid(system: LinearSystem, field: Field, box: tuple[float, float, float, float]) -> list[Mark]:
+def _damping_grid(system: LinearSystem, area: PlotArea, box: tuple[float, float, float, float]) -> list[Mark]:
     """Draw dotted lines of constant damping ratio, with their numbers at the edge of the figure."""
     marks: list[Mark] = []
     for damping in _DAMPINGS:
         if system.is_discrete:
             # s dt from 0 to the Nyquist frequency.
-            turn = np.linspace(0.0, math.pi, 121)
-            line: _Complex = np.exp(turn * complex(-damping / math.sqrt(1.0 - damping**2), 1.0))
+            angle = np.linspace(0.0, math.pi, 121)
+            line: _Complex = np.exp(angle * complex(-damping / math.sqrt(1.0 - damping**2), 1.0))
         else:
-            far = 4.0 * max(abs(field.across.low), abs(field.up.high))
-            line = np.array([0.0, far * complex(-damping, math.sqrt(1.0 - damping**2))])
+            radius = 4.0 * max(abs(area.x_scale.low), abs(area.y_scale.high))
+            line = np.array([0.0, radius * complex(-damping, math.sqrt(1.0 - damping**2))])
         for sign in (1.0, -1.0):
-            points = clipped_to(field.points(line.real, sign * line.imag), box)
+            points = clip_line(area.points(line.real, sign * line.imag), box)
             marks.append(Polyline(points, Tone.HAIRLINE, 1.0, (2.0, 3.0)))
-        ends = clipped_to(field.points(line.real, line.imag), box)
-        if len(ends) > 1 and (not system.is_discrete or abs(field.across.factor) > 120.0):
+        ends = clip_line(area.points(line.real, line.imag), box)
+        if len(ends) > 1 and (not system.is_discrete or abs(area.x_scale.factor) > 120.0):
             x, y = ends[len(ends) // 2 if system.is_discrete else -1].tolist()
             x = min(max(x, box[0] + 14), box[2] - 14)
             baseline = y + 12 if y < box[1] + 12 else y - 4
@@ -127,22 +129,22 @@ def _damping_grid(system: LinearSystem, field: Field, box: tuple[float, float, f
     return marks
 
 
-def _roots(field: Field, poles: _Complex, zeros: _Complex) -> list[Mark]:
+def _roots(area: PlotArea, poles: _Complex, zeros: _Complex) -> list[Mark]:
     marks: list[Mark] = []
     size = 4.6
-    left, top, right, bottom = field.box
+    left, top, right, bottom = area.box
     for root in zeros.tolist():
-        x, y = field.across(root.real), field.up(root.imag)
+        x, y = area.x_scale(root.real), area.y_scale(root.imag)
         if left <= x <= right and top <= y <= bottom:
             marks.append(Disc(x, y, size, fill=Tone.SURFACE, stroke=Tone.INK, stroke_width=1.8))
     for root in poles.tolist():
-        x, y = field.across(root.real), field.up(root.imag)
+        x, y = area.x_scale(root.real), area.y_scale(root.imag)
         marks.append(Polyline([(x - size, y - size), (x + size, y + size)], Tone.INK, 2.0))
         marks.append(Polyline([(x - size, y + size), (x + size, y - size)], Tone.INK, 2.0))
     return marks
 
 
-def _head(points: _Array, box: tuple[float, float, float, float], branch: int) -> list[Mark]:
+def _arrow_head(points: _Array, box: tuple[float, float, float, float], branch: int) -> list[Mark]:
     """Draw an arrow in the middle of the visible part of a branch."""
     left, top, right, bottom = box
     x, y = points[:, 0], points[:, 1]
@@ -156,10 +158,10 @@ def _head(points: _Array, box: tuple[float, float, float, float], branch: int) -
     length = float(np.hypot(*heading))
     if length == 0.0:
         return []
-    along = heading / length
-    side = np.array([-along[1], along[0]])
-    tip = points[k] + 4 * along
-    wings = np.stack([tip, tip - 9 * along + 4 * side, tip - 9 * along - 4 * side])
+    direction = heading / length
+    side = np.array([-direction[1], direction[0]])
+    tip = points[k] + 4 * direction
+    wings = np.stack([tip, tip - 9 * direction + 4 * side, tip - 9 * direction - 4 * side])
     return [Polyline(wings, stroke=None, fill=trace_tone(branch), closed=True)]
 
 
@@ -167,25 +169,25 @@ def _crossings(
     gains: _Array,
     roots: _Complex,
     loop: LinearSystem,
-    field: Field,
+    area: PlotArea,
     box: tuple[float, float, float, float],
 ) -> list[Mark]:
     """Mark the points at which branches cross the stability boundary, with the gain."""
     excess = np.abs(roots) - 1.0 if loop.is_discrete else roots.real
     marks: list[Mark] = []
-    named: list[tuple[float, float]] = []
+    labelled: list[tuple[float, float]] = []
     for k, branch in np.argwhere((excess[1:] > 0.0) != (excess[:-1] > 0.0)).tolist():
         if k == 0:
             continue
-        share = excess[k, branch] / (excess[k, branch] - excess[k + 1, branch])
-        crossing = roots[k, branch] + share * (roots[k + 1, branch] - roots[k, branch])
-        gain = float(gains[k] + share * (gains[k + 1] - gains[k]))
-        x, y = field.across(crossing.real), field.up(crossing.imag)
+        fraction = excess[k, branch] / (excess[k, branch] - excess[k + 1, branch])
+        crossing = roots[k, branch] + fraction * (roots[k + 1, branch] - roots[k, branch])
+        gain = float(gains[k] + fraction * (gains[k + 1] - gains[k]))
+        x, y = area.x_scale(crossing.real), area.y_scale(crossing.imag)
         if not (box[0] < x < box[2] and box[1] < y < box[3]):
             continue
         marks.append(Disc(x, y, 3.6, fill=Tone.ACCENT))
-        if crossing.imag >= 0.0 and all(math.hypot(x - u, y - v) > 18.0 for u, v in named):
-            named.append((x, y))
+        if crossing.imag >= 0.0 and all(math.hypot(x - u, y - v) > 18.0 for u, v in labelled):
+            labelled.append((x, y))
             word = f"gain {axis_number(gain, 3)}"
             fits = x + 80 < box[2]
             side = "start" if fits else "end"

@@ -29,7 +29,7 @@ class Scale:
         return (self.end - self.start) / (self.high - self.low)
 
     def array(self, values: _Array) -> _Array:
-        """The map over an array."""
+        """The positions of an array of numbers, px."""
         return self.start + (values - self.low) * self.factor
 
 
@@ -51,12 +51,12 @@ class LogScale:
         return (self.end - self.start) / (math.log10(self.high) - math.log10(self.low))
 
     def array(self, values: _Array) -> _Array:
-        """The map over an array."""
+        """The positions of an array of numbers, px."""
         return self.start + (np.log10(values) - math.log10(self.low)) * self.factor
 
 
-def padded(values: _Array, share: float) -> tuple[float, float]:
-    """The range of the finite values, extended by the fraction ``share`` of its length at both ends; never
+def padded_range(values: _Array, fraction: float) -> tuple[float, float]:
+    """The range of the finite values, extended by ``fraction`` of its length at both ends; never
     empty."""
     finite = values[np.isfinite(values)]
     if len(finite) == 0:
@@ -66,4 +66,4 @@ def padded(values: _Array, share: float) -> tuple[float, float]:
     if high - low <= 1e-9 * max(abs(low), abs(high)) or high == low:
         half = max(abs(low), abs(high)) * 0.5 or 1.0
         return low - half, high + half
-    return low - share * (high - low), high + share * (high - low)
+    return low - fraction * (high - low), high + fraction * (high - low)

@@ -16,17 +16,17 @@ from armblocks.report.charts.axes import (
     LEFT,
     RIGHT,
     TOP,
-    clipped_to,
-    headed,
-    log_field,
-    straight_field,
+    clip_line,
+    linear_area,
+    log_area,
+    with_legend,
 )
-from armblocks.report.charts.scale import padded
+from armblocks.report.charts.scale import padded_range
 
 _Array = NDArray[np.float64]
 
-_PANEL = 230.0
-_SHOWN_DECIBELS = 140.0
+_PANEL_HEIGHT = 230.0
+_DECIBEL_RANGE = 140.0
 """Displayed range below the highest line, dB. Lower values are rounding errors."""
 
 
@@ -44,36 +44,36 @@ def spectrum_chart(
     """
     units = {unit for _, unit, _ in spectra}
     density = spectra[0][2].quantity == "power density"
-    lines = [(spectrum.frequency, _shown(spectrum, decibels, density)) for _, _, spectrum in spectra]
+    lines = [(spectrum.frequency, _display_values(spectrum, decibels, density)) for _, _, spectrum in spectra]
     names = [label for label, _, _ in spectra]
     low = min(float(frequency[1]) for frequency, _ in lines) if logarithmic else 0.0
     high = max(float(frequency[-1]) for frequency, _ in lines)
     visible = np.concatenate([values[frequency >= low] for frequency, values in lines])
-    box = (LEFT, TOP, width - RIGHT, TOP + _PANEL)
+    box = (LEFT, TOP, width - RIGHT, TOP + _PANEL_HEIGHT)
     span = _range(visible, decibels)
     quantity = "Power density" if density else "Amplitude"
     picture = Picture(
         width=width,
-        height=TOP + _PANEL + BOTTOM,
+        height=TOP + _PANEL_HEIGHT + BOTTOM,
         title=title,
         description=f"{quantity} over the frequency of {', '.join(names)}.",
     )
     x = (low, high)
-    field = log_field(x, span, box, degrees=False) if logarithmic else straight_field(x, span, box)
+    area = log_area(x, span, box, degrees=False) if logarithmic else linear_area(x, span, box)
     label = _label(units.pop() if len(units) == 1 else "", decibels, density)
-    picture.extend(field.frame(x_label="Frequency, Hz", y_label=label))
+    picture.extend(area.frame(x_label="Frequency, Hz", y_label=label))
     for index, (frequency, values) in enumerate(lines):
         shown = frequency >= low
-        positions = field.points(
+        positions = area.points(
             frequency[shown], np.where(np.isfinite(values[shown]), values[shown], span[0] - 1e3)
         )
-        across, up = thin_out(positions[:, 0], positions[:, 1], round(box[2] - box[0]))
-        points = clipped_to(np.column_stack([across, up]), field.box)
+        x_scale, y_scale = thin_out(positions[:, 0], positions[:, 1], round(box[2] - box[0]))
+        points = clip_line(np.column_stack([x_scale, y_scale]), area.box)
         picture.add(Polyline(points, trace_tone(index), 1.6, trace_dash(index)))
-    return headed(picture, names)
+    return with_legend(picture, names)
 
 
-def _shown(spectrum: SignalSpectrum, decibels: bool, density: bool) -> _Array:
+def _display_values(spectrum: SignalSpectrum, decibels: bool, density: bool) -> _Array:
     values = spectrum.values[:, 0]
     if not decibels:
         return values
@@ -84,8 +84,8 @@ def _shown(spectrum: SignalSpectrum, decibels: bool, density: bool) -> _Array:
 def _range(values: _Array, decibels: bool) -> tuple[float, float]:
     finite = values[np.isfinite(values)]
     if decibels:
-        return padded(np.maximum(finite, finite.max(initial=-_SHOWN_DECIBELS) - _SHOWN_DECIBELS), 0.06)
-    return 0.0, padded(finite, 0.06)[1]
+        return padded_range(np.maximum(finite, finite.max(initial=-_DECIBEL_RANGE) - _DECIBEL_RANGE), 0.06)
+    return 0.0, padded_range(finite, 0.06)[1]
 
 
 def _label(unit: str, decibels: bool, density: bool) -> str:

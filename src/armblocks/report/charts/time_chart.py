@@ -14,16 +14,16 @@ from armblocks.pictures.picture import Mark, Picture, Polyline, Text
 from armblocks.pictures.style import FIGURE_WIDTH, SMALL_SIZE, TEXT_SIZE, Tone, trace_dash, trace_tone
 from armblocks.pictures.text_width import shorten, text_width
 from armblocks.pictures.thinning import thin_out
-from armblocks.report.charts.scale import Scale, padded
+from armblocks.report.charts.scale import Scale, padded_range
 
 _Array = NDArray[np.float64]
 
 PANEL_HEIGHT = 148.0
-_LABEL_ROOM = 132.0
-_HEAD = 26.0
+_LABEL_WIDTH = 132.0
+_HEADING_HEIGHT = 26.0
 _GAP = 18.0
-_NEAR_LIMIT = 0.6
-"""A limit is drawn if the signal comes closer to it than this fraction of the limit."""
+_SHOWN_LIMIT_FRACTION = 0.6
+"""A limit is drawn if the signal exceeds this fraction of it."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -46,7 +46,7 @@ class Panel:
 
     @property
     def heading(self) -> str:
-        """``Joint angle, deg``."""
+        """The heading of the panel: ``Joint angle, deg``."""
         return f"{self.quantity}, {self.unit}" if self.unit else self.quantity
 
 
@@ -66,82 +66,82 @@ def time_chart(
     ]
     left = 14 + max(text_width(axis_number(v), SMALL_SIZE) for values in ticks for v in values)
     left = max(left, 48.0)
-    right = width - _LABEL_ROOM
-    bottom = len(panels) * (_HEAD + height) + (len(panels) - 1) * _GAP
+    right = width - _LABEL_WIDTH
+    bottom = len(panels) * (_HEADING_HEIGHT + height) + (len(panels) - 1) * _GAP
     picture = Picture(width=width, height=bottom + 44, title=title, description=description)
-    across = Scale(float(time[0]), _end_of(time), left, right)
-    time_ticks = nice_ticks(across.low, across.high, 10 if width >= FIGURE_WIDTH else 6)
+    x_scale = Scale(float(time[0]), _end_time(time), left, right)
+    time_ticks = nice_ticks(x_scale.low, x_scale.high, 10 if width >= FIGURE_WIDTH else 6)
     for number, (panel, span, values) in enumerate(zip(panels, spans, ticks)):
-        top = number * (_HEAD + height + _GAP) + _HEAD
-        up = Scale(*span, top + height, top)
+        top = number * (_HEADING_HEIGHT + height + _GAP) + _HEADING_HEIGHT
+        y_scale = Scale(*span, top + height, top)
         picture.add(Text(left, top - 10, panel.heading, size=TEXT_SIZE, bold=True))
-        picture.extend(_grid(across, up, time_ticks, values, last=number == len(panels) - 1))
-        picture.extend(_traces(time, panel, across, up))
-        picture.extend(_end_labels(panel, up, right))
+        picture.extend(_grid(x_scale, y_scale, time_ticks, values, last=number == len(panels) - 1))
+        picture.extend(_traces(time, panel, x_scale, y_scale))
+        picture.extend(_end_labels(panel, y_scale, right))
     picture.add(Text((left + right) / 2, bottom + 36, "Time, s", size=TEXT_SIZE, anchor="middle"))
     return picture
 
 
-def fits_beside(label: str) -> bool:
+def label_fits(label: str) -> bool:
     """Whether there is space for the label at the right end of a line."""
-    return text_width(label, SMALL_SIZE) <= _LABEL_ROOM - 31
+    return text_width(label, SMALL_SIZE) <= _LABEL_WIDTH - 31
 
 
-def _end_of(time: _Array) -> float:
+def _end_time(time: _Array) -> float:
     return float(time[-1]) if time[-1] > time[0] else float(time[0]) + 1.0
 
 
 def _value_range(panel: Panel) -> tuple[float, float]:
     values = np.concatenate([trace.values for trace in panel.traces]) if panel.traces else np.zeros(1)
     shown = [bound for trace in panel.traces for bound in _drawn_limits(trace)]
-    return padded(np.concatenate([values, np.array(shown)]), 0.08)
+    return padded_range(np.concatenate([values, np.array(shown)]), 0.08)
 
 
 def _drawn_limits(trace: Trace) -> list[float]:
-    """The limits that the trace comes near to or exceeds."""
+    """The limits that the trace approaches or exceeds."""
     if trace.limits is None:
         return []
     finite = trace.values[np.isfinite(trace.values)]
     if len(finite) == 0:
         return []
     low, high = trace.limits
-    near: list[float] = []
-    if math.isfinite(high) and finite.max() >= _NEAR_LIMIT * high > 0:
-        near.append(high)
-    if math.isfinite(low) and finite.min() <= _NEAR_LIMIT * low < 0:
-        near.append(low)
-    return near
+    shown_limits: list[float] = []
+    if math.isfinite(high) and finite.max() >= _SHOWN_LIMIT_FRACTION * high > 0:
+        shown_limits.append(high)
+    if math.isfinite(low) and finite.min() <= _SHOWN_LIMIT_FRACTION * low < 0:
+        shown_limits.append(low)
+    return shown_limits
 
 
 def _grid(
-    across: Scale, up: Scale, times: Sequence[float], values: Sequence[float], *, last: bool
+    x_scale: Scale, y_scale: Scale, times: Sequence[float], values: Sequence[float], *, last: bool
 ) -> list[Mark]:
     marks: list[Mark] = []
     for value in times:
-        x = across(value)
-        marks.append(Polyline([(x, up.end), (x, up.start)], stroke=Tone.GRID, sharp=True))
+        x = x_scale(value)
+        marks.append(Polyline([(x, y_scale.end), (x, y_scale.start)], stroke=Tone.GRID, sharp=True))
         if last:
-            marks.append(Text(x, up.start + 17, axis_number(value), SMALL_SIZE, Tone.MUTED, "middle"))
+            marks.append(Text(x, y_scale.start + 17, axis_number(value), SMALL_SIZE, Tone.MUTED, "middle"))
     for value in values:
-        y = up(value)
+        y = y_scale(value)
         tone = Tone.HAIRLINE if value == 0 else Tone.GRID
-        marks.append(Polyline([(across.start, y), (across.end, y)], stroke=tone, sharp=True))
-        marks.append(Text(across.start - 7, y + 3.5, axis_number(value), SMALL_SIZE, Tone.MUTED, "end"))
-    frame = [(across.start, up.end), (across.start, up.start), (across.end, up.start)]
+        marks.append(Polyline([(x_scale.start, y), (x_scale.end, y)], stroke=tone, sharp=True))
+        marks.append(Text(x_scale.start - 7, y + 3.5, axis_number(value), SMALL_SIZE, Tone.MUTED, "end"))
+    frame = [(x_scale.start, y_scale.end), (x_scale.start, y_scale.start), (x_scale.end, y_scale.start)]
     marks.append(Polyline(frame, stroke=Tone.HAIRLINE, sharp=True))
     return marks
 
 
-def _traces(time: _Array, panel: Panel, across: Scale, up: Scale) -> list[Mark]:
-    columns = round(across.end - across.start)
+def _traces(time: _Array, panel: Panel, x_scale: Scale, y_scale: Scale) -> list[Mark]:
+    columns = round(x_scale.end - x_scale.start)
     marks: list[Mark] = []
     exceeding: list[Mark] = []
     for trace in panel.traces:
         for bound in _drawn_limits(trace):
-            y = up(bound)
+            y = y_scale(bound)
             marks.append(
                 Polyline(
-                    [(across.start, y), (across.end, y)],
+                    [(x_scale.start, y), (x_scale.end, y)],
                     stroke=trace_tone(trace.index),
                     dash=(7.0, 4.0),
                     opacity=0.9,
@@ -149,20 +149,22 @@ def _traces(time: _Array, panel: Panel, across: Scale, up: Scale) -> list[Mark]:
             )
     for trace in panel.traces:
         t, v = thin_out(time, trace.values, columns)
-        points = np.column_stack([across.array(t), up.array(v)])
+        points = np.column_stack([x_scale.array(t), y_scale.array(v)])
         marks.append(
             Polyline(points, stroke=trace_tone(trace.index), width=1.8, dash=trace_dash(trace.index))
         )
-        beyond = _beyond(trace, v)
-        if beyond.any():
+        exceeds_limit = _exceeds_limit(trace, v)
+        if exceeds_limit.any():
             # Neighbouring samples are included, so that a single sample beyond the limit is a visible line.
-            wide = beyond | np.roll(beyond, 1) | np.roll(beyond, -1)
-            wide[0], wide[-1] = beyond[:2].any(), beyond[-2:].any()
-            exceeding.append(Polyline(np.where(wide[:, None], points, np.nan), stroke=Tone.ERROR, width=4.2))
+            widened = exceeds_limit | np.roll(exceeds_limit, 1) | np.roll(exceeds_limit, -1)
+            widened[0], widened[-1] = exceeds_limit[:2].any(), exceeds_limit[-2:].any()
+            exceeding.append(
+                Polyline(np.where(widened[:, None], points, np.nan), stroke=Tone.ERROR, width=4.2)
+            )
     return [*marks, *exceeding]
 
 
-def _beyond(trace: Trace, values: _Array) -> NDArray[np.bool_]:
+def _exceeds_limit(trace: Trace, values: _Array) -> NDArray[np.bool_]:
     if trace.limits is None:
         return np.zeros(len(values), dtype=np.bool_)
     low, high = trace.limits
@@ -170,20 +172,20 @@ def _beyond(trace: Trace, values: _Array) -> NDArray[np.bool_]:
     return (values > high + slack) | (values < low - slack)
 
 
-def _end_labels(panel: Panel, up: Scale, right: float) -> list[Mark]:
+def _end_labels(panel: Panel, y_scale: Scale, right: float) -> list[Mark]:
     """Draw names with keys at the right ends of the lines, moved apart if they would overlap."""
     step = SMALL_SIZE + 4.0
     preferred: list[float] = []
     for trace in panel.traces:
         finite = trace.values[np.isfinite(trace.values)]
-        preferred.append(up(float(finite[-1])) if len(finite) else up.start)
+        preferred.append(y_scale(float(finite[-1])) if len(finite) else y_scale.start)
     order = sorted(range(len(preferred)), key=lambda k: (preferred[k], k))
-    positions = separated([preferred[k] for k in order], step, up.end - 4, up.start + 4)
+    positions = separated_positions([preferred[k] for k in order], step, y_scale.end - 4, y_scale.start + 4)
     marks: list[Mark] = []
     for k, y in zip(order, positions):
         trace = panel.traces[k]
         tone, dash = trace_tone(trace.index), trace_dash(trace.index)
-        exceeds = bool(_beyond(trace, trace.values).any())
+        exceeds = bool(_exceeds_limit(trace, trace.values).any())
         label = trace.label + (" over limit" if exceeds else "")
         marks.append(
             Polyline(
@@ -197,7 +199,7 @@ def _end_labels(panel: Panel, up: Scale, right: float) -> list[Mark]:
             Text(
                 right + 29,
                 y + 3.8,
-                shorten(label, SMALL_SIZE, _LABEL_ROOM - 31),
+                shorten(label, SMALL_SIZE, _LABEL_WIDTH - 31),
                 SMALL_SIZE,
                 Tone.ERROR if exceeds else Tone.INK,
                 bold=exceeds,
@@ -206,7 +208,7 @@ def _end_labels(panel: Panel, up: Scale, right: float) -> list[Mark]:
     return marks
 
 
-def separated(preferred: Sequence[float], step: float, low: float, high: float) -> list[float]:
+def separated_positions(preferred: Sequence[float], step: float, low: float, high: float) -> list[float]:
     """Positions close to the ascending positions ``preferred``, at least ``step`` apart, within ``low`` ..
     ``high`` if they fit.
 

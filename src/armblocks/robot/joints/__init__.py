@@ -11,6 +11,6 @@ JOINT_TYPES: tuple[type[Joint], ...] = (
     *_FIRST,
     *(kind for kind in classes_in(__name__, Joint) if kind not in (Joint, *_FIRST)),
 )
-"""All joint types of this package's folder, as files and tables list them."""
+"""All joint types of this package's folder, in the order of files and tables."""
 
 __all__ = ["JOINT_TYPES", "Fixed", "Joint", "JointLimits", "Prismatic", "Revolute"]

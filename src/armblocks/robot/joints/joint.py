@@ -1,4 +1,4 @@
-"""The base class of joints: rotation, translation, or both, about one axis."""
+"""The base class of joints: rotation about an axis, translation along it, or both."""
 
 from __future__ import annotations
 
@@ -84,14 +84,12 @@ class Joint(ABC):
     @property
     @abstractmethod
     def angular(self) -> float:
-        """Angular part of the motion subspace: rotation about the axis per unit of the joint coordinate,
-        rad."""
+        """Angular part of the motion subspace: rotation (rad) about the axis per unit of the coordinate."""
 
     @property
     @abstractmethod
     def linear(self) -> float:
-        """Linear part of the motion subspace: translation along the axis per unit of the joint coordinate,
-        m."""
+        """Linear part of the motion subspace: translation (m) along the axis per unit of the coordinate."""
 
     @property
     def moves(self) -> bool:

@@ -41,6 +41,9 @@ def changed_aspects(before: Diagram, after: Diagram, path: Aspect = ()) -> set[A
     for note in before.notes.keys() | after.notes.keys():
         if before.notes.get(note) != after.notes.get(note):
             aspects.add((*path, "/", note))
+    for name in before.bookmarks.keys() | after.bookmarks.keys():
+        if before.bookmarks.get(name) != after.bookmarks.get(name):
+            aspects.add((*path, "/", f"bookmark {name}"))
     for name in before.mask_values.keys() | after.mask_values.keys():
         if before.mask_values.get(name) != after.mask_values.get(name):
             aspects.add((*path, "/", f"mask parameter {name}"))

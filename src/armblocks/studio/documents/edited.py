@@ -81,7 +81,7 @@ class Edited(History[Value], ABC):
         """Return the aspects in which two values differ."""
 
     @abstractmethod
-    def written(self, value: Value, name: str) -> None:
+    def mark_saved(self, value: Value, name: str) -> None:
         """Mark ``value``, which is the present value or a former one, as the content of the file ``name``."""
 
     def _check_kind(self, edit: Edit) -> None:
@@ -106,8 +106,8 @@ class Edited(History[Value], ABC):
                 changed |= self.aspects(before.value, after.value)
         return changed
 
-    def _become(self, value: Value) -> None:
-        super()._become(value)
+    def _set_value(self, value: Value) -> None:
+        super()._set_value(value)
         self._versions.append(Version(self.version, self._author, value))
 
     def _conflict(self, what: str) -> InputError:

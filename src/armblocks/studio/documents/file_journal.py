@@ -72,7 +72,7 @@ class FileJournal:
         self._journal = journal
         self._kind = kind
         self.since_snapshot = 0
-        self._past = self._future = 0
+        self._undo_count = self._redo_count = 0
 
     @classmethod
     def begin(
@@ -102,35 +102,35 @@ class FileJournal:
         ``done``: key of the request that led to this value.
         """
         self.snapshot(self._kind.to_text(value), number, done)
-        self.since_snapshot = self._past = self._future = 0
+        self.since_snapshot = self._undo_count = self._redo_count = 0
 
     def snapshot(self, text: str, number: int, done: str = "") -> None:
         """Write a snapshot: the complete document of a version, as text."""
         self._journal.append({"whole": text, "version": number, "at": _now(), "done": done})
 
-    def performed(self, request: Alteration, number: int, after: Any, *, continued: bool = False) -> None:
-        """Write a request that was applied."""
+    def write_request(self, request: Alteration, number: int, after: Any, *, continued: bool = False) -> None:
+        """Write an applied request; write a snapshot instead if its undo step precedes the last snapshot."""
         does = "continue" if continued else request.does
-        past, future = _step_counts(does, self._past, self._future)
-        if past < 0 or future < 0:
+        undo_count, redo_count = _step_counts(does, self._undo_count, self._redo_count)
+        if undo_count < 0 or redo_count < 0:
             self.begin_from(after, number, request.key)
             return
-        self._past, self._future = past, future
+        self._undo_count, self._redo_count = undo_count, redo_count
         stored = request.model_dump(mode="json", exclude={"document", "base"})
         self._journal.append({"perform": stored, "does": does, "version": number, "at": _now()})
         self.since_snapshot += 1
 
-    def replaced(self, title: str, value: Any, number: int) -> None:
+    def write_replacement(self, title: str, value: Any, number: int) -> None:
         """Write that another value has replaced the document."""
-        self._past, self._future = _step_counts("change", self._past, self._future)
+        self._undo_count, self._redo_count = _step_counts("change", self._undo_count, self._redo_count)
         text = self._kind.to_text(value)
         self._journal.append({"replace": text, "title": title, "version": number, "at": _now()})
 
-    def kept(self, number: int) -> None:
+    def write_unsaved(self, number: int) -> None:
         """Write that the document is unchanged although its file contains another value."""
         self._journal.append({"kept": True, "version": number, "at": _now()})
 
-    def saved(self, path: str, of: int, number: int, on_disk: Fingerprint | None) -> None:
+    def write_saved(self, path: str, of: int, number: int, on_disk: Fingerprint | None) -> None:
         """Write that the file at this path contains version ``of``."""
         record = {"saved": path, "of": of, "on_disk": _fingerprint_dict(on_disk)}
         self._journal.append({**record, "version": number, "at": _now()})
@@ -150,7 +150,7 @@ class FileJournal:
 
 
 def journaled_file(path: Path, kind: FileKind[Any, EditedT]) -> JournaledFile[EditedT]:
-    """Return the document of a journal with as many of its edits as can be repeated.
+    """Return the document of a journal with as many of its edits as can be replayed.
 
     Raises ``FormatError`` if the journal contains no complete snapshot.
     """
@@ -197,7 +197,7 @@ def _snapshot(records: Sequence[Record], where: str) -> tuple[int, str]:
 
 def _is_repeatable(records: Sequence[Record], number: int) -> bool:
     """Whether all records after a version can be repeated: no version is missing, no undo goes beyond it."""
-    past = future = 0
+    undo_count = redo_count = 0
     for record in records:
         if record.get("version", 0) <= number or "whole" in record or "kept" in record:
             continue
@@ -205,23 +205,23 @@ def _is_repeatable(records: Sequence[Record], number: int) -> bool:
             return False
         number += 1
         if "saved" not in record:  # saving under another name renames the value: a new version
-            past, future = _step_counts(record.get("does", "change"), past, future)
-        if past < 0 or future < 0:
+            undo_count, redo_count = _step_counts(record.get("does", "change"), undo_count, redo_count)
+        if undo_count < 0 or redo_count < 0:
             return False
     return True
 
 
-def _step_counts(does: str, past: int, future: int) -> tuple[int, int]:
+def _step_counts(does: str, undo_count: int, redo_count: int) -> tuple[int, int]:
     """Numbers of undo and redo steps after a request; negative where the request needs one more step."""
     match does:
         case "undo":
-            return past - 1, future + 1
+            return undo_count - 1, redo_count + 1
         case "redo":
-            return past + 1, future - 1
+            return undo_count + 1, redo_count - 1
         case "continue":
-            return past or -1, future
+            return undo_count or -1, redo_count
         case _:
-            return past + 1, 0
+            return undo_count + 1, 0
 
 
 class _Replay(Generic[EditedT]):
@@ -280,7 +280,7 @@ class _Replay(Generic[EditedT]):
         if saved_value is None:
             recovered.document.saved = None
         elif number > recovered.document.version:
-            recovered.document.written(saved_value, name)
+            recovered.document.mark_saved(saved_value, name)
         else:
             recovered.document.saved = saved_value
         self._values[recovered.document.version] = recovered.document.value

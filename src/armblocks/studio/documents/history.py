@@ -41,8 +41,8 @@ class History(Generic[Value]):
         self.saved: Value | None = value
         self.version = version
         self.continued = False
-        self._past: list[Step[Value]] = []
-        self._future: list[Step[Value]] = []
+        self._undo_steps: list[Step[Value]] = []
+        self._redo_steps: list[Step[Value]] = []
 
     @property
     def dirty(self) -> bool:
@@ -52,53 +52,53 @@ class History(Generic[Value]):
     @property
     def undo_title(self) -> str:
         """Title of the step that ``undo`` would revert; ``""`` if there is none."""
-        return self._past[-1].title if self._past else ""
+        return self._undo_steps[-1].title if self._undo_steps else ""
 
     @property
     def redo_title(self) -> str:
         """Title of the step that ``redo`` would repeat; ``""`` if there is none."""
-        return self._future[-1].title if self._future else ""
+        return self._redo_steps[-1].title if self._redo_steps else ""
 
     def replace(self, title: str, value: Value, gesture: str = "") -> None:
         """Replace the present value, as one step that can be undone.
 
         Consecutive changes with the same ``gesture`` are one step, for example letters typed into a field.
         """
-        self.continued = bool(gesture and self._past and self._past[-1].gesture == gesture)
-        self.continued = self.continued and not self._future
+        self.continued = bool(gesture and self._undo_steps and self._undo_steps[-1].gesture == gesture)
+        self.continued = self.continued and not self._redo_steps
         if not self.continued:
-            self._past.append(Step(title, self.value, gesture))
-            del self._past[:-MAX_UNDO_STEPS]
-        self._future.clear()
-        self._become(value)
+            self._undo_steps.append(Step(title, self.value, gesture))
+            del self._undo_steps[:-MAX_UNDO_STEPS]
+        self._redo_steps.clear()
+        self._set_value(value)
 
     def rewrite(self, change: Callable[[Value], Value]) -> None:
         """Apply a change that cannot be undone to the present value and to all values for undo and redo."""
-        changed: dict[int, Value] = {}  # equal objects stay equal objects, so that `saved` is still found
+        changed: dict[int, Value] = {}  # identical objects stay identical, so that `dirty` can compare them
 
-        def once(value: Value) -> Value:
+        def change_once(value: Value) -> Value:
             if id(value) not in changed:
                 changed[id(value)] = change(value)
             return changed[id(value)]
 
-        self._past = [replace(step, before=once(step.before)) for step in self._past]
-        self._future = [replace(step, before=once(step.before)) for step in self._future]
-        self.saved = None if self.saved is None else once(self.saved)
-        self._become(once(self.value))
+        self._undo_steps = [replace(step, before=change_once(step.before)) for step in self._undo_steps]
+        self._redo_steps = [replace(step, before=change_once(step.before)) for step in self._redo_steps]
+        self.saved = None if self.saved is None else change_once(self.saved)
+        self._set_value(change_once(self.value))
 
     def undo(self) -> None:
         """Revert the last edit; raises ``InputError`` if there is none."""
-        step = self._pop(self._past, "undo")
-        self._future.append(Step(step.title, self.value))
-        self._become(step.before)
+        step = self._pop(self._undo_steps, "undo")
+        self._redo_steps.append(Step(step.title, self.value))
+        self._set_value(step.before)
 
     def redo(self) -> None:
         """Repeat the edit that was undone last; raises ``InputError`` if there is none."""
-        step = self._pop(self._future, "redo")
-        self._past.append(Step(step.title, self.value))
-        self._become(step.before)
+        step = self._pop(self._redo_steps, "redo")
+        self._undo_steps.append(Step(step.title, self.value))
+        self._set_value(step.before)
 
-    def _become(self, value: Value) -> None:
+    def _set_value(self, value: Value) -> None:
         self.value = value
         self.version += 1
 

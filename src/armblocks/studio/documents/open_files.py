@@ -22,7 +22,7 @@ from armblocks.errors import FormatError, InputError, UnknownNameError
 from armblocks.studio.documents.file_journal import SNAPSHOT_EVERY, FileJournal, JournaledFile
 from armblocks.studio.documents.file_kind import EditedT, FileKind
 from armblocks.studio.documents.journal import SYNC_SECONDS
-from armblocks.studio.documents.project_folder import Disk, Fingerprint, ProjectFolder
+from armblocks.studio.documents.project_folder import DiskState, Fingerprint, ProjectFolder
 from armblocks.studio.documents.recoverable_files import RecoverableFiles
 from armblocks.studio.documents.state_folder import StateFolder
 from armblocks.studio.protocol.messages import documents as document_messages
@@ -44,7 +44,7 @@ class OpenFile(Generic[EditedT]):
     origin: str = ""
     """The shipped example or robot from which it was created."""
     on_disk: Fingerprint | None = None
-    disk: Disk = "same"
+    disk: DiskState = "same"
     request_keys: deque[str] = dataclasses.field(default_factory=lambda: deque(maxlen=MAX_KEYS))
     journal: FileJournal | None = None
     journaled: bool = True
@@ -71,7 +71,7 @@ class OpenFile(Generic[EditedT]):
             journaled=self.journaled,
         )
 
-    def leave(self) -> None:
+    def cancel_tasks(self) -> None:
         """Cancel the pending tasks of the document, which is closed."""
         for task in (self.syncing, self.snapshot):
             if task is not None:
@@ -95,7 +95,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         self._notify: Callable[[OpenedT], Awaitable[None]] | None = None
 
     @abstractmethod
-    def _made(self, key: str, document: Any) -> OpenedT:
+    def _create(self, key: str, document: Any) -> OpenedT:
         """Create the open document of this class."""
 
     def __iter__(self) -> Iterator[OpenedT]:
@@ -125,7 +125,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
                 return open_file
         data, on_disk = self.folder.read_known(path)
         value = self.kind.from_file(data, place)
-        self.state_folder.use(path)
+        self.state_folder.add_recent(path)
         return self.add(value, path=path, on_disk=on_disk, key=key)
 
     def open_shipped(self, name: str, key: str = "") -> OpenedT:
@@ -175,32 +175,32 @@ class OpenFiles(ABC, Generic[OpenedT]):
             )
         self._close(open_file, keep=False)
 
-    def end(self) -> None:
+    def close_all(self) -> None:
         """Close all documents when the studio ends; journals of unsaved documents remain."""
         for open_file in self:
             with contextlib.suppress(OSError):
                 self._close(open_file, keep=open_file.document.dirty)
-        self.recoverable.end()
+        self.recoverable.delete_saved()
 
     def _close(self, open_file: OpenedT, *, keep: bool) -> None:
         del self._open[open_file.key]
-        open_file.leave()
+        open_file.cancel_tasks()
         if open_file.journal is not None:
             open_file.journal.close(keep=keep)
 
-    def bring(self, value: Any) -> OpenedT:
+    def open_value(self, value: Any) -> OpenedT:
         """Open a value from outside the project; it is journaled at once, because no file contains it."""
         open_file = self.add(value)
-        self._hold(open_file)
+        self._mark_unsaved(open_file)
         return open_file
 
     def _add(self, document: Any, key: str) -> OpenedT:
         if len(self._open) >= MAX_OPEN_DOCUMENTS:
-            self._close_one()
-        open_file = self._open[key] = self._made(key, document)
+            self._close_earliest_saved()
+        open_file = self._open[key] = self._create(key, document)
         return open_file
 
-    def _close_one(self) -> None:
+    def _close_earliest_saved(self) -> None:
         """Close the earliest opened document that has no unsaved edits."""
         for open_file in self:
             if not open_file.document.dirty:
@@ -229,7 +229,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
             open_file,
             before,
             number,
-            lambda journal: journal.performed(request, version, after, continued=continued),
+            lambda journal: journal.write_request(request, version, after, continued=continued),
         )
         if open_file.journal is not None and open_file.journal.since_snapshot >= SNAPSHOT_EVERY:
             self._snapshot_later(open_file, open_file.journal)
@@ -255,21 +255,26 @@ class OpenFiles(ABC, Generic[OpenedT]):
         document, before, number = open_file.document, open_file.document.value, open_file.document.version
         document.replace(title, value)
         version = document.version
-        self._write(open_file, before, number, lambda journal: journal.replaced(title, value, version))
+        self._write(
+            open_file, before, number, lambda journal: journal.write_replacement(title, value, version)
+        )
 
     def ignore_file_change(self, open_file: OpenedT) -> None:
         """Accept that another program has written the file; the next save overwrites it."""
         open_file.disk, open_file.on_disk = "same", None
         if open_file.path is not None and self.folder.exists(open_file.path):
             open_file.on_disk = self.folder.read_known(open_file.path)[1]
-        self._hold(open_file)
+        self._mark_unsaved(open_file)
 
-    def _hold(self, open_file: OpenedT) -> None:
+    def _mark_unsaved(self, open_file: OpenedT) -> None:
         """Mark the document as contained in no file, and note this in the journal."""
         document = open_file.document
         document.saved = None
         self._write(
-            open_file, document.value, document.version, lambda journal: journal.kept(document.version)
+            open_file,
+            document.value,
+            document.version,
+            lambda journal: journal.write_unsaved(document.version),
         )
 
     async def save(self, open_file: OpenedT, path: str, *, overwrite: bool) -> str:
@@ -295,8 +300,8 @@ class OpenFiles(ABC, Generic[OpenedT]):
 
             open_file.on_disk = await asyncio.to_thread(write)
             open_file.path, open_file.disk = path, "same"
-            document.written(written, value.name)
-            self.state_folder.use(path)
+            document.mark_saved(written, value.name)
+            self.state_folder.add_recent(path)
             self._saved(open_file, path, of)
             return path
 
@@ -313,7 +318,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         if open_file.journal is None:
             return
         now, version, on_disk = open_file.document.value, open_file.document.version, open_file.on_disk
-        self._write(open_file, now, version, lambda journal: journal.saved(path, of, version, on_disk))
+        self._write(open_file, now, version, lambda journal: journal.write_saved(path, of, version, on_disk))
 
     def _refuse_overwriting(self, open_file: OpenedT, path: str) -> None:
         if path != open_file.path:
@@ -449,9 +454,9 @@ class OpenFiles(ABC, Generic[OpenedT]):
                 path, known, old_state = open_file.path, open_file.on_disk, open_file.disk
                 disk, fingerprint = await asyncio.to_thread(self.folder.compared, path, known)
                 if open_file.on_disk is not known or open_file.path != path:
-                    continue  # it was saved meanwhile
+                    continue  # it has been saved since
                 open_file.disk, open_file.on_disk = disk, fingerprint
                 if disk != old_state:
                     if disk == "gone":
-                        self._hold(open_file)
+                        self._mark_unsaved(open_file)
                     await notify(open_file)

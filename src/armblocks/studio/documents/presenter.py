@@ -41,7 +41,7 @@ class Presenter(ABC, Generic[OpenedT]):
     def dropped(self, data: bytes, name: str) -> Opening[OpenedT]:
         """Open the documents of a file from outside the project."""
 
-    def place(self, open_file: OpenedT, wished: Place, *, known: bool) -> Place:
+    def place(self, open_file: OpenedT, requested: Place, *, known: bool) -> Place:
         """Return the part to show on a page; ``known``: the page shows the document already."""
         return ()
 
@@ -53,11 +53,11 @@ class Presenter(ABC, Generic[OpenedT]):
     def change(self, open_file: OpenedT, before: Any, place: Place) -> ContentChange:
         """The difference to ``before``; raises ``UnknownNameError`` if the part was added or removed."""
 
-    def shown(self, page: Page, open_file: OpenedT, *, known: bool) -> None:
+    def on_shown(self, page: Page, open_file: OpenedT, *, known: bool) -> None:
         """Called after a page was sent a document; ``known``: the page showed the document before."""
 
-    def changed(self, open_file: OpenedT) -> None:
+    def on_changed(self, open_file: OpenedT) -> None:
         """Called after a document changed and its pages were notified."""
 
-    async def saved(self, open_file: OpenedT) -> None:
+    async def on_saved(self, open_file: OpenedT) -> None:
         """Called after the file of a document was written."""

@@ -1,6 +1,7 @@
-"""Tables and Python functions of the project, by the rules of the project folder.
+"""Tables and Python functions in files of the project folder.
 
-A file that cannot be read gives a value with its fault, so that a diagram with it can be shown and corrected.
+For an unreadable file, the result is a value that contains the error. The studio can then show the diagram,
+and the user can correct it.
 The server runs no Python code of the user; only worker processes do (``runs_code``).
 """
 
@@ -155,7 +156,7 @@ class ProjectData(DataFiles):
         shown = self.shown(path)
         if outline.arguments != value.arguments:
             return FormatError(
-                f"{shown} has changed: the arguments of {outline.name} are others",
+                f"{shown} has changed: the arguments of {outline.name} are different",
                 where=shown,
                 fix="open the block and load the function again",
             )
@@ -183,7 +184,7 @@ def files_of(diagram: Diagram) -> Iterator[tuple[str, TimeTable | UserFunction]]
 
 
 def unloaded_fault(function: UserFunction) -> ArmblocksError | None:
-    """Why the code of a function has not been run, or ``None``."""
+    """Return the reason why the code of a function has not been run, or ``None``."""
     return function.function.fault if isinstance(function.function, UnloadedFunction) else None
 
 

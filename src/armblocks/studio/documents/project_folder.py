@@ -31,7 +31,7 @@ _FORBIDDEN = re.compile(r'[\x00-\x1f\x7f<>:"|?*\\]')
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 MAX_NAME_LENGTH = 120
 
-Disk = Literal["same", "changed", "gone"]
+DiskState = Literal["same", "changed", "gone"]
 """State of a file on disk, compared with its known fingerprint."""
 
 
@@ -152,7 +152,7 @@ class ProjectFolder:
         """Whether the file exists."""
         return self.path(relative).exists()
 
-    def compared(self, relative: str, known: Fingerprint | None) -> tuple[Disk, Fingerprint | None]:
+    def compared(self, relative: str, known: Fingerprint | None) -> tuple[DiskState, Fingerprint | None]:
         """Return the state of a file, and its present fingerprint if unchanged in content, else ``known``."""
         path = self.path(relative)
         try:
@@ -168,7 +168,7 @@ class ProjectFolder:
             ("same", current) if known is not None and known.digest == current.digest else ("changed", known)
         )
 
-    def sweep(self, used: Iterable[str]) -> None:
+    def remove_stray_files(self, used: Iterable[str]) -> None:
         """Remove partly written temporary files beside these files, left by a studio killed during a save."""
         folders = {self.root, *((self.root / name).resolve().parent for name in used)}
         for folder in folders:
@@ -201,8 +201,8 @@ class ProjectFolder:
         return str(self.path(name))
 
 
-def _first(names: Iterator[str], most: int) -> list[str]:
-    return [name for name, _ in zip(names, range(most))]
+def _first(names: Iterator[str], limit: int) -> list[str]:
+    return [name for name, _ in zip(names, range(limit))]
 
 
 def check_file_name(relative: str) -> None:

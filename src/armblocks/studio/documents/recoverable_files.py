@@ -35,10 +35,10 @@ class RecoverableFiles:
     def __contains__(self, key: str) -> bool:
         return key in self._read or key in self._unread
 
-    def offers(self) -> list[document_messages.Recovery]:
+    def descriptions(self) -> list[document_messages.Recovery]:
         """Descriptions of the unsaved documents, for pages."""
-        offers = [self._offer(entry) for entry in self._read.values() if entry.document.dirty]
-        return [*offers, *(self._unread_offer(key, path) for key, path in self._unread.items())]
+        descriptions = [self._offer(entry) for entry in self._read.values() if entry.document.dirty]
+        return [*descriptions, *(self._unread_offer(key, path) for key, path in self._unread.items())]
 
     def take(self, key: str) -> JournaledFile[Any]:
         """Return a recovered document and remove it from the recoverable ones.
@@ -61,7 +61,7 @@ class RecoverableFiles:
         self._read.pop(key, None)
         self._unread.pop(key, None)
 
-    def end(self) -> None:
+    def delete_saved(self) -> None:
         """Delete the journals of documents that have no unsaved edits, when the studio ends."""
         for entry in self._read.values():
             if not entry.document.dirty:

@@ -64,10 +64,12 @@ class DocumentRequests:
 
     def recoveries(self) -> list[document_messages.Recovery]:
         """The documents that can be recovered, the latest first."""
-        offers = (
-            offer for presenter in self._presenters.values() for offer in presenter.files.recoverable.offers()
+        descriptions = (
+            offer
+            for presenter in self._presenters.values()
+            for offer in presenter.files.recoverable.descriptions()
         )
-        return sorted(offers, key=lambda offer: -offer.last)
+        return sorted(descriptions, key=lambda offer: -offer.last)
 
     def watch(self) -> list[asyncio.Task[None]]:
         """Start the tasks that watch the files of all documents for changes by other programs."""
@@ -78,7 +80,7 @@ class DocumentRequests:
     def end(self) -> None:
         """Close all documents; journals of unsaved documents remain."""
         for presenter in self._presenters.values():
-            presenter.files.end()
+            presenter.files.close_all()
 
     async def show(
         self,
@@ -97,7 +99,7 @@ class DocumentRequests:
             state=open_file.state(), content=content, notes=list(notes), in_front=in_front
         )
         await page.notify(event)
-        presenter.shown(page, open_file, known=known)
+        presenter.on_shown(page, open_file, known=known)
         await self.notify_list()
         return open_file.key
 
@@ -167,7 +169,7 @@ class DocumentRequests:
             path = await presenter.files.save(open_file, request.path, overwrite=request.overwrite)
         finally:
             await self.notify_state(open_file)
-        await presenter.saved(open_file)
+        await presenter.on_saved(open_file)
         await self.notify_list()
         return path
 
@@ -209,7 +211,7 @@ class DocumentRequests:
 
     async def _notify_change(self, open_file: OpenFile[Any], before: Any, number: int) -> None:
         await self._notify_versions(open_file, before, number)
-        self._presenters[open_file.document.kind].changed(open_file)
+        self._presenters[open_file.document.kind].on_changed(open_file)
 
     async def _notify_versions(self, open_file: OpenFile[Any], before: Any, number: int) -> None:
         """Send each page of a document the changes in the part that the page shows."""

@@ -67,7 +67,7 @@ class StateFolder:
         except (FormatError, ValueError, KeyError, TypeError):
             return []
 
-    def use(self, path: str) -> None:
+    def add_recent(self, path: str) -> None:
         """Add a file to the recent files."""
         recent = self.recent()
         if recent[:1] != [path]:

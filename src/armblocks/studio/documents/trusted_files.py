@@ -23,8 +23,7 @@ def digest_of(source: bytes) -> str:
 class TrustedFiles:
     """Pairs of a path in the project and the digest of its content.
 
-    They are stored in the private folder of the user, outside the project: no file of a project can make
-    itself trusted.
+    The pairs are stored in the private folder of the user. Files of the project therefore cannot change them.
     """
 
     def __init__(self, state_folder: StateFolder | None = None, pairs: Iterable[Iterable[str]] = ()) -> None:
@@ -43,7 +42,7 @@ class TrustedFiles:
         return pair in self._pairs
 
     def set(self, path: str, digest: str, *, trusted: bool) -> None:
-        """Trust a content of a file, or trust no content of it."""
+        """Trust a file with the content of this digest, or withdraw the trust in all contents of the file."""
         if trusted:
             self._pairs[path, digest] = None
         else:

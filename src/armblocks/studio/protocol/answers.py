@@ -1,4 +1,4 @@
-"""The handlers of the requests."""
+"""The table of request handlers."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Answers:
         """Register the handler of a class of requests; the handler returns the value of the reply."""
         self._handlers[request] = answer
 
-    async def to(self, page: Page, request: Request[ReplyT]) -> ReplyT:
+    async def reply_to(self, page: Page, request: Request[ReplyT]) -> ReplyT:
         """Return the value of the reply to a request. Raises ``ArmblocksError`` if the request is refused."""
         return await self._handlers[type(request)](page, request)
 

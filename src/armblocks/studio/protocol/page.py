@@ -21,7 +21,7 @@ SendText = Callable[[str], Awaitable[None]]
 SendBytes = Callable[[bytes], Awaitable[None]]
 
 
-class NoRequestError(ValueError):
+class InvalidRequestError(ValueError):
     """The text from a page is not a request of the studio."""
 
 

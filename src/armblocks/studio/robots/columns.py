@@ -1,8 +1,8 @@
 """The columns of the robot editor's tables, declared once for front end and edits.
 
-The tables follow the paper: ``kinematics`` is its Table 1 (D-H row, ranges, speeds), ``dynamics`` its Table 2
-(mass, centre, inertia, motor). Both are in :mod:`armblocks.studio.robots.link_columns`. This file has the
-properties of the whole robot, such as base, tool and gravity.
+``kinematics`` has the D-H row, ranges and speeds of each link; ``dynamics`` has its mass, centre of mass,
+inertia and motor. Both are in :mod:`armblocks.studio.robots.link_columns`. This file has the properties of
+the whole robot, such as base, tool and gravity.
 """
 
 from __future__ import annotations
@@ -77,9 +77,9 @@ def _frame_column(frame: str, index: int) -> Column[Robot]:
         return [*transform.translation, *transform.rpy]
 
     def write(robot: Robot, value: Value) -> Robot:
-        six = numbers(robot)
-        six[index] = number_of(value)
-        x, y, z, roll, pitch, yaw = six
+        coordinates = numbers(robot)
+        coordinates[index] = number_of(value)
+        x, y, z, roll, pitch, yaw = coordinates
         transform = transl(x, y, z) @ trotz(yaw) @ troty(pitch) @ trotx(roll)
         return replace(robot, base=transform) if frame == "base" else replace(robot, tool=transform)
 

@@ -41,7 +41,7 @@ class RobotDocument(Edited[Robot]):
             cells |= _link_aspects(name, old.get(name), new.get(name))
         return cells
 
-    def written(self, value: Robot, name: str) -> None:
+    def mark_saved(self, value: Robot, name: str) -> None:
         """Mark ``value`` as saved; the name of a robot does not depend on its file name."""
         self.saved = value
 

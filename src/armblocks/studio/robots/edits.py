@@ -49,18 +49,18 @@ def _cell_title(edit: SetCell) -> str:
 @ROBOT_EDITS.on(SetCell, _cell_title)
 def _set_cell(edit: SetCell, robot: Robot) -> Robot:
     if not edit.link:
-        column = _known(ROBOT_COLUMNS, edit.column)
-        return column.write(robot, _typed(column, robot, edit, f"robot '{robot.name}'", turns=False))
+        column = _column(ROBOT_COLUMNS, edit.column)
+        return column.write(robot, _typed_value(column, robot, edit, f"robot '{robot.name}'", turns=False))
     link = robot.link(edit.link)
-    column = _known(LINK_COLUMNS, edit.column)
+    column = _column(LINK_COLUMNS, edit.column)
     where = f"link '{link.name}', {column.title}"
     if why := column.locked(link):
         raise InputError("this cell cannot be edited", where=where, allowed=why, fix="edit another cell")
-    changed = column.write(link, _typed(column, link, edit, where, turns=bool(link.joint.angular)))
+    changed = column.write(link, _typed_value(column, link, edit, where, turns=bool(link.joint.angular)))
     return replace(robot, links=tuple(changed if other is link else other for other in robot.links))
 
 
-def _known(columns: Mapping[str, Column[Owner]], name: str) -> Column[Owner]:
+def _column(columns: Mapping[str, Column[Owner]], name: str) -> Column[Owner]:
     if name not in columns:
         raise InputError(
             f"there is no column '{name[:40]}'",
@@ -71,7 +71,7 @@ def _known(columns: Mapping[str, Column[Owner]], name: str) -> Column[Owner]:
     return columns[name]
 
 
-def _typed(column: Column[Owner], owner: Owner, edit: SetCell, where: str, *, turns: bool) -> Value:
+def _typed_value(column: Column[Owner], owner: Owner, edit: SetCell, where: str, *, turns: bool) -> Value:
     """Return the SI value of the typed text."""
     text = edit.text.strip()
     if column.quantity is Quantity.TEXT:

@@ -12,17 +12,17 @@ from armblocks.studio.robots.columns import Column, Quantity, Value, number_of
 
 JOINT_WORDS = ("revolute", "prismatic")
 
-# -- links: Table 1 ------------------------------------------------------------------------------------------
+# -- kinematics ---------------------------------------------------------------------------------------------
 
 _NO_ROW = "the pose of this link is given by transforms in its file, not by a D-H row"
 _FIXED = "this joint is fixed"
 
 
-def _without_row(link: Link) -> str:
+def _no_row_reason(link: Link) -> str:
     return "" if link.dh is not None else _NO_ROW
 
 
-def _not_moving(link: Link) -> str:
+def _fixed_joint_reason(link: Link) -> str:
     return "" if link.joint.moves else _FIXED
 
 
@@ -32,7 +32,7 @@ def variable_of(link: Link) -> str:
 
 
 def with_row(link: Link, limits: JointLimits | None = None, **changes: object) -> Link:
-    """Return the link with changed D-H parameters, joint and transforms; ``limits`` default to its own."""
+    """Return the link with changed D-H parameters; ``limits`` default to those of the link."""
     if link.dh is None:
         raise RobotError(
             _NO_ROW,
@@ -58,7 +58,7 @@ def _dh_column(name: str, title: str, doc: str, quantity: Quantity, unit: str) -
     def locked(link: Link) -> str:
         if name == variable_of(link):
             return "this parameter is the joint coordinate; its constant part is the offset"
-        return _without_row(link)
+        return _no_row_reason(link)
 
     def read(link: Link) -> Value:
         return None if link.dh is None else float(getattr(link.dh, name))
@@ -117,7 +117,7 @@ def _range_end(index: int, name: str, title: str, doc: str) -> Column[Link]:
         group="Range",
         read=read,
         write=write,
-        locked=_not_moving,
+        locked=_fixed_joint_reason,
     )
 
 
@@ -130,7 +130,7 @@ KINEMATICS: tuple[Column[Link], ...] = (
         choices=JOINT_WORDS,
         read=lambda link: type(link.joint).__name__.lower(),
         write=_with_joint_type,
-        locked=_without_row,
+        locked=_no_row_reason,
     ),
     _dh_column("alpha", "α", "twist: angle about x between the two joint axes", Quantity.ANGLE, "rad"),
     _dh_column("a", "a", "length of the common normal of the two joint axes", Quantity.NUMBER, "m"),
@@ -145,7 +145,7 @@ KINEMATICS: tuple[Column[Link], ...] = (
         group="D-H row",
         read=lambda link: link.joint.offset,
         write=_with_offset,
-        locked=_not_moving,
+        locked=_fixed_joint_reason,
     ),
     _range_end(0, "lowest", "from", "lowest joint coordinate; empty if unknown"),
     _range_end(1, "highest", "to", "highest joint coordinate; empty if unknown"),
@@ -156,10 +156,10 @@ KINEMATICS: tuple[Column[Link], ...] = (
         quantity=Quantity.RATE,
         unit="rad/s, m/s",
         optional=True,
-        group="Greatest",
+        group="Maximum",
         read=lambda link: link.joint.limits.speed,
         write=lambda link, value: _with_limits(link, speed=value),
-        locked=_not_moving,
+        locked=_fixed_joint_reason,
     ),
     Column(
         name="torque",
@@ -167,15 +167,15 @@ KINEMATICS: tuple[Column[Link], ...] = (
         doc="maximum torque (force) at the joint, after the gear; empty if unknown",
         unit="N m",
         optional=True,
-        group="Greatest",
+        group="Maximum",
         read=lambda link: link.joint.limits.torque,
         write=lambda link, value: _with_limits(link, torque=value),
-        locked=_not_moving,
+        locked=_fixed_joint_reason,
     ),
 )
 
 
-# -- links: Table 2 ------------------------------------------------------------------------------------------
+# -- dynamics -----------------------------------------------------------------------------------------------
 
 
 def _centre(axis: int) -> Column[Link]:
@@ -208,9 +208,9 @@ INERTIA_INDICES: Mapping[str, tuple[int, int]] = {
 
 def _inertia(name: str, index: tuple[int, int]) -> Column[Link]:
     def write(link: Link, value: Value) -> Link:
-        six = [link.inertia[i][j] for i, j in INERTIA_INDICES.values()]
-        six[list(INERTIA_INDICES).index(name)] = number_of(value)
-        return replace(link, inertia=inertia_matrix(six, link=link.name))
+        entries = [link.inertia[i][j] for i, j in INERTIA_INDICES.values()]
+        entries[list(INERTIA_INDICES).index(name)] = number_of(value)
+        return replace(link, inertia=inertia_matrix(entries, link=link.name))
 
     return Column(
         name=name,
@@ -251,7 +251,7 @@ def _motor(name: str, title: str, doc: str, unit: str, index: int | None = None)
         group="Motor, before the gear",
         read=read,
         write=write,
-        locked=_not_moving,
+        locked=_fixed_joint_reason,
     )
 
 

@@ -42,5 +42,5 @@ class OpenRobots(OpenFiles[OpenRobot]):
     def __init__(self, folder: ProjectFolder, state_folder: StateFolder) -> None:
         super().__init__(folder, state_folder, RobotKind(folder))
 
-    def _made(self, key: str, document: RobotDocument) -> OpenRobot:
+    def _create(self, key: str, document: RobotDocument) -> OpenRobot:
         return OpenRobot(key=key, document=document)

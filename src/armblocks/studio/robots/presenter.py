@@ -9,6 +9,7 @@ from typing import TypeVar
 
 from armblocks import formats
 from armblocks.errors import ArmblocksWarning, FormatError
+from armblocks.formats.file_findings import FileContext
 from armblocks.robot import Robot
 from armblocks.studio.documents.presenter import Opening, Place, Presenter
 from armblocks.studio.documents.project_folder import ProjectFolder
@@ -38,7 +39,8 @@ class RobotPresenter(Presenter[OpenRobot]):
             open_file, notes = _with_warnings(lambda: self.files.open_path(path))
             open_file.notes = notes or open_file.notes
             return Opening([open_file], open_file.notes)
-        robots, notes = _read(self._folder.read(path), path)
+        place = FileContext(folder=self._folder.path(path).parent, root=self._folder.root)
+        robots, notes = _read(self._folder.read(path), path, place)
         source = str(self._folder.path(path))
         return self._opened_without_file(
             (dataclasses.replace(robot, source=source) for robot in robots.values()), notes
@@ -46,7 +48,7 @@ class RobotPresenter(Presenter[OpenRobot]):
 
     def dropped(self, data: bytes, name: str) -> Opening[OpenRobot]:
         """Open the robots of a file or script from outside the project."""
-        robots, notes = _read(data, name)
+        robots, notes = _read(data, name, FileContext())
         return self._opened_without_file(robots.values(), notes)
 
     def content(self, open_file: OpenRobot, place: Place) -> RobotContent:
@@ -57,7 +59,7 @@ class RobotPresenter(Presenter[OpenRobot]):
         """Return the complete robot; changes are not split."""
         return RobotChange(content=robot_content(open_file.robot))
 
-    async def saved(self, open_file: OpenRobot) -> None:
+    async def on_saved(self, open_file: OpenRobot) -> None:
         """Update the diagrams that use the robot."""
         if open_file.path is not None:
             source = str(self._folder.path(open_file.path))
@@ -65,15 +67,15 @@ class RobotPresenter(Presenter[OpenRobot]):
 
     def _opened_without_file(self, robots: Iterable[Robot], notes: tuple[str, ...]) -> Opening[OpenRobot]:
         """Open robots that have no file."""
-        opened = [self.files.bring(robot) for robot in robots]
+        opened = [self.files.open_value(robot) for robot in robots]
         for open_file in opened:
             open_file.notes = notes
         return Opening(opened, notes)
 
 
-def _read(data: bytes, name: str) -> tuple[Mapping[str, Robot], tuple[str, ...]]:
+def _read(data: bytes, name: str, context: FileContext) -> tuple[Mapping[str, Robot], tuple[str, ...]]:
     """Return the robots of a file, and the warnings issued while it was read."""
-    robots, notes = _with_warnings(lambda: formats.read_robots(data, name))
+    robots, notes = _with_warnings(lambda: formats.read_robots(data, name, context))
     if not robots:
         raise FormatError(
             "the file defines no robot",

@@ -14,10 +14,10 @@ from armblocks.robot.geometry import reach
 from armblocks.spatial import Transform
 from armblocks.studio.protocol.messages.robots import Readings
 
-SINGULAR = 1e-6
-"""Ratio of the minimum to the maximum singular value below which the arm is called singular."""
-NEARLY = 0.02
-"""Ratio below which joint speeds exceed fifty times the tool speed."""
+SINGULAR_RATIO = 1e-6
+"""The arm is called singular if the ratio of the extreme singular values of its Jacobian is smaller."""
+NEARLY_SINGULAR_RATIO = 0.02
+"""The arm is called close to singular below this ratio: joint speeds can exceed 50 times the tool speed."""
 _NAMED_FRACTION = 0.1
 """Fraction of the largest entry above which a joint or a direction is named."""
 
@@ -37,7 +37,7 @@ def readings(arm: Arm, q: Sequence[float], qd: Sequence[float], qdd: Sequence[fl
         gravload=arm.gravload(q).tolist(),
         torque=arm.rne(q, qd, qdd).tolist(),
         singular=singularity(J, arm.robot.joint_names, reach(arm.robot)),
-        limits=limit_words(arm.robot, q, qd, arm.rne(q, qd, qdd)),
+        limits=limit_warnings(arm.robot, q, qd, arm.rne(q, qd, qdd)),
     )
 
 
@@ -64,9 +64,9 @@ def singularity(J: NDArray[np.float64], joints: Sequence[str], length: float) ->
     if values[0] == 0:
         return "Singular: no joint moves the tool."
     ratio = float(values[-1] / values[0])
-    if ratio >= NEARLY:
+    if ratio >= NEARLY_SINGULAR_RATIO:
         return ""
-    degree = "Singular" if ratio < SINGULAR else "Close to singular"
+    degree = "Singular" if ratio < SINGULAR_RATIO else "Close to singular"
     null_motion = np.abs(right[len(values) - 1])
     named = [joint for joint, part in zip(joints, null_motion) if part > _NAMED_FRACTION * null_motion.max()]
     if len(named) == 1:
@@ -93,7 +93,9 @@ def _direction(lost: NDArray[np.float64]) -> str:
     return f"move along {name}" if is_linear else f"turn about {name}"
 
 
-def limit_words(robot: Robot, q: Sequence[float], qd: Sequence[float], tau: NDArray[np.float64]) -> list[str]:
+def limit_warnings(
+    robot: Robot, q: Sequence[float], qd: Sequence[float], tau: NDArray[np.float64]
+) -> list[str]:
     """Describe the joints outside their range, or beyond their speed or torque limits."""
     texts: list[str] = []
     for link, position, speed, torque in zip(robot.moving_links, q, qd, tau.tolist()):

@@ -58,7 +58,9 @@ class RobotRequests:
             opening = self._presenter.open_file(path.relative_to(self._folder.root).as_posix())
             return await self._documents.show(page, opening.opened[0], notes=opening.notes)
         is_shipped = robot.source in formats.list_robots()
-        open_file = self._robots.add(robot, origin=robot.source) if is_shipped else self._robots.bring(robot)
+        open_file = (
+            self._robots.add(robot, origin=robot.source) if is_shipped else self._robots.open_value(robot)
+        )
         return await self._documents.show(page, open_file)
 
     async def _tables(self, _: Page, request: robot_messages.AskRobotTables) -> robot_messages.RobotTables:

@@ -22,11 +22,11 @@ def scene_of(robot: Robot) -> RobotScene:
     rows[None] = 0
     radii = drum_radii(robot)
     bodies = robot_bodies(robot)
-    feet = [float(body.mesh.corners[..., 2].min()) for body in bodies if body.row == 0]
+    lowest_points = [float(body.mesh.corners[..., 2].min()) for body in bodies if body.row == 0]
     return RobotScene(
         name=robot.name,
         reach=reach(robot),
-        foot=max(0.0, -min(feet, default=0.0)),
+        foot=max(0.0, -min(lowest_points, default=0.0)),
         rows=len(robot.links) + 2,
         bodies=[
             SceneBody(

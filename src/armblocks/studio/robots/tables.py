@@ -36,8 +36,8 @@ def robot_content(robot: Robot) -> robot_messages.RobotContent:
         findings=[
             *_inertia_findings(robot),
             *_friction_findings(robot),
-            *_weightless(robot),
-            *_findings(robot),
+            *_massless_findings(robot),
+            *_plausibility_findings(robot),
         ],
     )
 
@@ -88,7 +88,7 @@ def _inertia_findings(robot: Robot) -> list[robot_messages.RobotFinding]:
     ]
 
 
-def _findings(robot: Robot) -> list[robot_messages.RobotFinding]:
+def _plausibility_findings(robot: Robot) -> list[robot_messages.RobotFinding]:
     return [
         robot_messages.RobotFinding(
             link=finding.link or robot.name, columns=[], what=f"{finding.what}.", fix=finding.question
@@ -103,12 +103,12 @@ def _friction_findings(robot: Robot) -> list[robot_messages.RobotFinding]:
         if link.motor is None:
             continue
         plus, minus = link.motor.coulomb_friction
-        wrong = {"B": link.motor.viscous_friction < 0, "Tc+": plus < 0, "Tc-": minus > 0}
-        if any(wrong.values()):
+        is_invalid = {"B": link.motor.viscous_friction < 0, "Tc+": plus < 0, "Tc-": minus > 0}
+        if any(is_invalid.values()):
             findings.append(
                 robot_messages.RobotFinding(
                     link=link.name,
-                    columns=[name for name, is_wrong in wrong.items() if is_wrong],
+                    columns=[name for name, invalid in is_invalid.items() if invalid],
                     what="Friction accelerates the joint instead of braking it.",
                     fix="Give B and Tc+ that are not below zero, and Tc- that is not above it.",
                 )
@@ -116,11 +116,15 @@ def _friction_findings(robot: Robot) -> list[robot_messages.RobotFinding]:
     return findings
 
 
-def _weightless(robot: Robot) -> list[robot_messages.RobotFinding]:
+def _massless_findings(robot: Robot) -> list[robot_messages.RobotFinding]:
     """Find joints without inertia, for which forward dynamics has no solution."""
     last = robot.links[-1]
-    light = last.mass == 0 and not any(any(row) for row in last.inertia)
-    if not light or (last.motor is not None and last.motor.reflected_inertia > 0) or not last.joint.moves:
+    is_massless = last.mass == 0 and not any(any(row) for row in last.inertia)
+    if (
+        not is_massless
+        or (last.motor is not None and last.motor.reflected_inertia > 0)
+        or not last.joint.moves
+    ):
         return []
     return [
         robot_messages.RobotFinding(

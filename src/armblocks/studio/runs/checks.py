@@ -18,7 +18,7 @@ from armblocks.errors import ArmblocksError
 from armblocks.studio.documents.project_data import ProjectData, has_functions
 from armblocks.studio.protocol.messages.sheets import Finding, WireKind
 from armblocks.studio.runs.worker import diagram_of, limit_process
-from armblocks.studio.runs.workers import answer_of
+from armblocks.studio.runs.workers import process_reply
 from armblocks.studio.sheet.check import check
 from armblocks.studio.sheet.parameter_values import ResolveRobot
 
@@ -34,14 +34,14 @@ class Checks:
         self._data = data
         self._resolve_robot = resolve_robot
 
-    async def of(self, diagram: Diagram) -> Checked:
+    async def check(self, diagram: Diagram) -> Checked:
         """Return the findings, and the known types of signals, as :func:`~.sheet.check.check` does."""
         faults = await asyncio.to_thread(self._faults, diagram)
         if faults or not await asyncio.to_thread(has_functions, diagram):
             findings, wires = await asyncio.to_thread(check, diagram)
             # With faults, the shapes behind these blocks are unknown: only unconnected inputs are certain.
             return [*faults, *(finding for finding in findings if finding.port or not faults)], wires
-        message = await answer_of(write, self.job(diagram), MAX_SECONDS)
+        message = await process_reply(send_findings, self.job(diagram), MAX_SECONDS)
         if not message:
             return [_finding("", f"the Python functions did not return within {MAX_SECONDS:g} s", _FIX)], {}
         return _CHECKED.validate_json(message)
@@ -73,7 +73,7 @@ def _finding(block: str, what: str, fix: str) -> Finding:
     return Finding(severity="error", block=block, port="", what=what, fix=fix)
 
 
-def write(pipe: Connection, job: dict[str, Any]) -> None:
+def send_findings(pipe: Connection, job: dict[str, Any]) -> None:
     """Check a diagram and send the result; executed in the separate process."""
     limit_process()
     checked: Checked

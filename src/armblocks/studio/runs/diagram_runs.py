@@ -19,7 +19,7 @@ from armblocks.studio.runs.report import report_of
 from armblocks.studio.runs.workers import Workers
 from armblocks.studio.sheet.open_documents import OpenDocuments
 
-PAGE_SECONDS = 1.5
+FIRST_WORKER_DELAY_SECONDS = 1.5
 """Delay of the first worker process after a page was opened, so that the page can draw first, s."""
 
 
@@ -35,7 +35,7 @@ class DiagramRuns:
         self._diagrams = diagrams
         self._job = job
         self._records: dict[str, RunRecord] = {}
-        self._sending: set[asyncio.Task[None]] = set()
+        self._send_tasks: set[asyncio.Task[None]] = set()
 
     def register(self, answers: Answers) -> None:
         """Register the handlers of the requests about runs."""
@@ -43,15 +43,15 @@ class DiagramRuns:
         for command in (run_messages.Control, run_messages.SetSpeed, run_messages.Rewind, run_messages.Tune):
             answers.on(command, self._command)
 
-    def of(self, document: str) -> str | None:
+    def run_key(self, document: str) -> str | None:
         """The key of the run of a diagram, or ``None``."""
         return next((run.key for run in self.processes.values() if run.document == document), None)
 
-    def shown(self, page: Page, document: str) -> None:
+    def on_shown(self, page: Page, document: str) -> None:
         """Send a page that opened a diagram the record of its run, and start the process of the next run."""
-        if (run := self.of(document)) is not None:
+        if (run := self.run_key(document)) is not None:
             self._send_later(page, run, 0)
-        self.workers.prepare(after=PAGE_SECONDS)
+        self.workers.prepare(after=FIRST_WORKER_DELAY_SECONDS)
 
     async def report(self, document: str) -> bytes:
         """Return the report of the last run of a diagram as HTML; raises ``ArmblocksError``."""
@@ -63,7 +63,7 @@ class DiagramRuns:
 
     def close(self) -> None:
         """End every run."""
-        for task in self._sending:
+        for task in self._send_tasks:
             task.cancel()
         for run in self.processes.values():
             run.end()
@@ -103,7 +103,7 @@ class DiagramRuns:
     async def _command(self, _: Page, request: run_messages.RunCommand) -> None:
         if request.run not in self.processes:
             raise UnknownNameError("run", request.run, self.processes)
-        self.processes[request.run].obey(request)
+        self.processes[request.run].send_command(request)
 
     # -- messages to pages -----------------------------------------------------------------------------------
 
@@ -114,9 +114,9 @@ class DiagramRuns:
         from the page until it has received the record.
         """
         page.records_in_progress[run] = begin
-        sending = asyncio.get_running_loop().create_task(self._notify(page, run))
-        self._sending.add(sending)
-        sending.add_done_callback(self._sending.discard)
+        task = asyncio.get_running_loop().create_task(self._notify(page, run))
+        self._send_tasks.add(task)
+        task.add_done_callback(self._send_tasks.discard)
 
     async def _notify(self, page: Page, run: str) -> None:
         record = self._records[run]

@@ -1,7 +1,7 @@
-"""A run with checkpoints: it can return to one and continue with identical results.
+"""A run with snapshots: it can return to a snapshot and continue with identical results.
 
-Simulink's Step Back works the same way: it restores a snapshot. Samples between two checkpoints can be
-reached as well, because a run that restarts from a checkpoint repeats the same steps bit for bit. Tuned
+Simulink's Step Back works the same way: it restores a snapshot. Samples between two snapshots can be
+reached as well, because a run that restarts from a snapshot repeats the same steps bit for bit. Tuned
 values are not restored: they apply from the time to which the run returns.
 """
 
@@ -22,13 +22,13 @@ from armblocks.simulation import RunState, Samples, Simulation
 
 Array = NDArray[np.float64]
 MAX_BYTES = 64 * 2**20
-"""Limit of the memory of all checkpoints, bytes; beyond it every second checkpoint is removed."""
+"""Limit of the memory of all snapshots, bytes; beyond it every second snapshot is removed."""
 MIN_SNAPSHOTS = 8
 
 
 @dataclass(frozen=True)
 class Snapshot:
-    """A checkpoint: state and parameters of a run; ``state`` is ``None`` before the first step."""
+    """State and parameters of a run; ``state`` is ``None`` before the first step."""
 
     recorded: int
     state: RunState | None
@@ -37,7 +37,7 @@ class Snapshot:
 
     @property
     def time(self) -> float:
-        """Time of the checkpoint, s."""
+        """Time of the snapshot, s."""
         return -math.inf if self.state is None else self.state.time
 
     @property
@@ -52,13 +52,13 @@ class Snapshot:
 
 
 class RunHistory:
-    """One run of a model with checkpoints; the numbers of its samples continue after each return."""
+    """One run of a model with snapshots; the numbers of its samples continue after each return."""
 
     def __init__(self, model: CompiledDiagram) -> None:
         self.run: DiagramRun = model.begin()
         self._snapshots = [Snapshot(0, None, self.run.diagram, self.run.parameters)]
         self._begin = 0
-        """Number of the first new sample of ``run``, which restarts at a checkpoint."""
+        """Number of the first new sample of ``run``, which restarts at a snapshot."""
 
     @property
     def recorded(self) -> int:
@@ -72,7 +72,7 @@ class RunHistory:
         return dataclasses.replace(samples, begin=begin)
 
     def add_snapshot(self) -> None:
-        """Add a checkpoint at the present state."""
+        """Add a snapshot of the present state."""
         run, snapshots = self.run, self._snapshots
         if run.finished or self.recorded <= snapshots[-1].recorded:
             return
@@ -101,7 +101,7 @@ class RunHistory:
         while len(self._snapshots) > 1 and self._snapshots[-1].recorded > recorded:
             self._snapshots.pop()
         self._resume(self._snapshots[-1])
-        # One checkpoint a step: a step that records too many samples is reverted to its own checkpoint.
+        # Each step begins with a snapshot: a step that records too many samples is reverted to it.
         while self.recorded < recorded and not self.run.finished:
             self.step()
         if self.recorded > recorded and len(self._snapshots) > 1:

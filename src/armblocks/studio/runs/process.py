@@ -33,7 +33,7 @@ MAX_SECONDS = 24 * 3600.0
 """Longest duration of a run, pauses included, s."""
 JOIN_SECONDS = 5.0
 """Time within which a process ends after its pipe was closed, s."""
-ENDED = ("done", "stopped", "failed")
+FINAL_STATES = ("done", "stopped", "failed")
 
 
 class RunProcess:
@@ -50,12 +50,12 @@ class RunProcess:
         self._loop = asyncio.get_running_loop()
         self._queue: asyncio.Queue[bytes | None] = asyncio.Queue()
         self._commands: SimpleQueue[bytes | None] = SimpleQueue()
-        self._until = monotonic() + MAX_SECONDS
+        self._deadline = monotonic() + MAX_SECONDS
         self._killed = False
         """Whether the worker was killed because it did not obey ``stop``."""
         self._failure: str = ""
         """The reason for killing the worker, other than ``stop``."""
-        self._passing: asyncio.Task[None] | None = None
+        self._forward_task: asyncio.Task[None] | None = None
 
     def start(self, job: dict[str, Any]) -> None:
         """Send the worker its job, see :func:`armblocks.studio.runs.worker.work`."""
@@ -63,25 +63,25 @@ class RunProcess:
         self._commands.put(json.dumps(self.job).encode())
         for transfer in (self._read, self._write):
             Thread(target=transfer, args=(self._worker.pipe,), daemon=True).start()
-        self._passing = self._loop.create_task(self._pass_on())
+        self._forward_task = self._loop.create_task(self._forward_messages())
 
-    def obey(self, request: run_messages.RunCommand) -> None:
+    def send_command(self, request: run_messages.RunCommand) -> None:
         """Send a command to the worker; raises ``InputError`` if the run has ended."""
-        if self.state in ENDED:
+        if self.state in FINAL_STATES:
             raise InputError("the run has ended", where="run", fix="start the model again")
         self._commands.put(request.model_dump_json().encode())
         if isinstance(request, run_messages.Control) and request.action == "stop":
-            self._loop.call_later(STOP_SECONDS, self._force)
+            self._loop.call_later(STOP_SECONDS, self._kill_if_active)
 
     def end(self) -> None:
-        """Kill the process of the run; no more messages are passed on."""
-        if self._passing is not None:
-            self._passing.cancel()
+        """Kill the process of the run; no more messages are forwarded."""
+        if self._forward_task is not None:
+            self._forward_task.cancel()
         self._commands.put(None)
         self._worker.end()
 
-    def _force(self) -> None:
-        if self.state not in ENDED:
+    def _kill_if_active(self) -> None:
+        if self.state not in FINAL_STATES:
             self._killed = True
             self._worker.process.kill()
 
@@ -97,7 +97,7 @@ class RunProcess:
             self._loop.call_soon_threadsafe(self._queue.put_nowait, None)
 
     def _write(self, pipe: Connection) -> None:
-        """Send commands to the worker, in a separate thread, so that an unresponsive worker blocks nobody."""
+        """Send commands to the worker in a separate thread; a hung worker does not block the server."""
         try:
             while (command := self._commands.get()) is not None:
                 pipe.send_bytes(command)
@@ -106,7 +106,7 @@ class RunProcess:
 
     async def _next_message(self) -> bytes | None:
         """Return the next message of the worker; kill a worker that is silent or runs for too long."""
-        remaining = max(self._until - monotonic(), 0.0)
+        remaining = max(self._deadline - monotonic(), 0.0)
         timeout = min(SILENT_SECONDS, remaining) if self.state == "running" else remaining
         try:
             async with asyncio.timeout(timeout):
@@ -122,26 +122,26 @@ class RunProcess:
             self._worker.process.kill()
             return await self._queue.get()
 
-    async def _pass_on(self) -> None:
+    async def _forward_messages(self) -> None:
         last: run_messages.RunProgress | None = None
         while (message := await self._next_message()) is not None:
             if self._failure:
                 continue  # the worker is being killed; its last messages are not valid
             if message[:1] == b"S":
-                await self._pass_samples(message[1:])
+                await self._forward_samples(message[1:])
                 continue
             event = _EVENTS.validate_json(message[1:])
             if isinstance(event, run_messages.RunProgress):
                 self.state, last = event.state, event
             await self._notify(event)
         self._commands.put(None)
-        if self.state not in ENDED:
+        if self.state not in FINAL_STATES:
             await asyncio.to_thread(self._worker.process.join, JOIN_SECONDS)
             self.state = "stopped" if self._killed else "failed"
             await self._notify(self._final_progress(last))
 
-    async def _pass_samples(self, frame: bytes) -> None:
-        """Pass a frame on; end the run if the disk cannot store it."""
+    async def _forward_samples(self, frame: bytes) -> None:
+        """Forward a frame; end the run if the disk cannot store it."""
         try:
             await self._notify(frame)
         except OSError as error:

@@ -1,8 +1,9 @@
 """The stored messages of a run, for pages that connect later: after a reload, after a lost connection, or as
 a second page.
 
-The messages are in an unnamed temporary file, so that a long run needs no memory; the system removes the file
-with the process. If the disk is full, no more samples are stored, but the final message of the run still is.
+The messages are in an unnamed temporary file, so that a long run needs little memory. The system deletes
+the file when the process ends. If the disk is full, no more samples are stored, but the final message of the
+run still is.
 """
 
 from __future__ import annotations

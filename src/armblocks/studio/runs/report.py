@@ -14,7 +14,7 @@ from typing import Any
 
 from armblocks.errors import ArmblocksError, SimulationError
 from armblocks.studio.runs.worker import begin_run, limit_process
-from armblocks.studio.runs.workers import answer_of
+from armblocks.studio.runs.workers import process_reply
 
 MAX_SECONDS = 300.0
 
@@ -24,7 +24,7 @@ async def report_of(job: Mapping[str, Any]) -> bytes:
 
     Raises ``SimulationError`` with the error of the run or of the report, or if the report takes too long.
     """
-    return _page(await answer_of(write, job, MAX_SECONDS))
+    return _page(await process_reply(send_report, job, MAX_SECONDS))
 
 
 def _page(reply: bytes) -> bytes:
@@ -42,7 +42,7 @@ def _page(reply: bytes) -> bytes:
     return reply[1:]
 
 
-def write(pipe: Connection, job: dict[str, Any]) -> None:
+def send_report(pipe: Connection, job: dict[str, Any]) -> None:
     """Run the model, write the report and send it; executed in the separate process."""
     limit_process()
     from armblocks.report import write_report

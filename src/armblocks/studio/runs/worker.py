@@ -47,7 +47,7 @@ MAX_MEMORY_BYTES = 8 * 2**30
 """Limit of the address space of a worker, bytes."""
 MAX_CPU_SECONDS = 3600
 MAX_NUMBERS = 16_000_000
-"""Numbers of one run that a page receives, 128 MB; beyond it, only extreme values are sent."""
+"""Limit of the numbers of one run that a page receives (128 MB); longer records are reduced to extremes."""
 
 
 def work(pipe: Connection) -> None:

@@ -37,20 +37,20 @@ def process_context() -> ForkServerContext | SpawnContext:
     return context
 
 
-async def answer_of(
-    answer: Callable[[Connection, dict[str, Any]], None], job: Mapping[str, Any], seconds: float
+async def process_reply(
+    send_reply: Callable[[Connection, dict[str, Any]], None], job: Mapping[str, Any], seconds: float
 ) -> bytes:
-    """Let a new process send one message about a job; ``b""`` if it ends or takes longer."""
+    """Return the message that ``send_reply`` sends in a new process; ``b""`` if it sends none in time."""
     context = process_context()
-    ours, theirs = context.Pipe(duplex=False)
-    process = context.Process(target=answer, args=(theirs, dict(job)), daemon=True)
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=send_reply, args=(sender, dict(job)), daemon=True)
     await asyncio.to_thread(process.start)
-    theirs.close()
+    sender.close()
     try:
-        return await asyncio.to_thread(_received, ours, seconds)
+        return await asyncio.to_thread(_received, receiver, seconds)
     finally:
         process.kill()
-        ours.close()
+        receiver.close()
 
 
 def _received(pipe: Connection, seconds: float) -> bytes:
@@ -71,10 +71,10 @@ class Worker:
 
     def __init__(self) -> None:
         context = process_context()
-        self.pipe, theirs = context.Pipe()
-        self.process = context.Process(target=_work, args=(theirs,), daemon=True)
+        self.pipe, sender = context.Pipe()
+        self.process = context.Process(target=_work, args=(sender,), daemon=True)
         self.process.start()
-        theirs.close()
+        sender.close()
 
     def end(self) -> None:
         """Kill the process."""
@@ -82,32 +82,32 @@ class Worker:
         self.pipe.close()
 
 
-PAUSE_SECONDS = 0.5
+NEXT_WORKER_DELAY_SECONDS = 0.5
 """Delay between the start of a run and the start of the next worker, so that the run starts alone, s."""
 
 
 class Workers:
     """Provides workers; during a run the next worker is started in advance."""
 
-    def __init__(self, pause: float = PAUSE_SECONDS) -> None:
-        self._pause = pause
-        self._next: asyncio.Task[Worker] | None = None
-        self._later: asyncio.TimerHandle | None = None
+    def __init__(self, delay: float = NEXT_WORKER_DELAY_SECONDS) -> None:
+        self._delay = delay
+        self._next_worker: asyncio.Task[Worker] | None = None
+        self._timer: asyncio.TimerHandle | None = None
 
     def prepare(self, after: float = 0.0) -> None:
         """Start a worker after ``after`` seconds, if none is waiting."""
-        if self._later is not None:
-            self._later.cancel()
+        if self._timer is not None:
+            self._timer.cancel()
         if after > 0.0:
-            self._later = asyncio.get_running_loop().call_later(after, self.prepare)
-        elif self._next is None:
-            self._next = asyncio.get_running_loop().create_task(asyncio.to_thread(Worker))
+            self._timer = asyncio.get_running_loop().call_later(after, self.prepare)
+        elif self._next_worker is None:
+            self._next_worker = asyncio.get_running_loop().create_task(asyncio.to_thread(Worker))
 
     async def take(self) -> Worker:
         """Return a worker for one run. Raises ``SimulationError`` if no process can be started."""
         while True:
             self.prepare()
-            starting, self._next = self._next, None
+            starting, self._next_worker = self._next_worker, None
             assert starting is not None
             try:
                 worker = await starting
@@ -119,16 +119,20 @@ class Workers:
                     fix="close other programs, and run the model again",
                 ) from None
             if worker.process.is_alive():
-                self.prepare(after=self._pause)
+                self.prepare(after=self._delay)
                 return worker
 
     def end(self) -> None:
         """Kill the waiting worker."""
-        if self._later is not None:
-            self._later.cancel()
-        if self._next is None:
+        if self._timer is not None:
+            self._timer.cancel()
+        if self._next_worker is None:
             return
-        if self._next.done() and not self._next.cancelled() and self._next.exception() is None:
-            self._next.result().end()
-        self._next.cancel()
-        self._next = None
+        if (
+            self._next_worker.done()
+            and not self._next_worker.cancelled()
+            and self._next_worker.exception() is None
+        ):
+            self._next_worker.result().end()
+        self._next_worker.cancel()
+        self._next_worker = None

@@ -27,7 +27,7 @@ Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
 Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
-SAFE = ("GET", "HEAD")
+SAFE_METHODS = ("GET", "HEAD")
 CHANGE_HEADER = "x-armblocks"
 POLICY_VIOLATION = 4403
 """Close code of a rejected websocket."""
@@ -73,7 +73,7 @@ class Keys:
         return self._login
 
     def spend_login(self, login: str) -> bool:
-        """Whether ``login`` is valid; it becomes invalid."""
+        """Return whether ``login`` is valid, and invalidate it."""
         is_valid = self._login is not None and hmac.compare_digest(login.encode(), self._login.encode())
         if is_valid:
             self._login = None
@@ -131,7 +131,7 @@ class Guard:
         if len(origins) > 1 or (origins and origins[0].lower() not in self._origins):
             return 403, "requests from other pages are refused"
         websocket = scope["type"] == "websocket"
-        changing = websocket or scope["method"] not in SAFE
+        changing = websocket or scope["method"] not in SAFE_METHODS
         if (
             changing
             and values("sec-fetch-site")

@@ -27,7 +27,7 @@ from armblocks.studio.protocol.answers import Answers
 from armblocks.studio.protocol.envelope import Envelope, Reply
 from armblocks.studio.protocol.message import Fault
 from armblocks.studio.protocol.messages.studio import FileList, Files, Ping, Welcome
-from armblocks.studio.protocol.page import NoRequestError, Page, Pages
+from armblocks.studio.protocol.page import InvalidRequestError, Page, Pages
 from armblocks.studio.robots.open_robots import OpenRobots
 from armblocks.studio.robots.presenter import RobotPresenter
 from armblocks.studio.robots.requests import RobotRequests
@@ -35,15 +35,15 @@ from armblocks.studio.runs.checks import Checks
 from armblocks.studio.runs.diagram_runs import DiagramRuns
 from armblocks.studio.runs.settings import setting_rules, solver_choices
 from armblocks.studio.sheet.data_requests import DataRequests
+from armblocks.studio.sheet.drawing_data import library
 from armblocks.studio.sheet.lines import LinesOfSheets
 from armblocks.studio.sheet.nesting import with_robot
 from armblocks.studio.sheet.open_documents import OpenDocuments
 from armblocks.studio.sheet.presenter import DiagramPresenter
 from armblocks.studio.sheet.queries import SheetQueries
-from armblocks.studio.sheet.shown import library
 
 LOG = logging.getLogger(__name__)
-NO_REQUEST = Fault(
+INVALID_REQUEST = Fault(
     what="this is not a request of the studio",
     where="page",
     allowed="requests of the page of this version",
@@ -55,7 +55,7 @@ DEFECT = Fault(
     allowed="a reply, or an error that explains why it is impossible",
     fix="report it with the steps that led to it; your drawing is not affected",
 )
-_NUMBERED = re.compile(r'\s*\{\s*"number"\s*:\s*(\d{1,15})\s*,')
+_REQUEST_NUMBER = re.compile(r'\s*\{\s*"number"\s*:\s*(\d{1,15})\s*,')
 
 
 class Hub:
@@ -71,29 +71,33 @@ class Hub:
         self.runs = DiagramRuns(self._pages, self._diagrams, checks.job)
         lines = LinesOfSheets()
         robots = RobotPresenter(OpenRobots(folder, self._state), folder, self._robot_saved)
-        self._shown = DiagramPresenter(self._diagrams, self._pages, self.runs, lines, checks.of)
-        self.documents = DocumentRequests(folder, self._pages, {"diagram": self._shown, "robot": robots})
+        self._diagram_presenter = DiagramPresenter(
+            self._diagrams, self._pages, self.runs, lines, checks.check
+        )
+        self.documents = DocumentRequests(
+            folder, self._pages, {"diagram": self._diagram_presenter, "robot": robots}
+        )
         self.answers = Answers()
         self.answers.on(Ping, self._ping)
         self.answers.on(Files, self._files)
-        for part in (
+        for handlers in (
             self.documents,
             SheetQueries(folder, self.documents, self._diagrams, self._resolve_robot, lines),
             DataRequests(data, self._files_changed),
             RobotRequests(folder, self.documents, robots, self._diagrams),
             self.runs,
         ):
-            part.register(self.answers)
-        self._watching: list[asyncio.Task[None]] = []
+            handlers.register(self.answers)
+        self._watch_tasks: list[asyncio.Task[None]] = []
 
     def prepare(self) -> None:
-        """Start to watch the files."""
-        self._folder.sweep(self._state.recent())
-        self._watching = self.documents.watch()
+        """Remove abandoned temporary files, and start to watch the open files for changes."""
+        self._folder.remove_stray_files(self._state.recent())
+        self._watch_tasks = self.documents.watch()
 
     def close(self) -> None:
         """End all runs and close the documents; journals of unsaved documents remain."""
-        for task in self._watching:
+        for task in self._watch_tasks:
             task.cancel()
         self.documents.end()
         self.runs.close()
@@ -118,7 +122,7 @@ class Hub:
             )
         )
 
-    def leave(self, page: Page) -> None:
+    def remove_page(self, page: Page) -> None:
         """Remove a page that has disconnected; its documents stay open for a reconnection."""
         self._pages.discard(page)
 
@@ -126,19 +130,19 @@ class Hub:
         """Handle one request; every request with a number gets a reply, also an invalid one.
 
         A page repeats a request without a reply, so invalid requests and defects are reported in a reply.
-        Raises ``NoRequestError`` for a text without a request number.
+        Raises ``InvalidRequestError`` for a text without a request number.
         """
         try:
             envelope = Envelope.model_validate_json(text)
         except ValidationError as error:
-            numbered = _NUMBERED.match(text)
-            if numbered is None:
-                raise NoRequestError(str(error)) from None
-            await page.notify(Reply(number=int(numbered[1]), fault=NO_REQUEST))
+            match = _REQUEST_NUMBER.match(text)
+            if match is None:
+                raise InvalidRequestError(str(error)) from None
+            await page.notify(Reply(number=int(match[1]), fault=INVALID_REQUEST))
             return
         number, fault, value = envelope.number, None, None
         try:
-            value = await self.answers.to(page, envelope.request)
+            value = await self.answers.reply_to(page, envelope.request)
         except ArmblocksError as error:
             fault = Fault(what=error.what, where=error.where, allowed=error.allowed, fix=error.fix)
         except Exception as error:
@@ -153,9 +157,9 @@ class Hub:
         return FileList(files=self._folder.files(), recent=self._recent())
 
     def _recent(self) -> list[str]:
-        return [path for path in self._state.recent() if self._is_there(path)]
+        return [path for path in self._state.recent() if self._exists(path)]
 
-    def _is_there(self, path: str) -> bool:
+    def _exists(self, path: str) -> bool:
         with contextlib.suppress(ArmblocksError):
             return self._folder.exists(path)
         return False
@@ -184,14 +188,14 @@ class Hub:
     def _files_changed(self) -> None:
         """Check all open diagrams again after a change of a table or of the trust in a Python file."""
         for open_file in self._diagrams:
-            self._shown.changed(open_file)
+            self._diagram_presenter.on_changed(open_file)
 
     async def _robot_saved(self, robot: Robot) -> None:
         """Update the diagrams that use a robot whose file was saved, as one undo step each."""
         for open_file in self._diagrams:
             after = with_robot(open_file.document.diagram, robot)
             if after is not open_file.document.diagram:
-                await self.documents.replace(open_file, f"new form of {robot.name}", after)
+                await self.documents.replace(open_file, f"update {robot.name}", after)
 
 
 @lru_cache(maxsize=64)

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any
 
-Raised = tuple[type[BaseException], BaseException, TracebackType | None] | tuple[None, None, None]
+ExceptionInfo = tuple[type[BaseException], BaseException, TracebackType | None] | tuple[None, None, None]
 
 
 class DiscreetFormatter(logging.Formatter):
@@ -23,10 +23,10 @@ class DiscreetFormatter(logging.Formatter):
         super().__init__("%(levelname)s: %(message)s")
         self._secrets = secrets
 
-    def formatException(self, ei: Raised) -> str:
+    def formatException(self, ei: ExceptionInfo) -> str:
         """Return the traceback and the type of the exception, without its message."""
-        kind, _, place = ei
-        frames = "".join(traceback.format_tb(place))
+        kind, _, trace = ei
+        frames = "".join(traceback.format_tb(trace))
         return f"{frames}{kind.__name__ if kind is not None else ''}".rstrip()
 
     def format(self, record: logging.LogRecord) -> str:

@@ -1,4 +1,4 @@
-"""The web application of the studio: one page, one websocket, a few downloads, behind the guard.
+"""The web application of the studio: one page, one websocket and a few downloads, protected by the guard.
 
 The page itself needs no hub and is served at once. The imports of the hub take longer than loading the page,
 so the hub is created in a thread meanwhile (:class:`FutureHub`), and requests that need it wait.
@@ -26,7 +26,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from armblocks.errors import ArmblocksError
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol.outbox import Outbox
-from armblocks.studio.protocol.page import NoRequestError, Page
+from armblocks.studio.protocol.page import InvalidRequestError, Page
 from armblocks.studio.server.guard import Guard, Keys
 
 if TYPE_CHECKING:
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
 DRAWING_TYPES = {"svg": "image/svg+xml", "png": "image/png", "pdf": "application/pdf"}
 THEMES = ("light", "dark", None)
-FOREVER = "private, max-age=31536000, immutable"
-"""Cache lifetime of a file whose name contains a hash of its content."""
+CACHE_CONTROL = "private, max-age=31536000, immutable"
+"""Cache header of a file whose name contains a hash of its content."""
 
 
 class Assets(StaticFiles):
@@ -50,7 +50,7 @@ class Assets(StaticFiles):
     ) -> Response:
         """Return the file with a permanent cache lifetime."""
         response = super().file_response(full_path, stat_result, scope, status_code)
-        response.headers["cache-control"] = FOREVER
+        response.headers["cache-control"] = CACHE_CONTROL
         return response
 
 
@@ -63,20 +63,20 @@ class FutureHub:
         self._started = False
 
     def begin(self) -> None:
-        """Start to create the hub, once."""
+        """Start creating the hub; later calls do nothing."""
         if not self._started:
             self._started = True
-            Thread(target=self._make, name="hub").start()
+            Thread(target=self._create_hub, name="hub").start()
 
     async def ready(self) -> Hub:
         """Return the hub when it exists; raise the error that prevented its creation."""
         self.begin()
         return await asyncio.shield(asyncio.wrap_future(self.result))
 
-    def _make(self) -> None:
+    def _create_hub(self) -> None:
         try:
             from armblocks.studio.server.hub import Hub
-            from armblocks.studio.sheet.shown import library
+            from armblocks.studio.sheet.drawing_data import library
 
             library()  # fills its cache for the first page
             self.result.set_result(Hub(self._folder))
@@ -93,13 +93,15 @@ class Endpoints:
     web: Path
 
     async def health(self, _: Request) -> Response:
-        """Report that the studio is running here."""
+        """Report that the server at this address is a studio."""
         return PlainTextResponse("armblocks studio")
 
     async def login(self, request: Request) -> Response:
         """Exchange the one-time key of the link for the session cookie."""
         if not self.keys.spend_login(request.query_params.get("key", "")):
-            return PlainTextResponse("this login link was used or is wrong: start the studio again", 401)
+            return PlainTextResponse(
+                "this login link was already used or is invalid: start the studio again", 401
+            )
         answer = RedirectResponse("/", status_code=303)
         answer.set_cookie(
             self.keys.cookie_name, self.keys.session, httponly=True, samesite="strict", path="/"
@@ -112,13 +114,13 @@ class Endpoints:
 
     async def drawing(self, request: Request) -> Response:
         """Return a sheet as a file for download."""
-        requested, kind = request.query_params, request.path_params["kind"]
-        theme = requested.get("theme")
+        query, kind = request.query_params, request.path_params["kind"]
+        theme = query.get("theme")
         if theme not in THEMES:
             return PlainTextResponse("the theme must be light or dark", 422)
         hub, document = await self.hub.ready(), request.path_params["document"]
         try:
-            data = await hub.drawing(document, kind, sheet=requested.get("sheet", ""), theme=theme)
+            data = await hub.drawing(document, kind, sheet=query.get("sheet", ""), theme=theme)
         except ArmblocksError as error:
             return PlainTextResponse(str(error), 404)
         return Response(data, media_type=DRAWING_TYPES[kind])
@@ -141,7 +143,7 @@ class Endpoints:
             return PlainTextResponse(str(error), 404)
         return Response(data, media_type="text/html")
 
-    async def talk(self, socket: WebSocket) -> None:
+    async def websocket(self, socket: WebSocket) -> None:
         """Serve the websocket of a page until it disconnects."""
         await socket.accept()
         outbox = Outbox(socket.send_text, socket.send_bytes)
@@ -151,21 +153,21 @@ class Endpoints:
         try:
             while (text := await _received(socket, sending)) is not None:
                 await hub.answer(page, text)
-        except (NoRequestError, KeyError):
+        except (InvalidRequestError, KeyError):
             await socket.close(1008, "this is not a request of the studio")
         except WebSocketDisconnect:
             pass
         finally:
-            hub.leave(page)
+            hub.remove_page(page)
             sending.cancel()
             await asyncio.gather(sending, return_exceptions=True)
 
 
 async def _received(socket: WebSocket, sending: asyncio.Task[None]) -> str | None:
-    """Return the next message of the page; ``None`` if nothing can be sent to the page any more.
+    """Return the next message of the page; ``None`` after a failed transmission to the page.
 
-    After a failed transmission, ``receive_text`` raises an error that is not a ``WebSocketDisconnect``, also
-    while messages of the page are left.
+    After a failed transmission, ``receive_text`` raises an error that is not a ``WebSocketDisconnect``, even
+    if messages of the page are still queued.
     """
     receiving = asyncio.create_task(socket.receive_text())
     try:
@@ -173,13 +175,13 @@ async def _received(socket: WebSocket, sending: asyncio.Task[None]) -> str | Non
         return None if sending.done() else receiving.result()
     finally:
         if receiving.done():
-            receiving.exception()  # an error of an ended connection is not reported
+            receiving.exception()  # marks the error as retrieved, so that asyncio does not log it
         else:
             receiving.cancel()
 
 
 def studio_app(hub: FutureHub, keys: Keys, hosts: frozenset[str], web: Path) -> Guard:
-    """Create the guarded application. ``hosts``: the ``Host`` values of this server."""
+    """Create the guarded application. ``hosts``: the accepted values of the HTTP header ``Host``."""
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncGenerator[None]:
@@ -200,7 +202,7 @@ def studio_app(hub: FutureHub, keys: Keys, hosts: frozenset[str], web: Path) -> 
         Route("/drawing/{document}.{kind}", endpoints.drawing),
         Route("/example/{name}.svg", endpoints.example),
         Route("/report/{document}", endpoints.report),
-        WebSocketRoute("/ws", endpoints.talk),
+        WebSocketRoute("/ws", endpoints.websocket),
         Route("/", endpoints.index),
         Mount("/assets", Assets(directory=web / "assets", check_dir=False)),
         Mount("/", StaticFiles(directory=web)),

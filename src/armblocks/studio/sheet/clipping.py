@@ -15,7 +15,7 @@ from armblocks.blocks import BLOCKS
 from armblocks.diagram import Block, Connection, Diagram, PortRef
 from armblocks.diagram.mask import formula_names
 from armblocks.diagram.names import FreeNames, folded
-from armblocks.drawing.block_boxes import standing_box
+from armblocks.drawing.block_boxes import box_at_placement
 from armblocks.drawing.wires import moved_bends
 from armblocks.errors import DiagramError
 from armblocks.studio.sheet.nesting import check_free
@@ -130,7 +130,7 @@ def _unused_names(
 def leaves_horizontally(wire: Connection, diagram: Diagram) -> bool:
     """Whether a wire leaves its block horizontally."""
     block, place = diagram.blocks[wire.source.block], diagram.layout[wire.source.block]
-    ports = standing_box(wire.source.block, block, place).outputs
+    ports = box_at_placement(wire.source.block, block, place).outputs
     return any(port.name == wire.source.port and port.dx != 0 for port in ports)
 
 

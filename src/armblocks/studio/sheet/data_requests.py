@@ -26,7 +26,7 @@ _INVISIBLE = re.compile(
     "[\u0000-\u0008\u000b\u000c\u000e-\u001f\u007f-\u009f\u00ad\u061c\u200b-\u200f"
     "\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb]"
 )
-"""Control characters and those that change the direction of text or have no width."""
+"""Control characters, and characters that change the direction of text or have no width."""
 
 
 class DataRequests:
@@ -44,15 +44,15 @@ class DataRequests:
         """Register the handlers of the requests about data files."""
         answers.on(data_messages.DataFileList, self._files)
         answers.on(data_messages.PreviewTable, self._preview)
-        answers.on(data_messages.StoreFile, self._keep)
+        answers.on(data_messages.StoreFile, self._store)
         answers.on(data_messages.ReadSource, self._source)
         answers.on(data_messages.TrustSource, self._trust)
 
     async def _files(self, _: Page, request: data_messages.DataFileList) -> list[data_messages.DataFile]:
         suffixes = TABLE_SUFFIXES if request.holds == "table" else SOURCE_SUFFIXES
-        return await asyncio.to_thread(self._listed, suffixes)
+        return await asyncio.to_thread(self._files_with, suffixes)
 
-    def _listed(self, suffixes: tuple[str, ...]) -> list[data_messages.DataFile]:
+    def _files_with(self, suffixes: tuple[str, ...]) -> list[data_messages.DataFile]:
         found: list[data_messages.DataFile] = []
         for path in self._folder.files(suffixes):
             try:
@@ -70,12 +70,12 @@ class DataRequests:
             try:
                 file = self._data.columns(path)
             except ArmblocksError as error:
-                raise _relative(error, request.file) from None
+                raise _with_relative_path(error, request.file) from None
             return table_preview(file, request.file, request.time, request.columns)
 
         return await asyncio.to_thread(read)
 
-    async def _keep(self, _: Page, request: data_messages.StoreFile) -> data_messages.StoredFile:
+    async def _store(self, _: Page, request: data_messages.StoreFile) -> data_messages.StoredFile:
         data = dropped_bytes(request.content, request.name[:80])
         name = PurePath(request.name).name
         path = self._folder.path(name, TABLE_SUFFIXES)
@@ -84,7 +84,7 @@ class DataRequests:
             try:
                 columns_of(data, path)
             except ArmblocksError as error:
-                raise _relative(error, name) from None
+                raise _with_relative_path(error, name) from None
             if path.exists() and not request.replace:
                 return _has_content(path, data)
             self._folder.write_data(name, data, TABLE_SUFFIXES)
@@ -156,6 +156,6 @@ def _has_content(path: Path, data: bytes) -> bool:
         return False
 
 
-def _relative(error: ArmblocksError, shown: str) -> FormatError:
+def _with_relative_path(error: ArmblocksError, shown: str) -> FormatError:
     """The error with the path in the project instead of the absolute path."""
     return FormatError(error.what, where=shown, allowed=error.allowed, fix=error.fix)

@@ -13,7 +13,7 @@ from armblocks.studio.protocol.messages.documents import Change
 from armblocks.studio.protocol.messages.sheet_edits import DiagramEdit, ModelEdit
 from armblocks.studio.sheet.clipping import ReadDiagram, reader
 from armblocks.studio.sheet.edits import EDITS, EditContext
-from armblocks.studio.sheet.nesting import check_own, inside, with_inside
+from armblocks.studio.sheet.nesting import check_editable, inside, with_inside
 from armblocks.studio.sheet.parameter_sets import with_consistent_sets
 from armblocks.studio.sheet.parameter_values import ResolveRobot
 
@@ -51,7 +51,7 @@ class Document(Edited[Diagram]):
         """
         self.perform(Change(document="", inside=list(path), edit=edit))
 
-    def written(self, value: Diagram, name: str) -> None:
+    def mark_saved(self, value: Diagram, name: str) -> None:
         """Mark ``value``, which is the present diagram or a former one, as the content of the file ``name``.
 
         A diagram with another name is renamed, together with the diagrams for undo and redo.
@@ -65,7 +65,7 @@ class Document(Edited[Diagram]):
         edit, title = request.edit, EDITS.title(request.edit)
         if isinstance(edit, ModelEdit):
             return Outcome(title, EDITS.applied(edit, self.diagram, self._context), request.gesture)
-        check_own(self.diagram, request.inside)
+        check_editable(self.diagram, request.inside)
         sheet = EDITS.applied(edit, inside(self.diagram, request.inside), self._context)
         after = with_inside(self.diagram, request.inside, sheet)
         return Outcome(

@@ -37,6 +37,7 @@ from armblocks.formats.data_files import DataFiles
 from armblocks.studio.documents.edit_table import EditTable
 from armblocks.studio.protocol.messages.sheet_edits import (
     AddBlocks,
+    AddBookmark,
     ApplyParameterSet,
     ArrangeBlocks,
     BendWires,
@@ -55,9 +56,11 @@ from armblocks.studio.protocol.messages.sheet_edits import (
     PasteBlocks,
     Place,
     RemoveBlocks,
+    RemoveBookmark,
     RemoveParameterSet,
     RemoveSetParameter,
     Rename,
+    RenameBookmark,
     RenameParameterSet,
     SaveParameterSet,
     SetAppearance,
@@ -68,7 +71,7 @@ from armblocks.studio.protocol.messages.sheet_edits import (
     SheetNote,
     Wire,
 )
-from armblocks.studio.sheet import parameter_sets
+from armblocks.studio.sheet import bookmarks, parameter_sets
 from armblocks.studio.sheet.clipping import ReadDiagram, leaves_horizontally, pasted, reader
 from armblocks.studio.sheet.grounding import grounded
 from armblocks.studio.sheet.mask_edits import with_mask
@@ -113,7 +116,7 @@ def applied(
 # -- blocks --------------------------------------------------------------------------------------------------
 
 
-@EDITS.on(AddBlocks, lambda edit: f"add {_listed([block.name for block in edit.blocks])}")
+@EDITS.on(AddBlocks, lambda edit: f"add {_name_list([block.name for block in edit.blocks])}")
 def _add(edit: AddBlocks, diagram: Diagram, context: EditContext) -> Diagram:
     where = f"diagram '{diagram.name}'"
     blocks, layout = dict(diagram.blocks), dict(diagram.layout)
@@ -126,8 +129,8 @@ def _add(edit: AddBlocks, diagram: Diagram, context: EditContext) -> Diagram:
         layout[new.name] = _placement(new.place)
     added = dataclasses.replace(diagram, blocks=blocks, layout=layout)
     if edit.instead:
-        added = _without(RemoveBlocks(wires=edit.instead), added)
-    return _connected(edit.wires, added, replace=False)
+        added = _without_removed(RemoveBlocks(wires=edit.instead), added)
+    return _with_wires(edit.wires, added, replace=False)
 
 
 @EDITS.on(PasteBlocks, lambda edit: "paste")
@@ -150,8 +153,8 @@ def _check_room(diagram: Diagram, count: int) -> None:
 
 def _new_block(new: NewBlock, scope: Scope, context: EditContext) -> Block:
     resolve_robot, where = context.resolve_robot, f"block '{new.name}'"
-    kind = BLOCKS[new.type]
-    rules = {rule.name: rule for rule in kind.parameters()}
+    block_type = BLOCKS[new.type]
+    rules = {rule.name: rule for rule in block_type.parameters()}
     values: dict[str, Any] = {}
     for name, value in new.parameters.items():
         if name not in rules:
@@ -161,7 +164,7 @@ def _new_block(new: NewBlock, scope: Scope, context: EditContext) -> Block:
         if rule.required and name not in values:
             default = DEFAULT_ROBOT if rule.kind is ParameterKind.ROBOT else None
             values[name] = parameter_value(rule, default, where, resolve_robot)
-    block = kind(**values)
+    block = block_type(**values)
     # The sheet of a new subsystem must be drawable as well.
     return (
         dataclasses.replace(block, diagram=placed(block.diagram))
@@ -172,20 +175,20 @@ def _new_block(new: NewBlock, scope: Scope, context: EditContext) -> Block:
 
 def _removal_title(edit: RemoveBlocks) -> str:
     if edit.blocks:
-        return f"delete {_listed(edit.blocks)}"
-    return f"delete {_counted(edit.wires, 'wire') if edit.wires else _counted(edit.notes, 'note')}"
+        return f"delete {_name_list(edit.blocks)}"
+    return f"delete {_count_text(edit.wires, 'wire') if edit.wires else _count_text(edit.notes, 'note')}"
 
 
 @EDITS.on(RemoveBlocks, _removal_title)
 def _remove(edit: RemoveBlocks, diagram: Diagram, _: EditContext) -> Diagram:
-    return _without(edit, diagram)
+    return _without_removed(edit, diagram)
 
 
-def _without(edit: RemoveBlocks, diagram: Diagram) -> Diagram:
-    removed = {_known(name, diagram) for name in edit.blocks}
-    cut = {connection(wire) for wire in edit.wires}
-    for wire in cut:
-        _present(wire, diagram)
+def _without_removed(edit: RemoveBlocks, diagram: Diagram) -> Diagram:
+    removed = {_checked_block(name, diagram) for name in edit.blocks}
+    removed_wires = {connection(wire) for wire in edit.wires}
+    for wire in removed_wires:
+        _checked_wire(wire, diagram)
     return dataclasses.replace(
         diagram,
         blocks={name: block for name, block in diagram.blocks.items() if name not in removed},
@@ -194,13 +197,15 @@ def _without(edit: RemoveBlocks, diagram: Diagram) -> Diagram:
         connections=tuple(
             wire
             for wire in diagram.connections
-            if wire not in cut and wire.source.block not in removed and wire.target.block not in removed
+            if wire not in removed_wires
+            and wire.source.block not in removed
+            and wire.target.block not in removed
         ),
         logged=tuple(ref for ref in diagram.logged if ref.block not in removed),
     )
 
 
-def _present(wire: Connection, diagram: Diagram) -> Connection:
+def _checked_wire(wire: Connection, diagram: Diagram) -> Connection:
     if wire not in diagram.connections:
         raise DiagramError(
             f"the wire {wire} does not exist",
@@ -221,10 +226,10 @@ def _log(edit: LogSignal, diagram: Diagram, _: EditContext) -> Diagram:
 
 @EDITS.on(Connect, lambda edit: f"connect {edit.wire.source} to {edit.wire.target}")
 def _connect(edit: Connect, diagram: Diagram, _: EditContext) -> Diagram:
-    return _connected([edit.wire], diagram, replace=edit.replace)
+    return _with_wires([edit.wire], diagram, replace=edit.replace)
 
 
-def _connected(wires: Sequence[Wire], diagram: Diagram, *, replace: bool) -> Diagram:
+def _with_wires(wires: Sequence[Wire], diagram: Diagram, *, replace: bool) -> Diagram:
     connections = {wire.target: wire for wire in diagram.connections}
     for wire in wires:
         added = connection(wire)
@@ -242,7 +247,7 @@ def _connected(wires: Sequence[Wire], diagram: Diagram, *, replace: bool) -> Dia
     if not wires:
         return diagram
     connected = dataclasses.replace(diagram, connections=tuple(connections.values()))
-    return _bent([wire for wire in wires if wire.bends], connected)
+    return _with_bends([wire for wire in wires if wire.bends], connected)
 
 
 def connection(wire: Wire) -> Connection:
@@ -263,7 +268,7 @@ def _port(text: str) -> PortRef:
 
 
 def _check_port(ref: PortRef, diagram: Diagram, *, output: bool) -> None:
-    block = diagram.blocks[_known(ref.block, diagram)]
+    block = diagram.blocks[_checked_block(ref.block, diagram)]
     ports = [port.name for port in (block.output_ports() if output else block.input_ports())]
     if ref.port not in ports:
         side = "output" if output else "input"
@@ -273,8 +278,8 @@ def _check_port(ref: PortRef, diagram: Diagram, *, output: bool) -> None:
 def _move_title(edit: MoveBlocks) -> str:
     if edit.instead and edit.places:
         into = len(edit.wires) > len(edit.instead)
-        return f"{'insert' if into else 'disconnect'} {_listed(list(edit.places))}"
-    return f"move {_listed(list(edit.places)) if edit.places else _counted(edit.notes, 'note')}"
+        return f"{'insert' if into else 'disconnect'} {_name_list(list(edit.places))}"
+    return f"move {_name_list(list(edit.places)) if edit.places else _count_text(edit.notes, 'note')}"
 
 
 @EDITS.on(MoveBlocks, _move_title)
@@ -282,7 +287,7 @@ def _move(edit: MoveBlocks, diagram: Diagram, _: EditContext) -> Diagram:
     layout = dict(diagram.layout)
     shifts: dict[str, tuple[float, float]] = {}
     for name, place in edit.places.items():
-        before, after = layout[_known(name, diagram)], _placement(place)
+        before, after = layout[_checked_block(name, diagram)], _placement(place)
         layout[name] = after
         if dataclasses.replace(before, x=after.x, y=after.y) == after:
             shifts[name] = (after.x - before.x, after.y - before.y)
@@ -291,43 +296,44 @@ def _move(edit: MoveBlocks, diagram: Diagram, _: EditContext) -> Diagram:
         shift = shifts.get(wire.source.block)
         if shift is not None and shift == shifts.get(wire.target.block):
             bends[wire] = moved_bends(values, leaves_horizontally(wire, diagram), shift)
-    moved = _noted(edit.notes, dataclasses.replace(diagram, layout=layout, bends=bends), known=True)
-    return _connected(edit.wires, _without(RemoveBlocks(wires=edit.instead), moved), replace=False)
+    moved = _with_notes(edit.notes, dataclasses.replace(diagram, layout=layout, bends=bends), known=True)
+    return _with_wires(edit.wires, _without_removed(RemoveBlocks(wires=edit.instead), moved), replace=False)
 
 
 def _appearance_title(edit: SetAppearance) -> str:
     if edit.colour is not None:
-        return f"colour {_listed(edit.blocks)}"
-    return f"{'hide' if edit.name_side == 'hidden' else 'move'} the name of {_listed(edit.blocks)}"
+        return f"colour {_name_list(edit.blocks)}"
+    return f"{'hide' if edit.name_side == 'hidden' else 'move'} the name of {_name_list(edit.blocks)}"
 
 
 @EDITS.on(SetAppearance, _appearance_title)
 def _set_appearance(edit: SetAppearance, diagram: Diagram, _: EditContext) -> Diagram:
-    stated = edit.model_dump(include={"name_side", "colour"}, exclude_none=True)
+    changes = edit.model_dump(include={"name_side", "colour"}, exclude_none=True)
     changed = {
-        name: dataclasses.replace(diagram.layout[_known(name, diagram)], **stated) for name in edit.blocks
+        name: dataclasses.replace(diagram.layout[_checked_block(name, diagram)], **changes)
+        for name in edit.blocks
     }
     return dataclasses.replace(diagram, layout={**diagram.layout, **changed})
 
 
-@EDITS.on(BendWires, lambda edit: f"bend {_counted(edit.wires, 'wire')}")
+@EDITS.on(BendWires, lambda edit: f"bend {_count_text(edit.wires, 'wire')}")
 def _bend(edit: BendWires, diagram: Diagram, _: EditContext) -> Diagram:
-    return _bent(edit.wires, diagram)
+    return _with_bends(edit.wires, diagram)
 
 
-def _bent(wires: Sequence[Wire], diagram: Diagram) -> Diagram:
+def _with_bends(wires: Sequence[Wire], diagram: Diagram) -> Diagram:
     bends = dict(diagram.bends)
     for wire in wires:
-        bends[_present(connection(wire), diagram)] = tuple(wire.bends)
+        bends[_checked_wire(connection(wire), diagram)] = tuple(wire.bends)
     return dataclasses.replace(diagram, bends=bends)
 
 
-@EDITS.on(SetNotes, lambda edit: f"write {_counted(edit.notes, 'note')}")
+@EDITS.on(SetNotes, lambda edit: f"write {_count_text(edit.notes, 'note')}")
 def _write_notes(edit: SetNotes, diagram: Diagram, _: EditContext) -> Diagram:
-    return _noted(edit.notes, diagram)
+    return _with_notes(edit.notes, diagram)
 
 
-def _noted(notes: Mapping[str, SheetNote], diagram: Diagram, *, known: bool = False) -> Diagram:
+def _with_notes(notes: Mapping[str, SheetNote], diagram: Diagram, *, known: bool = False) -> Diagram:
     if not notes:
         return diagram
     for name in notes if known else ():
@@ -343,7 +349,7 @@ def _placement(place: Place) -> Placement:
 
 @EDITS.on(Rename, lambda edit: f"rename {edit.block}")
 def _rename(edit: Rename, diagram: Diagram, _: EditContext) -> Diagram:
-    _known(edit.block, diagram)
+    _checked_block(edit.block, diagram)
     used_names = {folded(name): name for name in diagram.blocks if name != edit.block}
     check_free(edit.name, used_names, f"diagram '{diagram.name}'")
 
@@ -378,15 +384,15 @@ def _name_signal(edit: NameSignal, diagram: Diagram, _: EditContext) -> Diagram:
 
 @EDITS.on(GroundPorts, lambda edit: "ground and terminate ports")
 def _ground(edit: GroundPorts, diagram: Diagram, _: EditContext) -> Diagram:
-    return grounded(diagram, {_known(name, diagram) for name in edit.blocks} or set(diagram.blocks))
+    return grounded(diagram, {_checked_block(name, diagram) for name in edit.blocks} or set(diagram.blocks))
 
 
 _COMMENTED = {"out": "comment out", "through": "comment through", "": "uncomment"}
 
 
-@EDITS.on(CommentBlocks, lambda edit: f"{_COMMENTED[edit.comment]} {_listed(edit.blocks)}")
+@EDITS.on(CommentBlocks, lambda edit: f"{_COMMENTED[edit.comment]} {_name_list(edit.blocks)}")
 def _comment(edit: CommentBlocks, diagram: Diagram, _: EditContext) -> Diagram:
-    chosen = {_known(name, diagram) for name in edit.blocks}
+    chosen = {_checked_block(name, diagram) for name in edit.blocks}
     commented = {name: comment for name, comment in diagram.commented.items() if name not in chosen}
     if edit.comment:
         for name in sorted(chosen):
@@ -397,7 +403,7 @@ def _comment(edit: CommentBlocks, diagram: Diagram, _: EditContext) -> Diagram:
 
 @EDITS.on(SetParameters, lambda edit: f"change {edit.block}")
 def _set_parameters(edit: SetParameters, diagram: Diagram, context: EditContext) -> Diagram:
-    old = diagram.blocks[_known(edit.block, diagram)]
+    old = diagram.blocks[_checked_block(edit.block, diagram)]
     rules = {rule.name: rule for rule in old.own_parameters()}
     where = f"block '{edit.block}' ({old.title})"
     values: dict[str, Any] = {}
@@ -416,14 +422,19 @@ def _arrange(edit: ArrangeBlocks, diagram: Diagram, _: EditContext) -> Diagram:
     return arranged(diagram)
 
 
-@EDITS.on(GroupBlocks, lambda edit: f"group {_counted(edit.blocks, 'block')}")
+@EDITS.on(GroupBlocks, lambda edit: f"group {_count_text(edit.blocks, 'block')}")
 def _group(edit: GroupBlocks, diagram: Diagram, _: EditContext) -> Diagram:
     return grouped(edit.blocks, edit.name, diagram)
 
 
 @EDITS.on(BreakLink, lambda edit: f"break the link of {edit.block}")
 def _break_link(edit: BreakLink, diagram: Diagram, _: EditContext) -> Diagram:
-    return unlinked(diagram, _known(edit.block, diagram))
+    return unlinked(diagram, _checked_block(edit.block, diagram))
+
+
+EDITS.on(AddBookmark, bookmarks.addition_title)(bookmarks.added)
+EDITS.on(RenameBookmark, lambda edit: f"rename the bookmark {edit.name}")(bookmarks.renamed)
+EDITS.on(RemoveBookmark, lambda edit: f"remove the bookmark {edit.name}")(bookmarks.removed)
 
 
 # -- the whole model -----------------------------------------------------------------------------------------
@@ -434,29 +445,17 @@ def _set_mask(edit: SetMask, diagram: Diagram, context: EditContext) -> Diagram:
     return with_mask(edit, diagram, context.resolve_robot)
 
 
-@EDITS.on(KeepTuned, lambda edit: f"keep {_counted(edit.values, 'tuned value')}")
+@EDITS.on(KeepTuned, lambda edit: f"keep {_count_text(edit.values, 'tuned value')}")
 def _keep_tuned(edit: KeepTuned, diagram: Diagram, _: EditContext) -> Diagram:
     return with_parameters(diagram, {path: tuned_value(value, path) for path, value in edit.values.items()})
 
 
-@EDITS.on(SaveParameterSet, lambda edit: f"save the parameter set {edit.name.strip()}")
-def _save_parameter_set(edit: SaveParameterSet, diagram: Diagram, _: EditContext) -> Diagram:
-    return parameter_sets.saved(edit, diagram)
-
-
-@EDITS.on(RenameParameterSet, lambda edit: f"rename the parameter set {edit.name}")
-def _rename_parameter_set(edit: RenameParameterSet, diagram: Diagram, _: EditContext) -> Diagram:
-    return parameter_sets.renamed(edit, diagram)
-
-
-@EDITS.on(RemoveParameterSet, lambda edit: f"remove the parameter set {edit.name}")
-def _remove_parameter_set(edit: RemoveParameterSet, diagram: Diagram, _: EditContext) -> Diagram:
-    return parameter_sets.removed(edit, diagram)
-
-
-@EDITS.on(RemoveSetParameter, lambda edit: f"remove {edit.path} from the parameter sets")
-def _remove_set_parameter(edit: RemoveSetParameter, diagram: Diagram, _: EditContext) -> Diagram:
-    return parameter_sets.without_parameter(edit, diagram)
+EDITS.on(SaveParameterSet, lambda edit: f"save the parameter set {edit.name.strip()}")(parameter_sets.saved)
+EDITS.on(RenameParameterSet, lambda edit: f"rename the parameter set {edit.name}")(parameter_sets.renamed)
+EDITS.on(RemoveParameterSet, lambda edit: f"remove the parameter set {edit.name}")(parameter_sets.removed)
+EDITS.on(RemoveSetParameter, lambda edit: f"remove {edit.path} from the parameter sets")(
+    parameter_sets.without_parameter
+)
 
 
 @EDITS.on(ApplyParameterSet, lambda edit: f"apply the parameter set {edit.name}")
@@ -477,15 +476,15 @@ def _describe(edit: Describe, diagram: Diagram, _: EditContext) -> Diagram:
 # -- names ---------------------------------------------------------------------------------------------------
 
 
-def _known(name: str, diagram: Diagram) -> str:
+def _checked_block(name: str, diagram: Diagram) -> str:
     if name not in diagram.blocks:
         raise UnknownNameError("block", name, diagram.blocks, where=f"diagram '{diagram.name}'")
     return name
 
 
-def _listed(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else _counted(names, "block")
+def _name_list(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else _count_text(names, "block")
 
 
-def _counted(items: Sized, noun: str) -> str:
+def _count_text(items: Sized, noun: str) -> str:
     return f"{len(items)} {noun}{'' if len(items) == 1 else 's'}"

@@ -18,7 +18,7 @@ from armblocks.diagram import (
     open_inputs,
 )
 from armblocks.diagram.names import FreeNames
-from armblocks.drawing.block_boxes import NAME_ROOM, Box, BoxPort
+from armblocks.drawing.block_boxes import NAME_HEIGHT, Box, BoxPort
 from armblocks.drawing.diagram_drawing import obstacle
 from armblocks.drawing.diagram_layout import boxes
 from armblocks.drawing.wires import Area
@@ -26,14 +26,15 @@ from armblocks.errors import DiagramError
 
 _WIDTH, _HEIGHT = 30.0, 20.0
 """Size of a new block, px."""
-_LEAST_DISTANCE = 50.0
+_MIN_DISTANCE = 50.0
 """Minimum distance between a port and the new block, px."""
-_STEPS = sorted(
+_SHIFTS = sorted(
     ((distance, across) for distance in range(40) for across in range(-15, 16)),
     key=lambda step: (step[0] + 1.5 * abs(step[1]), step),
 )
 """Shifts away from the port and across its direction, nearest first, in units of ``_STEP``."""
 _STEP = 20.0
+"""Grid spacing of the search for a free position, px."""
 _GAP = 6.0
 """Minimum distance to other blocks, px."""
 
@@ -48,7 +49,7 @@ def grounded(diagram: Diagram, names: Collection[str]) -> Diagram:
     new = _NewBlocks(diagram, placed)
     commented = diagram.commented
     for ref in sorted(open_inputs({"": diagram})):
-        if ref.block in names and _takes_zeros(diagram.blocks[ref.block], ref.port):
+        if ref.block in names and _can_be_grounded(diagram.blocks[ref.block], ref.port):
             new.add(ref, placed[ref.block].inputs, _ground(diagram.blocks[ref.block], ref.port))
     driving = {wire.source for wire in diagram.connections}
     for ref in sorted(_outputs(diagram)):
@@ -74,7 +75,7 @@ def _outputs(diagram: Diagram) -> Iterator[PortRef]:
         yield from (PortRef(name, port.name) for port in block.output_ports())
 
 
-def _takes_zeros(block: Block, port: str) -> bool:
+def _can_be_grounded(block: Block, port: str) -> bool:
     return not isinstance(block, Merge) and not (
         isinstance(block, BusSelector | BusAssignment) and port == "bus"
     )
@@ -103,45 +104,45 @@ class _NewBlocks:
         name = self._names.take(block.title)
         self.blocks[name] = block
         self.layout[name] = self._place(port, -1 if drives else 1)
-        own = PortRef(name, "y" if drives else "u")
-        self.connections.append(Connection(own, ref) if drives else Connection(ref, own))
+        new_port = PortRef(name, "y" if drives else "u")
+        self.connections.append(Connection(new_port, ref) if drives else Connection(ref, new_port))
 
     def _place(self, port: BoxPort, side: int) -> Placement:
         """The nearest free position in the direction of a port; ``side`` is 1 behind an output."""
-        upright = port.dy == 0
-        width, height = (_WIDTH, _HEIGHT) if upright else (_HEIGHT, _WIDTH)
+        is_horizontal = port.dy == 0
+        width, height = (_WIDTH, _HEIGHT) if is_horizontal else (_HEIGHT, _WIDTH)
         dx, dy = side * port.dx, side * port.dy
 
         def corner(step: tuple[int, int]) -> tuple[float, float]:
-            distance, across = _LEAST_DISTANCE + _STEP * step[0], _STEP * step[1]
+            distance, across = _MIN_DISTANCE + _STEP * step[0], _STEP * step[1]
             return (
                 round(port.x + dx * (distance + width / 2) + dy * across - width / 2),
                 round(port.y + dy * (distance + height / 2) + dx * across - height / 2),
             )
 
-        free = (step for step in _STEPS if self._is_free(_new_area(corner(step), width, height)))
-        x, y = corner(next(free, _STEPS[0]))
+        free = (step for step in _SHIFTS if self._is_free(_new_area(corner(step), width, height)))
+        x, y = corner(next(free, _SHIFTS[0]))
         self._used_areas.append(_new_area((x, y), width, height))
         return Placement(
             x=x,
             y=y,
             width=width,
             height=height,
-            flipped=upright and port.dx < 0,
-            rotation=0 if upright else 90 if port.dy > 0 else 270,
+            flipped=is_horizontal and port.dx < 0,
+            rotation=0 if is_horizontal else 90 if port.dy > 0 else 270,
         )
 
     def _is_free(self, area: Area) -> bool:
-        left, top, right, low = area
+        left, top, right, bottom = area
         return not any(
-            left < other_right and other_left < right and top < other_low and other_top < low
-            for other_left, other_top, other_right, other_low in self._used_areas
+            left < other_right and other_left < right and top < other_bottom and other_top < bottom
+            for other_left, other_top, other_right, other_bottom in self._used_areas
         )
 
 
 def _new_area(corner: tuple[float, float], width: float, height: float) -> Area:
     """The area of a new block with its name below and a gap around them."""
     x, y = corner
-    half_name = 40.0
+    half_name = 40.0  # px
     middle = x + width / 2
-    return middle - half_name, y - _GAP, middle + half_name, y + height + NAME_ROOM + _GAP
+    return middle - half_name, y - _GAP, middle + half_name, y + height + NAME_HEIGHT + _GAP

@@ -21,18 +21,18 @@ class SheetLines:
 
     def __init__(self) -> None:
         self._routing = Routing()
-        self._latest: list[tuple[Diagram, Lines]] = []
+        self._cache: list[tuple[Diagram, Lines]] = []
 
-    def of(self, sheet: Diagram) -> Lines:
+    def route(self, sheet: Diagram) -> Lines:
         """Return the lines of a sheet, by output."""
-        for cached, lines in self._latest:
+        for cached, lines in self._cache:
             if cached is sheet:
                 return lines
-        lines = self.dragged(sheet, {}, sheet.connections, sheet.bends, None)
-        self._latest = [*self._latest[-1:], (sheet, lines)]
+        lines = self.route_dragged(sheet, {}, sheet.connections, sheet.bends, None)
+        self._cache = [*self._cache[-1:], (sheet, lines)]
         return lines
 
-    def dragged(
+    def route_dragged(
         self,
         sheet: Diagram,
         places: Mapping[str, tuple[float, float]],
@@ -52,8 +52,8 @@ class SheetLines:
             shift = shifts.get(wire.source.block)
             if shift is not None and shift == shifts.get(wire.target.block):
                 ports = placed[wire.source.block].outputs
-                flat = any(port.name == wire.source.port and port.dx != 0 for port in ports)
-                moved[wire] = moved_bends(values, flat, shift)
+                is_horizontal = any(port.name == wire.source.port and port.dx != 0 for port in ports)
+                moved[wire] = moved_bends(values, is_horizontal, shift)
         nets, wires = wire_nets(connections, moved, placed)
         obstacles = {name: obstacle(box) for name, box in placed.items() if name != passed}
         routed = self._routing.update(obstacles, dict(zip(map(str, wires), nets)))
@@ -77,7 +77,7 @@ class LinesOfSheets:
     def __init__(self) -> None:
         self._sheets: dict[tuple[str, tuple[str, ...]], SheetLines] = {}
 
-    def on(self, document: str, path: tuple[str, ...]) -> SheetLines:
+    def for_sheet(self, document: str, path: tuple[str, ...]) -> SheetLines:
         """Return the lines of the sheet at a path of a document."""
         lines = self._sheets.pop((document, path), None) or SheetLines()
         self._sheets[document, path] = lines
@@ -86,7 +86,7 @@ class LinesOfSheets:
         return lines
 
 
-def is_possible(wire: Connection, sheet: Diagram) -> bool:
+def has_ports(wire: Connection, sheet: Diagram) -> bool:
     """Whether both ports of a wire exist on the sheet; a page may show an earlier version of it."""
     source, target = sheet.blocks.get(wire.source.block), sheet.blocks.get(wire.target.block)
     return (

@@ -90,12 +90,12 @@ def _masked(edit: SetMask, diagram: Diagram, resolve_robot: ResolveRobot) -> Dia
             raise UnknownNameError("mask parameter", name, old, where=where)
     mask = tuple(_rule(rule, old.get(rule.was), where, resolve_robot) for rule in edit.parameters)
     values: dict[str, Value] = {}
-    for stated, rule in zip(edit.parameters, mask):
-        before = old.get(stated.was)
+    for declaration, rule in zip(edit.parameters, mask):
+        before = old.get(declaration.was)
         # A parameter with a new type takes its default; a value equal to the old default takes the new one.
         if before is None or before.kind is not rule.kind:
             continue
-        if (value := diagram.mask_values[stated.was]) != before.default:
+        if (value := diagram.mask_values[declaration.was]) != before.default:
             values[rule.name] = rule.check(value, f"{where}, '{rule.name}'")
     removed = [name for name in old if name not in names]
     blocks = {
@@ -106,34 +106,36 @@ def _masked(edit: SetMask, diagram: Diagram, resolve_robot: ResolveRobot) -> Dia
     )
 
 
-def _rule(stated: MaskParameter, old: Parameter | None, where: str, resolve_robot: ResolveRobot) -> Parameter:
+def _rule(
+    declaration: MaskParameter, old: Parameter | None, where: str, resolve_robot: ResolveRobot
+) -> Parameter:
     """Return the declaration; properties that the dialog does not show are unchanged."""
-    kind = ParameterKind(stated.kind)
+    kind = ParameterKind(declaration.kind)
     plain = Parameter(name="", kind=kind, doc="", default=REQUIRED)
     base = plain if old is None or old.kind is not kind else old
     rule = dataclasses.replace(
         base,
-        name=stated.name,
-        doc=stated.doc,
-        unit=stated.unit,
+        name=declaration.name,
+        doc=declaration.doc,
+        unit=declaration.unit,
         default=REQUIRED,
-        minimum=-math.inf if stated.minimum is None else stated.minimum,
-        above=stated.above,
-        maximum=math.inf if stated.maximum is None else stated.maximum,
-        choices=tuple(stated.choices),
+        minimum=-math.inf if declaration.minimum is None else declaration.minimum,
+        above=declaration.above,
+        maximum=math.inf if declaration.maximum is None else declaration.maximum,
+        choices=tuple(declaration.choices),
     )
-    default = parameter_value(rule, _typed(stated, where), where, resolve_robot)
+    default = parameter_value(rule, _typed(declaration, where), where, resolve_robot)
     return dataclasses.replace(rule, default=default)
 
 
-def _typed(stated: MaskParameter, where: str) -> Any:
-    typed = stated.default
-    if stated.kind != "boolean" or not isinstance(typed, str):
+def _typed(declaration: MaskParameter, where: str) -> Any:
+    typed = declaration.default
+    if declaration.kind != "boolean" or not isinstance(typed, str):
         return typed
     if typed.strip().lower() not in _BOOLEANS:
         raise InputError(
             f"the value is '{typed[:40]}'",
-            where=f"{where}, parameter '{stated.name}'",
+            where=f"{where}, parameter '{declaration.name}'",
             allowed="true or false",
             fix="choose one of the two",
         )

@@ -46,7 +46,7 @@ def linked_part(diagram: Diagram, path: Sequence[str]) -> tuple[str, ...]:
     return next((tuple(path[:depth]) for depth in depths if inside(diagram, path[:depth]).link), ())
 
 
-def check_own(diagram: Diagram, path: Sequence[str]) -> None:
+def check_editable(diagram: Diagram, path: Sequence[str]) -> None:
     """Raise ``DiagramError`` for a sheet inside a library block, which cannot be edited."""
     linked = linked_part(diagram, path)
     if linked:

@@ -22,9 +22,9 @@ class OpenDocument(OpenFile[Document]):
 
     checking: asyncio.Task[None] | None = None
 
-    def leave(self) -> None:
+    def cancel_tasks(self) -> None:
         """Cancel the pending tasks of the document, which is closed."""
-        super().leave()
+        super().cancel_tasks()
         if self.checking is not None:
             self.checking.cancel()
 
@@ -44,7 +44,7 @@ class OpenDocuments(OpenFiles[OpenDocument]):
 
     def open_bytes(self, data: bytes, name: str) -> OpenDocument:
         """Open the content of a file from outside the project as a new diagram."""
-        return self.bring(self.kind.from_file(data, self.folder.root / PurePath(name).name))
+        return self.open_value(self.kind.from_file(data, self.folder.root / PurePath(name).name))
 
-    def _made(self, key: str, document: Document) -> OpenDocument:
+    def _create(self, key: str, document: Document) -> OpenDocument:
         return OpenDocument(key=key, document=document)

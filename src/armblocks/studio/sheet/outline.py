@@ -1,11 +1,13 @@
-"""The outline of a diagram (its tree of sheets) and the search for blocks."""
+"""The outline of a diagram (its tree of sheets) and the search for blocks and bookmarks."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
 from armblocks.diagram import Block, Diagram, DiagramBlock, ParameterKind
+from armblocks.robot import Robot
 from armblocks.studio.protocol.messages.sheets import FoundBlock, Outline
+from armblocks.studio.sheet.bookmarks import bookmarks_of
 from armblocks.studio.sheet.parameter_values import parameter_json
 
 MAX_RESULTS = 50
@@ -26,9 +28,10 @@ def outline(diagram: Diagram) -> Outline:
 
 
 def find(diagram: Diagram, text: str) -> list[FoundBlock]:
-    """Return the blocks of all sheets whose name, type or values contain every word of ``text``, best first.
+    """Return the blocks and bookmarks of all sheets that contain every word of ``text``, best first.
 
-    A word at the beginning of a name ranks first, then a word in a name, in a type, in a value.
+    Words of a block are in its name, type or values, those of a bookmark in its name. A word at the beginning
+    of a name ranks first, then a word in a name, in a type, in a value.
     """
     words = text.lower().split()
     ranked: list[tuple[int, int, FoundBlock]] = []
@@ -39,8 +42,16 @@ def find(diagram: Diagram, text: str) -> list[FoundBlock]:
             rank = max(rank, word_rank)
             matches += [match] if match else []
         if words and rank < _NO_MATCH:
-            found = FoundBlock(inside=list(path), name=name, title=block.title, match=", ".join(matches))
+            found = FoundBlock(
+                inside=list(path), name=name, title=block.title, match=", ".join(dict.fromkeys(matches))
+            )
             ranked.append((rank, len(path), found))
+    for bookmark in bookmarks_of(diagram) if words else ():
+        rank = max(_name_rank(bookmark.name, word) for word in words)
+        if rank < _NO_MATCH:
+            part, inside = bookmark.part, bookmark.inside
+            found = FoundBlock(inside=inside, name=bookmark.name, title="", match="", part=part)
+            ranked.append((rank, len(inside), found))
     ranked.sort(key=lambda entry: entry[:2])
     return [found for _, _, found in ranked[:MAX_RESULTS]]
 
@@ -49,17 +60,21 @@ _NO_MATCH = 9
 """Rank of a block that does not match."""
 
 
-def _rank(name: str, block: Block, word: str) -> tuple[int, str]:
+def _name_rank(name: str, word: str) -> int:
     if name.lower().startswith(word):
-        return 0, ""
-    if word in name.lower():
-        return 1, ""
+        return 0
+    return 1 if word in name.lower() else _NO_MATCH
+
+
+def _rank(name: str, block: Block, word: str) -> tuple[int, str]:
+    if (name_rank := _name_rank(name, word)) < _NO_MATCH:
+        return name_rank, ""
     if word in block.title.lower() or word in block.type_name().lower():
         return 2, ""
     for rule in block.parameters():
         if rule.kind is ParameterKind.DIAGRAM:
             continue
-        text_of_rule = f"{rule.name} = {_text(parameter_json(block.parameter_value(rule.name)))}"
+        text_of_rule = f"{rule.name} = {_value_text(block.parameter_value(rule.name))}"
         if word in text_of_rule.lower():
             return 3, text_of_rule if len(
                 text_of_rule
@@ -67,8 +82,15 @@ def _rank(name: str, block: Block, word: str) -> tuple[int, str]:
     return _NO_MATCH, ""
 
 
+def _value_text(value: object) -> str:
+    """Format a value as the dialogs show it; a robot has all its names."""
+    if isinstance(value, Robot):
+        names = dict.fromkeys((value.manufacturer, value.name, value.source))
+        return ", ".join(name for name in names if name)
+    return _text(parameter_json(value))
+
+
 def _text(value: object) -> str:
-    """Format a value as the dialogs show it."""
     if isinstance(value, dict):
         return str(value.get("source", ""))  # pyright: ignore[reportUnknownMemberType, reportUnknownArgumentType]
     if isinstance(value, float) and value.is_integer():

@@ -31,11 +31,11 @@ from armblocks.studio.protocol.messages.sheets import ParameterSetTable, SetPara
 from armblocks.studio.sheet.nesting import inside, with_inside
 from armblocks.studio.sheet.parameter_values import parameter_json, tuned_value
 
-_Move = Callable[[str], str | None]
-"""The path of a parameter of a sheet after an edit; ``None``: the edit removes the parameter."""
+_PathMap = Callable[[str], str | None]
+"""Maps the path of a parameter before an edit to its path after it; ``None`` if the edit removes it."""
 
 
-def saved(edit: SaveParameterSet, diagram: Diagram) -> Diagram:
+def saved(edit: SaveParameterSet, diagram: Diagram, _context: object) -> Diagram:
     """Return the diagram with a new parameter set, or with other values of an existing one."""
     name, sets = edit.name.strip(), diagram.parameter_sets
     if edit.replace:
@@ -44,7 +44,7 @@ def saved(edit: SaveParameterSet, diagram: Diagram) -> Diagram:
         check_set_name(name, sets, f"diagram '{diagram.name}'")
     where = set_location(diagram, name)
     values: dict[str, Any] = {}
-    if edit.of_others:
+    if edit.all_parameters:
         for other, entries in sets.items():
             for path in entries if other != name else ():
                 values[path] = settable_parameter(diagram, path)[1]
@@ -67,22 +67,22 @@ def _read(diagram: Diagram, path: str, typed: Any, where: str) -> Any:
         return tuned_value(typed, path)
 
 
-def renamed(edit: RenameParameterSet, diagram: Diagram) -> Diagram:
-    """Return the diagram with another name of a parameter set."""
+def renamed(edit: RenameParameterSet, diagram: Diagram, _context: object) -> Diagram:
+    """Return the diagram with a renamed parameter set."""
     values, name = parameter_set(diagram, edit.name), edit.to.strip()
     others = {other: entries for other, entries in diagram.parameter_sets.items() if other != edit.name}
     check_set_name(name, others, f"diagram '{diagram.name}'")
     return dataclasses.replace(diagram, parameter_sets={**others, name: values})
 
 
-def removed(edit: RemoveParameterSet, diagram: Diagram) -> Diagram:
+def removed(edit: RemoveParameterSet, diagram: Diagram, _context: object) -> Diagram:
     """Return the diagram without a parameter set."""
     parameter_set(diagram, edit.name)
     others = {name: entries for name, entries in diagram.parameter_sets.items() if name != edit.name}
     return dataclasses.replace(diagram, parameter_sets=others)
 
 
-def without_parameter(edit: RemoveSetParameter, diagram: Diagram) -> Diagram:
+def without_parameter(edit: RemoveSetParameter, diagram: Diagram, _context: object) -> Diagram:
     """Return the diagram without a parameter in any of its sets."""
     sets = {
         name: {path: value for path, value in entries.items() if path != edit.path}
@@ -133,25 +133,27 @@ def _fault(diagram: Diagram, path: str, value: Value, name: str) -> str:
 def with_consistent_sets(before: Diagram, after: Diagram, edit: object, path: Sequence[str]) -> Diagram:
     """Return the diagram after an edit of the sheet at a path, with the parameter sets adapted to it.
 
-    Parameters of renamed or grouped blocks and renamed mask parameters have their new paths. Parameters that
+    Parameters of renamed or grouped blocks and renamed mask parameters get their new paths. Parameters that
     the edit has removed are removed from all sets. This applies to the sets of every enclosing diagram.
     """
     for depth in range(len(path) + 1):
         old, new = inside(before, path[:depth]), inside(after, path[:depth])
         if not new.parameter_sets:
             continue
-        move = _move_below("/".join(path[depth:]), _move(edit, inside(before, path)))
-        sets = {name: _adapted(entries, old, new, move) for name, entries in new.parameter_sets.items()}
+        path_map = _enclosing_path_map("/".join(path[depth:]), _path_map(edit, inside(before, path)))
+        sets = {name: _adapted(entries, old, new, path_map) for name, entries in new.parameter_sets.items()}
         if sets != new.parameter_sets:
             after = with_inside(after, path[:depth], dataclasses.replace(new, parameter_sets=sets))
     return after
 
 
-def _adapted(entries: Mapping[str, Value], old: Diagram, new: Diagram, move: _Move) -> dict[str, Value]:
+def _adapted(
+    entries: Mapping[str, Value], old: Diagram, new: Diagram, path_map: _PathMap
+) -> dict[str, Value]:
     """The entries of a set at their new paths, without those whose parameters the edit has removed."""
     adapted: dict[str, Value] = {}
     for path, value in entries.items():
-        moved = move(path)
+        moved = path_map(path)
         if moved is not None and (_exists(new, moved) or not _exists(old, path)):
             adapted[moved] = value
     return adapted
@@ -167,54 +169,54 @@ def _exists(diagram: Diagram, path: str) -> bool:
     return True
 
 
-def _move(edit: object, sheet: Diagram) -> _Move:
-    """The changes that an edit of a sheet makes to the paths of its parameters."""
+def _path_map(edit: object, sheet: Diagram) -> _PathMap:
+    """Return the map of the parameter paths of a sheet for an edit."""
     match edit:
         case Rename():
-            return _block_move({edit.block: edit.name})
+            return _block_path_map({edit.block: edit.name})
         case GroupBlocks():
-            return _block_move({name: f"{edit.name}/{name}" for name in edit.blocks})
+            return _block_path_map({name: f"{edit.name}/{name}" for name in edit.blocks})
         case SetMask():
-            return _mask_move(edit, sheet)
+            return _mask_path_map(edit, sheet)
         case _:
             return lambda path: path
 
 
-def _block_move(names: Mapping[str, str]) -> _Move:
-    def move(path: str) -> str:
+def _block_path_map(names: Mapping[str, str]) -> _PathMap:
+    def path_map(path: str) -> str:
         block, _, parameter = path.rpartition(".")
         first, slash, rest = block.partition("/")
         return f"{names.get(first, first)}{slash}{rest}.{parameter}" if block else path
 
-    return move
+    return path_map
 
 
-def _mask_move(edit: SetMask, sheet: Diagram) -> _Move:
-    """Renamed and removed mask parameters; those of the block type itself are unchanged."""
+def _mask_path_map(edit: SetMask, sheet: Diagram) -> _PathMap:
+    """Return the map for an edited mask; parameters of the block type itself keep their paths."""
     names = {rule.was: rule.name for rule in edit.parameters if rule.was}
     owner = inside(sheet, [edit.block]) if edit.block else sheet
     declared = {rule.name for rule in owner.mask}
 
-    def move(path: str) -> str | None:
+    def path_map(path: str) -> str | None:
         block, dot, parameter = path.rpartition(".")
         if block != edit.block or parameter not in declared:
             return path
         return f"{block}{dot}{names[parameter]}" if parameter in names else None
 
-    return move
+    return path_map
 
 
-def _move_below(sheet: str, move: _Move) -> _Move:
-    """The same changes for the paths of an enclosing diagram in which the sheet has this path."""
+def _enclosing_path_map(sheet: str, path_map: _PathMap) -> _PathMap:
+    """Return the same map for paths of an enclosing diagram, in which the sheet has the path ``sheet``."""
     if not sheet:
-        return move
+        return path_map
 
     def moved(path: str) -> str | None:
         block, dot, parameter = path.rpartition(".")
         if block != sheet and not block.startswith(f"{sheet}/"):
             return path
         within = f"{block[len(sheet) + 1 :]}{dot if block != sheet else ''}{parameter}"
-        after = move(within)
+        after = path_map(within)
         if after is None:
             return None
         block, _, parameter = after.rpartition(".")

@@ -18,10 +18,10 @@ from armblocks.studio.protocol.messages.sheets import (
     WireKind,
 )
 from armblocks.studio.protocol.page import Page, Pages
+from armblocks.studio.sheet.drawing_data import outer_comment, sheet, sheet_change
 from armblocks.studio.sheet.lines import LinesOfSheets, changed_lines
 from armblocks.studio.sheet.nesting import inside, linked_part
 from armblocks.studio.sheet.open_documents import OpenDocument, OpenDocuments
-from armblocks.studio.sheet.shown import outer_comment, sheet, sheet_change
 
 CHECK_DELAY_SECONDS = 0.15
 """Delay of the background check after the last edit, s."""
@@ -30,11 +30,11 @@ CHECK_DELAY_SECONDS = 0.15
 class RunsOfDiagrams(Protocol):
     """The methods of ``DiagramRuns`` that the presenter uses."""
 
-    def of(self, document: str) -> str | None:
+    def run_key(self, document: str) -> str | None:
         """The key of the run of a diagram, or ``None``."""
         ...
 
-    def shown(self, page: Page, document: str) -> None:
+    def on_shown(self, page: Page, document: str) -> None:
         """Called after a page was sent a diagram."""
         ...
 
@@ -65,21 +65,21 @@ class DiagramPresenter(Presenter[OpenDocument]):
         """Open the diagram of a file from outside the project."""
         return Opening([self._documents.open_bytes(data, name)])
 
-    def place(self, open_file: OpenDocument, wished: Place, *, known: bool) -> Place:
+    def place(self, open_file: OpenDocument, requested: Place, *, known: bool) -> Place:
         """Return the path of the sheet; the top sheet if a reconnecting page shows a deleted one."""
         try:
-            inside(open_file.document.diagram, wished)
+            inside(open_file.document.diagram, requested)
         except UnknownNameError:
             if known:
                 raise
             return ()
-        return wished
+        return requested
 
     def content(self, open_file: OpenDocument, place: Place) -> DiagramContent:
         """Return the sheet at a path."""
         diagram = open_file.document.diagram
         shown, linked = inside(diagram, place), linked_part(diagram, place)
-        drawn = sheet(shown, self._lines.on(open_file.key, place).of(shown))
+        drawn = sheet(shown, self._lines.for_sheet(open_file.key, place).route(shown))
         if linked:
             link = inside(diagram, linked).link
             drawn = drawn.model_copy(update={"linked": list(linked), "link": link})
@@ -87,27 +87,31 @@ class DiagramPresenter(Presenter[OpenDocument]):
             inside=list(place),
             sheet=drawn,
             settings=dataclasses.asdict(diagram.settings),
-            run=self._runs.of(open_file.key),
+            run=self._runs.run_key(open_file.key),
             outer_comment=outer_comment(diagram, place),
         )
 
     def change(self, open_file: OpenDocument, before: Diagram, place: Place) -> DiagramChange:
         """Return the changes of the sheet at a path."""
         diagram = open_file.document.diagram
-        old, new, lines = inside(before, place), inside(diagram, place), self._lines.on(open_file.key, place)
+        old, new, lines = (
+            inside(before, place),
+            inside(diagram, place),
+            self._lines.for_sheet(open_file.key, place),
+        )
         return DiagramChange(
-            sheet=sheet_change(old, new, changed_lines(lines.of(old), lines.of(new))),
+            sheet=sheet_change(old, new, changed_lines(lines.route(old), lines.route(new))),
             settings=dataclasses.asdict(diagram.settings),
             outer_comment=outer_comment(diagram, place),
         )
 
-    def shown(self, page: Page, open_file: OpenDocument, *, known: bool) -> None:
+    def on_shown(self, page: Page, open_file: OpenDocument, *, known: bool) -> None:
         """Send the page the run of the diagram, and start the background check."""
         if not known:
-            self._runs.shown(page, open_file.key)
-        self.changed(open_file)
+            self._runs.on_shown(page, open_file.key)
+        self.on_changed(open_file)
 
-    def changed(self, open_file: OpenDocument) -> None:
+    def on_changed(self, open_file: OpenDocument) -> None:
         """Start the background check after a pause in the edits; a check in progress is cancelled."""
         if open_file.checking is not None:
             open_file.checking.cancel()
@@ -115,8 +119,8 @@ class DiagramPresenter(Presenter[OpenDocument]):
 
     async def _check(self, open_file: OpenDocument) -> None:
         await asyncio.sleep(CHECK_DELAY_SECONDS)
-        diagram, version_now = open_file.document.diagram, open_file.document.version
+        diagram, checked_version = open_file.document.diagram, open_file.document.version
         findings, wires = await self._check_diagram(diagram)
-        if open_file.document.version == version_now:
-            event = Checked(document=open_file.key, version=version_now, findings=findings, wires=wires)
+        if open_file.document.version == checked_version:
+            event = Checked(document=open_file.key, version=checked_version, findings=findings, wires=wires)
             await self._pages.notify_showing(open_file.key, event)

@@ -16,9 +16,10 @@ from armblocks.studio.protocol.answers import Answers
 from armblocks.studio.protocol.messages import sheets as sheet_messages
 from armblocks.studio.protocol.messages.sheet_edits import SetMask
 from armblocks.studio.protocol.page import Page
+from armblocks.studio.sheet.bookmarks import bookmarks_of
 from armblocks.studio.sheet.clipping import clipped
 from armblocks.studio.sheet.edits import connection
-from armblocks.studio.sheet.lines import LinesOfSheets, is_possible
+from armblocks.studio.sheet.lines import LinesOfSheets, has_ports
 from armblocks.studio.sheet.mask_edits import mask_of
 from armblocks.studio.sheet.nesting import inside
 from armblocks.studio.sheet.open_documents import OpenDocuments
@@ -52,6 +53,7 @@ class SheetQueries:
         answers.on(sheet_messages.AskOutline, self._outline)
         answers.on(sheet_messages.AskMask, self._mask)
         answers.on(sheet_messages.AskParameterSets, self._parameter_sets)
+        answers.on(sheet_messages.AskBookmarks, self._bookmarks)
         answers.on(sheet_messages.Copy, self._copy)
         answers.on(sheet_messages.Find, self._find)
         answers.on(sheet_messages.TypedValue, self._typed_value)
@@ -67,14 +69,14 @@ class SheetQueries:
         self, _: Page, request: sheet_messages.RouteWires
     ) -> dict[str, sheet_messages.WireLines]:
         sheet = self._sheet(request.document, request.inside)
-        lines = self._lines.on(request.document, tuple(request.inside))
+        lines = self._lines.for_sheet(request.document, tuple(request.inside))
         connections, bends = sheet.connections, sheet.bends
         if request.wires is not None:
             wires = {connection(wire): wire.bends for wire in request.wires}
-            connections, bends = tuple(wire for wire in wires if is_possible(wire, sheet)), wires
-        before = lines.of(sheet)
+            connections, bends = tuple(wire for wire in wires if has_ports(wire, sheet)), wires
+        before = lines.route(sheet)
         places = {name: (corner.x, corner.y) for name, corner in request.places.items()}
-        after = lines.dragged(sheet, places, connections, bends, request.passed)
+        after = lines.route_dragged(sheet, places, connections, bends, request.passed)
         return {source: shown for source, shown in after.items() if before.get(source) != shown}
 
     async def _outline(self, _: Page, request: sheet_messages.AskOutline) -> sheet_messages.Outline:
@@ -88,6 +90,11 @@ class SheetQueries:
         self, _: Page, request: sheet_messages.AskParameterSets
     ) -> sheet_messages.ParameterSetTable:
         return parameter_set_table(self._sheet(request.document), request.also)
+
+    async def _bookmarks(
+        self, _: Page, request: sheet_messages.AskBookmarks
+    ) -> list[sheet_messages.SheetBookmark]:
+        return bookmarks_of(self._sheet(request.document))
 
     async def _copy(self, _: Page, request: sheet_messages.Copy) -> str:
         sheet = self._sheet(request.document, request.inside)

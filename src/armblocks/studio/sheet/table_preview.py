@@ -13,15 +13,15 @@ from armblocks.formats.table_columns import Column, ColumnFile, table_of, time_c
 from armblocks.studio.protocol.message import Fault
 from armblocks.studio.protocol.messages.data_files import TableColumn, TablePreview
 
-FIRST_ROWS = 6
+MAX_ROWS = 6
 MAX_COLUMNS = 500
-MAX_SHOWN = 12
+MAX_SHOWN_COLUMNS = 12
 """Number of columns whose rows and curves are shown."""
 MAX_POINTS = 600
 
 
 def table_preview(file: ColumnFile, shown: str, time: str, columns: Sequence[str]) -> TablePreview:
-    """The preview of a choice of columns."""
+    """Return the preview of the chosen columns."""
     table, fault = None, None
     try:
         table = table_of(file, shown, time, columns)
@@ -38,7 +38,7 @@ def table_preview(file: ColumnFile, shown: str, time: str, columns: Sequence[str
         ],
         time=key,
         chosen=chosen,
-        rows=_rows([known[name] for name in [key, *chosen[:MAX_SHOWN]] if name in known]),
+        rows=_rows([known[name] for name in [key, *chosen[:MAX_SHOWN_COLUMNS]] if name in known]),
         count=0 if table is None else table.shape[0],
         spacing=spacing,
         times=times,
@@ -50,7 +50,7 @@ def table_preview(file: ColumnFile, shown: str, time: str, columns: Sequence[str
 
 def _rows(columns: Sequence[Column]) -> list[list[str]]:
     values = [column.values for column in columns]
-    count = min(FIRST_ROWS, max((len(column) for column in values if column is not None), default=0))
+    count = min(MAX_ROWS, max((len(column) for column in values if column is not None), default=0))
     return [[_cell(column, row) for column in values] for row in range(count)]
 
 
@@ -68,7 +68,7 @@ def _curves(table: TimeTable | None) -> tuple[list[float], list[list[float]], tu
     rows = np.asarray(table)
     steps = np.diff(rows[:, 0])
     group = max(1, -(-2 * len(rows) // MAX_POINTS))
-    shown = rows[:, 1 : 1 + MAX_SHOWN]
+    shown = rows[:, 1 : 1 + MAX_SHOWN_COLUMNS]
     times: list[float] = []
     curves: list[list[float]] = [[] for _ in range(shown.shape[1])]
     for start in range(0, len(rows), group):

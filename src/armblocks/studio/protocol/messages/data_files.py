@@ -43,7 +43,7 @@ class TableColumn(Message):
 class TablePreview(Message):
     """The columns of a file, and the table of the chosen ones, or its ``fault``.
 
-    ``time`` is the column with the times, ``chosen`` are those of the values. ``rows`` are the first rows of
+    ``time`` is the column of times, ``chosen`` are the columns of values. ``rows`` are the first rows of
     these columns as text. ``times`` (s) and ``curves`` are points for a plot: minimum and maximum of groups
     of rows. ``spacing`` has the minimum and the maximum difference of successive times, s.
     """
@@ -87,7 +87,7 @@ class StoreFile(Request[StoredFile]):
 
 
 class SourceFunction(Message):
-    """A function of a Python file; ``line`` is that of its definition."""
+    """A function of a Python file; ``line`` is the line number of its definition."""
 
     name: str
     arguments: list[str]

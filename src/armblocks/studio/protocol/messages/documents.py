@@ -13,7 +13,7 @@ from pydantic import Field
 from armblocks.studio.protocol.message import AnyOf, Edit, Event, Message, Request
 
 DocumentKind = Literal["diagram", "robot"]
-Disk = Literal["same", "changed", "gone"]
+DiskState = Literal["same", "changed", "gone"]
 MAX_DROPPED_BYTES = 5 * 2**20
 """Largest size of a file that is dropped on the studio, bytes."""
 
@@ -37,7 +37,7 @@ class DocumentState(Message):
     dirty: bool
     undo: str
     redo: str
-    disk: Disk
+    disk: DiskState
     journaled: bool
 
 
@@ -58,7 +58,7 @@ class Recovery(Message):
     last: float
     edits: int
     parts: int
-    disk: Disk
+    disk: DiskState
     missing: str
 
 

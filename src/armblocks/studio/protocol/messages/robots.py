@@ -12,7 +12,7 @@ from armblocks.studio.protocol.robot_scene import RobotScene
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Joints = Annotated[list[Number], Field(max_length=1000)]
-"""One number for each joint: rad or m, and per second."""
+"""One number for each joint: rad or m; for speeds rad/s or m/s, for accelerations rad/s² or m/s²."""
 
 # -- data of robots ------------------------------------------------------------------------------------------
 
@@ -46,6 +46,7 @@ class LinkRow(Message):
     turns: bool
     """Whether its joint coordinate is an angle."""
     moves: bool
+    """Whether the joint is not fixed."""
     variable: str
     """The D-H column that shows the joint coordinate instead of a number."""
     cells: dict[str, float | str | None]

@@ -224,6 +224,42 @@ class GroundPorts(DiagramEdit):
     blocks: list[str] = Field(default_factory=list[str])
 
 
+BookmarkName = Annotated[str, Field(max_length=200)]
+
+
+class SheetPart(Message):
+    """A part of a sheet, px: top left corner and size."""
+
+    x: Px
+    y: Px
+    width: Annotated[float, Field(ge=1, le=1e6)]
+    height: Annotated[float, Field(ge=1, le=1e6)]
+
+
+class AddBookmark(DiagramEdit):
+    """Store a part of the sheet under a name. ``replace``: the bookmark exists, and gets this part."""
+
+    kind: Literal["add_bookmark"] = "add_bookmark"
+    name: BookmarkName
+    part: SheetPart
+    replace: bool = False
+
+
+class RenameBookmark(DiagramEdit):
+    """Rename a bookmark of the sheet."""
+
+    kind: Literal["rename_bookmark"] = "rename_bookmark"
+    name: BookmarkName
+    to: BookmarkName
+
+
+class RemoveBookmark(DiagramEdit):
+    """Remove a bookmark of the sheet."""
+
+    kind: Literal["remove_bookmark"] = "remove_bookmark"
+    name: BookmarkName
+
+
 class ModelEdit(DiagramEdit):
     """An edit of the whole model, independent of the displayed sheet."""
 
@@ -242,14 +278,14 @@ SetName = Annotated[str, Field(max_length=200)]
 class SaveParameterSet(ModelEdit):
     """Store values of parameters, by ``block.parameter``, under a name.
 
-    ``of_others``: also the model's values of the parameters of all other sets. ``replace``: the values
-    replace those of a set with this name, which must exist.
+    ``all_parameters``: the model's values of the parameters that only other sets have are stored, too.
+    ``replace``: the values replace those of a set with this name, which must exist.
     """
 
     kind: Literal["save_parameter_set"] = "save_parameter_set"
     name: SetName
     values: dict[str, Any]
-    of_others: bool = False
+    all_parameters: bool = False
     replace: bool = False
 
 

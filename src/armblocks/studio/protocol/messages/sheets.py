@@ -8,7 +8,7 @@ from pydantic import Field
 
 from armblocks.studio.protocol.message import Event, Message, Request
 from armblocks.studio.protocol.messages.documents import Content, ContentChange
-from armblocks.studio.protocol.messages.sheet_edits import Place, Px, SetMask, SheetNote, Wire
+from armblocks.studio.protocol.messages.sheet_edits import Place, Px, SetMask, SheetNote, SheetPart, Wire
 
 
 class SheetPort(Message):
@@ -33,12 +33,17 @@ class Outline(Message):
 
 
 class FoundBlock(Message):
-    """A block found by a search; ``match`` is the matching value, ``""`` if the name or type matches."""
+    """A block or a bookmark found by a search.
+
+    ``match`` is the matching value of the block, ``""`` if its name or type matches. ``part`` is the part of
+    the sheet that a bookmark shows; ``title`` is then ``""``.
+    """
 
     inside: list[str]
     name: str
     title: str
     match: str
+    part: SheetPart | None = None
 
 
 class ParameterRule(Message):
@@ -256,11 +261,27 @@ class AskMask(Request[SetMask]):
 
 
 class Find(Request[list[FoundBlock]]):
-    """Search all sheets for blocks by words in names, types and values."""
+    """Search all sheets: blocks by words in names, types and values, bookmarks by words in names."""
 
     kind: Literal["find"] = "find"
     document: str
     text: Annotated[str, Field(max_length=200)]
+
+
+class SheetBookmark(Message):
+    """A bookmark of the sheet at a path. ``linked``: it belongs to a library block and cannot be edited."""
+
+    inside: list[str]
+    name: str
+    part: SheetPart
+    linked: bool
+
+
+class AskBookmarks(Request[list[SheetBookmark]]):
+    """Return the bookmarks of all sheets of a model."""
+
+    kind: Literal["bookmarks"] = "bookmarks"
+    document: str
 
 
 class SetParameter(Message):

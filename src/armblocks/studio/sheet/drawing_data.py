@@ -11,10 +11,10 @@ from typing import Any, Literal, cast
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import Block, Connection, Diagram, DiagramBlock, Parameter, ParameterKind, Placement
 from armblocks.diagram.signs import Outline
-from armblocks.drawing.block_boxes import Box, standing_box
+from armblocks.drawing.block_boxes import Box, box_at_placement
 from armblocks.drawing.block_faces import face_size, port_labels
 from armblocks.drawing.diagram_drawing import block_marks
-from armblocks.drawing.diagram_layout import SumSides, drawn_blocks, sum_sides, turned_sum
+from armblocks.drawing.diagram_layout import SumSides, drawn_blocks, sum_sides, sum_with_sides
 from armblocks.errors import ArmblocksError
 from armblocks.formats import load_robot
 from armblocks.pictures.picture import Picture
@@ -95,7 +95,7 @@ def library() -> tuple[BlockType, ...]:
 
 def _block_type(kind: type[Block]) -> BlockType:
     block = _default(kind)
-    box = standing_box("", block, Placement(x=0.0, y=0.0))
+    box = box_at_placement("", block, Placement(x=0.0, y=0.0))
     return BlockType(
         type=kind.type_name(),
         title=kind.title,
@@ -158,9 +158,9 @@ def _drawn(
     block: Block, place: Placement, sides: SumSides | None, comment: Literal["out", "through", ""]
 ) -> SheetBlock:
     """Draw a block at the origin; the result is cached, so that equal blocks are drawn once."""
-    box = standing_box("", block, place)
+    box = box_at_placement("", block, place)
     if sides is not None:
-        box = turned_sum(box, sides)
+        box = sum_with_sides(box, sides)
     into, out = port_labels(block)
     return SheetBlock(
         name="",

@@ -1,0 +1,30 @@
+"""URDF, the robot description format of ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from armblocks.formats.robot_format import RobotFormat
+
+if TYPE_CHECKING:
+    from armblocks.formats.file_findings import FileContext
+    from armblocks.robot import Robot
+
+
+def _read(data: bytes, name: str, context: FileContext) -> Mapping[str, Robot]:
+    from armblocks.formats.urdf.reader import read_urdf
+
+    robot = read_urdf(data, name, context)
+    return {robot.name: robot}
+
+
+def _write(robot: Robot) -> bytes:
+    from armblocks.formats.urdf.writer import write_urdf
+
+    return write_urdf(robot)
+
+
+URDF = RobotFormat(
+    name="URDF", suffixes=(".urdf",), max_bytes=16 * 2**20, read_in_context=_read, write=_write
+)

@@ -1,0 +1,109 @@
+"""Shapes of URDF links from ``<visual>``, or from ``<collision>`` where no visual can be shown."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import PurePath
+
+import numpy as np
+
+from armblocks.errors import FormatError
+from armblocks.files import read_bounded
+from armblocks.formats.file_findings import FileContext
+from armblocks.formats.urdf.origins import note, origin_of
+from armblocks.formats.urdf.packages import resolved
+from armblocks.formats.urdf.rules import MESH, SHAPE
+from armblocks.formats.urdf.stl import MAX_BYTES, stl_mesh
+from armblocks.formats.urdf.xml_elements import Element, shortened
+from armblocks.robot.shapes import Box, Cylinder, Material, Pose, Shape, Sphere
+from armblocks.spatial import Transform, transl
+
+
+def shapes_of(link: Element, context: FileContext, material: Material) -> tuple[Shape, ...] | None:
+    """The shapes of a link; ``None`` if it has some, but none that can be shown.
+
+    Colours and textures are not used.
+    """
+    elements = [*link.all("visual")] or [*link.all("collision")]
+    if not elements:
+        return ()
+    before = len(context.findings)
+    shapes = [shape for element in elements for shape in _readable(element, link, context, material)]
+    if shapes:
+        return tuple(shapes)
+    collisions = [*link.all("collision")] if elements[0].tag == "visual" else []
+    quiet = replace(context, findings=[])
+    shapes = [shape for element in collisions for shape in _readable(element, link, quiet, material)]
+    return tuple(shapes) if shapes else (None if len(context.findings) > before else ())
+
+
+def _readable(element: Element, link: Element, context: FileContext, material: Material) -> list[Shape]:
+    """The shapes of a visual or collision; a finding where its numbers cannot be read."""
+    try:
+        return _shapes(element, link, context, material)
+    except FormatError as error:
+        note(context, SHAPE, element, f"it is not shown: {error.what}", link.label)
+        return []
+
+
+def _shapes(element: Element, link: Element, context: FileContext, material: Material) -> list[Shape]:
+    geometry = element.first("geometry")
+    kind = geometry.children[0] if geometry is not None and geometry.children else None
+    if kind is None:
+        note(context, SHAPE, element, "it has no shape", link.label)
+        return []
+    pose = origin_of(element, context)
+    if kind.tag == "mesh":
+        return _mesh(kind, link, context, pose, material)
+    if kind.tag not in ("box", "cylinder", "sphere", "capsule"):
+        note(context, SHAPE, kind, f"the shape '{shortened(kind.tag)}' is not known", link.label)
+        return []
+    sizes = kind.vector("size", (1.0, 1.0, 1.0)) if kind.tag == "box" else _round_sizes(kind)
+    if min(sizes) <= 0:
+        note(
+            context, SHAPE, kind, f"the {kind.tag} has the size {min(sizes):g} m; it is left out", link.label
+        )
+        return []
+    if kind.tag == "box":
+        return [Box(size=(sizes[0], sizes[1], sizes[2]), material=material, pose=pose_rows(pose))]
+    radius, length, _ = sizes
+    ball = Sphere(radius=radius, material=material, pose=pose_rows(pose))
+    if kind.tag == "sphere":
+        return [ball]
+    body = Cylinder(radius=radius, length=length, material=material, pose=pose_rows(pose))
+    if kind.tag == "cylinder":
+        return [body]
+    ends = (transl(0.0, 0.0, side * length / 2) for side in (-1.0, 1.0))
+    shapes: list[Shape] = [body]
+    shapes += (replace(ball, pose=pose_rows(pose @ end)) for end in ends)
+    return shapes
+
+
+def _mesh(
+    kind: Element, link: Element, context: FileContext, pose: Transform, material: Material
+) -> list[Shape]:
+    """The mesh of a file; a finding says why it is not shown."""
+    file = kind.attributes.get("filename", "").strip()
+    scale = kind.vector("scale", (1.0, 1.0, 1.0))
+    suffix = PurePath(file).suffix.lower()
+    if suffix != ".stl":
+        reason = f"'{shortened(suffix)}' meshes are not supported"
+    elif isinstance(path := resolved(file, context), str):
+        reason = path
+    else:
+        try:
+            return [stl_mesh(read_bounded(path, MAX_BYTES), file, np.array(scale), material, pose_rows(pose))]
+        except FormatError as error:
+            reason = error.what
+    note(context, MESH, kind, f"the mesh '{shortened(file)}' is not shown: {reason}", link.label)
+    return []
+
+
+def _round_sizes(kind: Element) -> tuple[float, float, float]:
+    return kind.number("radius"), kind.number("length") if kind.tag != "sphere" else 1.0, 1.0
+
+
+def pose_rows(pose: Transform) -> Pose:
+    """The pose of a shape as rows of numbers."""
+    a, b, c, d = (tuple(row) for row in pose.matrix.tolist())
+    return (a, b, c, d)

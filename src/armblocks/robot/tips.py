@@ -1,0 +1,31 @@
+"""The tip of a robot: the link that carries the tool, which is the last link of the description."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from armblocks.robot.link import Link
+from armblocks.robot.robot import Robot
+
+
+def with_tip(robot: Robot, tip: str) -> Robot:
+    """The robot with the link named ``tip`` as its last link; the other links keep their order.
+
+    If the joint of that link moves, its coordinate becomes the last one in q. Raises UnknownNameError.
+    """
+    last = robot.link(tip)
+    return replace(robot, links=(*(link for link in robot.links if link is not last), last))
+
+
+def deepest_tip(links: Sequence[Link]) -> str:
+    """The link without children that has the most moving joints between the base and itself.
+
+    Of several such links it is the last one. ``links``: parents before their children.
+    """
+    joints: dict[str | None, int] = {None: 0}
+    for link in links:
+        joints[link.name] = joints[link.parent] + (1 if link.joint.moves else 0)
+    parents = {link.parent for link in links}
+    ends = [link.name for link in links if link.name not in parents]
+    return max(reversed(ends), key=lambda name: joints[name])
