@@ -78,6 +78,8 @@ class BlockNumbers:
         self.lines = block.delay_lines(shapes)
         self.conditions = block.conditions(shapes)
         self.modes = (*block.modes(shapes), *self.conditions)
+        self.at_zero: dict[str, np.ndarray] = {}
+        """Elements of conditions whose quantity counts as 0, whatever its rounding error is."""
         self.remembered = [mode for mode in block.modes(shapes) if mode.hysteresis]
         self.guards = block.guards(shapes)
         self.symbols: dict[str, SX] = {"t": SX.sym("t")}
@@ -126,9 +128,11 @@ class BlockNumbers:
         add("guard", block.guard_values(t, x, u, p), {g.name: g.shape for g in self.guards})
         earlier = x | {mode.name: x[mode.before] for mode in self.remembered}
         mode_values = dict(block.mode_values(t, earlier, u, p)) | own_modes(block, x, u, p)
+        quantities = block.condition_values(t, x, u, p) if self.conditions else {}
         for condition in self.conditions:
-            quantity = block.condition_values(t, x, u, p)[condition.name]
+            quantity = quantities[condition.name]
             mode_values[condition.name] = quantity >= 0.0 if condition.closed else quantity > 0.0
+        add("quantity", quantities, {condition.name: condition.shape for condition in self.conditions})
         add("mode", mode_values, {m.name: m.shape for m in self.modes})
         mode_shapes = {m.name: m.shape for m in self.modes}
         resets = block.resets(t, x, u, p, e) if self.guards and not isinstance(block, RateLimiting) else {}
@@ -237,13 +241,21 @@ class BlockNumbers:
         for name, value in values.items():
             self.arrays[f"x:{name}"][:] = value
 
+    def mode_value(self, name: str) -> np.ndarray:
+        """Return the value of a mode that is consistent with the signals."""
+        value = self.value("mode", name)
+        if name in self.at_zero:
+            closed = next(condition.closed for condition in self.conditions if condition.name == name)
+            value[self.at_zero[name]] = float(closed)
+        return value
+
     def update_modes(self) -> bool:
         """Update the modes from the signals; return whether a mode has changed."""
         changed = False
         for _ in range(len(self.modes) + 2):
             again = False
             for mode in self.modes:
-                new, array = self.value("mode", mode.name), self.arrays[f"x:{mode.name}"]
+                new, array = self.mode_value(mode.name), self.arrays[f"x:{mode.name}"]
                 if new.tolist() != array.tolist():  # faster than NumPy's comparison for a few numbers
                     array[:] = new
                     again = True
@@ -257,6 +269,6 @@ class BlockNumbers:
     def modes_differ(self) -> bool:
         """Return whether the modes are inconsistent with the signals."""
         return any(
-            self.value("mode", mode.name).tolist() != self.arrays[f"x:{mode.name}"].tolist()
+            self.mode_value(mode.name).tolist() != self.arrays[f"x:{mode.name}"].tolist()
             for mode in self.modes
         )

@@ -418,6 +418,18 @@ class Network:
             self.take_signs(fired)
         return bool(fired) or acted or self.fingerprint() != before
 
+    def hold_zeros(self, below: float) -> bool:
+        """Let the quantities of conditions that are almost 0 count as 0; return whether there are any.
+
+        ``below``: the largest magnitude of such a quantity. With 0, all quantities count as they are.
+        """
+        for block in self.blocks.values():
+            if block.conditions and block.on:
+                self._feed_all(block)
+                near = {c.name: np.abs(block.value("quantity", c.name)) < below for c in block.conditions}
+                block.at_zero = {name: elements for name, elements in near.items() if elements.any()}
+        return any(block.at_zero for block in self.blocks.values() if block.conditions)
+
     def _reset(
         self, block: Any, fired: Mapping[tuple[str, str], np.ndarray], without: set[str]
     ) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -52,6 +52,8 @@ __all__ = ["EndlessEventsError", "Network", "ReferenceRun", "UnsupportedError", 
 MAX_ITERATIONS = 100
 RIGHT_LIMIT = 1e-12
 """Offset of the first stage of a step, s; its error is this time multiplied by the derivative."""
+ALMOST_ZERO = 1e-9
+"""Bound of a quantity that passes through zero at the end of a located step."""
 SAME_TIME = 2.0**-50
 """Times within this relative distance belong to the same instant."""
 
@@ -61,11 +63,21 @@ class EndlessEventsError(Exception):
 
 
 class ReferenceRun:
-    """One run of a diagram from 0 to ``stop``; ``record`` (N,) has the times to record, the first is 0."""
+    """One run of a diagram from 0 to ``stop``; ``record`` (N,) has the times to record, the first is 0.
+
+    ``momentary``: whether a condition such as u ~= 0 has the value for u = 0 for a moment where u passes
+    through 0. Otherwise it has this value only if u is exactly 0 at the end of a step, after rounding.
+    """
 
     def __init__(
-        self, diagram: Diagram, record: np.ndarray, step: float = 0.01, max_events: int = 500
+        self,
+        diagram: Diagram,
+        record: np.ndarray,
+        step: float = 0.01,
+        max_events: int = 500,
+        momentary: bool = False,
     ) -> None:
+        self.momentary = momentary
         self.network = network = Network(diagram)
         self.step = min([step, *network.shortest_delays()])
         self.stop = float(record[-1])
@@ -211,18 +223,29 @@ class ReferenceRun:
                 if not network.iterate(0.0, first=True):
                     break
             network.take_signs()
-        for _ in range(MAX_ITERATIONS):
-            if not network.iterate(t):
-                break
-        else:
-            raise EndlessEventsError(f"the events at {t} do not end")
+        if self.momentary and t > 0.0 and network.hold_zeros(ALMOST_ZERO):
+            self.iterate(t)
+            network.hold_zeros(0.0)
+        self.iterate(t)
         network.select_segments()
         network.end_instant()
         self.stopped = network.ended()
 
+    def iterate(self, t: float) -> None:
+        """Repeat the iteration of an instant until nothing changes."""
+        for _ in range(MAX_ITERATIONS):
+            if not self.network.iterate(t):
+                return
+        raise EndlessEventsError(f"the events at {t} do not end")
+
 
 def run_reference(
-    diagram: Diagram, record: Sequence[float], step: float = 0.01, max_events: int = 500
+    diagram: Diagram,
+    record: Sequence[float],
+    step: float = 0.01,
+    max_events: int = 500,
+    *,
+    momentary: bool = False,
 ) -> dict[str, np.ndarray]:
     """Return signals ``(N, *shape)`` by ``block/port`` at the times ``record`` (N,), which start at 0."""
-    return ReferenceRun(diagram, np.asarray(record, dtype=np.float64), step, max_events).run()
+    return ReferenceRun(diagram, np.asarray(record, dtype=np.float64), step, max_events, momentary).run()

@@ -105,6 +105,23 @@ def test_an_algebraic_loop_is_solved() -> None:
     np.testing.assert_allclose(y + y**3, np.sin(TIMES), atol=1e-12)
 
 
+def test_a_signal_that_passes_through_zero_is_zero_for_a_moment_on_request() -> None:
+    """The condition u ~= 0 of ramps u triggers a hold of the time at which u passes through 0, or never."""
+    inside = DiagramBuilder("hold")
+    inside.add("y", bl.Outport(port=1, initial=-1.0), inside.add("u", bl.Inport(port=1)))
+    rng = np.random.default_rng(3)
+    for slope, initial in zip(rng.uniform(1.5, 4.0, 8), rng.uniform(-1.0, -0.1, 8)):
+        builder = DiagramBuilder("crossing")
+        nonzero = builder.add("nonzero", bl.CompareToZero(relation="~="))
+        builder.connect(builder.add("ramp", bl.Ramp(slope=slope, initial=initial)), nonzero)
+        hold = bl.TriggeredSubsystem(diagram=inside.build(), edge="falling")
+        builder.add("hold", hold, u=builder.add("clock", bl.Clock()), trigger=nonzero)
+        at_zero = run_reference(builder.build(), TIMES, momentary=True)
+        rounded = run_reference(builder.build(), TIMES)
+        assert at_zero["hold/y/y"][-1] == pytest.approx(-initial / slope, abs=1e-12)
+        assert rounded["hold/y/y"][-1] in (-1.0, at_zero["hold/y/y"][-1])
+
+
 def test_too_many_events_raise_an_error() -> None:
     with pytest.raises(EndlessEventsError, match="more than 20 events"):
         run_reference(chain(bl.SineWave(frequency=1e3), bl.Sign()), TIMES, max_events=20)
