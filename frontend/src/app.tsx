@@ -7,6 +7,7 @@ import { deferred, useDeferredReady, usePrefetch, useDialogRequested } from './d
 import { Notices } from './notices'
 import { panelsOf, type Panel } from './panel'
 import { showRobotPanelIfNeeded } from './robot_panel'
+import { useTypeAhead } from './library/type_ahead'
 import { TopBar } from './run/top_bar'
 import { Timeline } from './run/timeline'
 import { DropZone } from './robot/drop'
@@ -37,6 +38,7 @@ export function App() {
   useEffect(() => onTheme(setColorScheme), [setColorScheme])
   const editing = useRobotEditor((s) => s.current !== null)
   usePrefetch()
+  useTypeAhead()
   return (
     <div className="studio">
       <div className={editing ? 'behind' : 'sheets'} inert={editing}>

@@ -26,6 +26,8 @@ interface Dialogs {
   openCount: number
   /** Text typed into the search lists. */
   typed: string
+  /** Whether Enter was pressed before the field of a search list had the focus. */
+  accepted: boolean
   /**
    * The subsystem whose mask is edited; `''` is the model. `ownsVisibleSheet`: it owns the visible sheet.
    */
@@ -44,6 +46,7 @@ export const useDialogs = create<Dialogs>(() => ({
   open: null,
   openCount: 0,
   typed: '',
+  accepted: false,
   maskOwner: '',
   ownsVisibleSheet: false,
   at: null,
@@ -58,7 +61,9 @@ export function showDialog(
   connectTo: Dialogs['connectTo'] = null,
 ): void {
   // A closing dialog still shows its content for a moment.
-  useDialogs.setState((s) => (open ? { open, openCount: s.openCount + 1, typed, at, connectTo } : { open }))
+  useDialogs.setState((s) =>
+    open ? { open, openCount: s.openCount + 1, typed, accepted: false, at, connectTo } : { open },
+  )
 }
 
 /** The visible stop of the tour; `null` while the tour is not shown. */

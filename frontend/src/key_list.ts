@@ -70,6 +70,7 @@ export const KEYS: KeyGroup[] = [
     title: 'Lists, fields and the tour',
     sources: [
       'library/pick_list.tsx',
+      'library/type_ahead.ts',
       'documents/open_dialog.tsx',
       'documents/tour.tsx',
       'scopes/inspector.tsx',

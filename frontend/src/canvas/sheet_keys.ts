@@ -1,6 +1,6 @@
 import { useEffect, type RefObject } from 'react'
 import { commandOf } from '../commands'
-import { showDialog, useDialogs } from '../dialogs'
+import { showDialog } from '../dialogs'
 import { change, openSheet, useStudio } from '../store'
 import { selectedBlocks } from './arranging'
 import { rename } from './block_node'
@@ -9,15 +9,6 @@ import { addNote, moveNodes, openBlock, sheetView, ZOOM_STEP } from './sheet_act
 import { wireKey, type Places } from '../model/wires'
 
 const ARROW_STEP = 5
-
-const SEARCH_LISTS = new Set(['find', 'commands'])
-
-/** Add a letter that was typed before an opened list has the focus; otherwise open the list of blocks. */
-function typeLetter(letter: string): void {
-  const { open, typed } = useDialogs.getState()
-  if (open && SEARCH_LISTS.has(open)) useDialogs.setState({ typed: typed + letter })
-  else showDialog('insert', open === 'insert' ? typed + letter : letter)
-}
 
 /** Keys that a focused button handles; all other keys are handled by the sheet. */
 const BUTTON_KEYS = new Set(['Enter', ' ', 'Tab'])
@@ -82,7 +73,7 @@ export function useSheetKeys(
     else if (event.key === 'Escape' && document.inside.length && !selection.size)
       openSheet(document.inside.slice(0, -1))
     else if (event.key === 'Escape') select([])
-    else if (/^\p{L}$/u.test(event.key)) typeLetter(event.key)
+    else if (/^\p{L}$/u.test(event.key)) showDialog('insert', event.key)
     else return false
     return true
   }

@@ -1,6 +1,7 @@
 import './pick_list.css'
 import { Kbd, Modal, TextInput } from '@mantine/core'
 import { useEffect, useRef, useState, type ReactNode } from 'react'
+import { useDialogs } from '../dialogs'
 
 export interface PickItem {
   key: string
@@ -51,6 +52,7 @@ export function PickList({
     onClose()
     onPick(index)
   }
+  usePickEarly(opened && items.length > 0, () => pick(0))
   return (
     <Modal
       opened={opened}
@@ -59,6 +61,7 @@ export function PickList({
       size="md"
       padding="xs"
       yOffset="16vh"
+      classNames={{ content: 'pick-list' }}
       attributes={{ content: { 'aria-label': label } }}
     >
       <TextInput
@@ -66,7 +69,10 @@ export function PickList({
         placeholder={placeholder}
         data-autofocus
         value={typed}
-        onChange={(event) => onTyped(event.currentTarget.value)}
+        onChange={(event) => {
+          useDialogs.setState({ accepted: false })
+          onTyped(event.currentTarget.value)
+        }}
         onKeyDown={(event) => {
           if (event.key === 'ArrowDown') setActiveIndex(Math.min(activeIndex + 1, items.length - 1))
           else if (event.key === 'ArrowUp') setActiveIndex(Math.max(activeIndex - 1, 0))
@@ -101,6 +107,16 @@ export function PickList({
       {items.length === 0 && <p className="empty">{emptyText}</p>}
     </Modal>
   )
+}
+
+/** Pick the first entry as soon as there is one, if Enter was pressed before the field had the focus. */
+function usePickEarly(available: boolean, pickFirst: () => void): void {
+  const accepted = useDialogs((s) => s.accepted)
+  useEffect(() => {
+    if (!available || !accepted) return
+    useDialogs.setState({ accepted: false })
+    pickFirst()
+  })
 }
 
 /** Consecutive entries with the same heading; `first` is the index of the first one. */

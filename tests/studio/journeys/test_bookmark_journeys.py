@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import json
 import re
+from contextlib import suppress
 
 import pytest
 from accessibility import axe
 from building import DIALOG, block, keep_view, middle, select_block, wait_until
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Locator, Page, TimeoutError, expect
 
 from conftest import Studio
 
 View = tuple[float, ...]
+RETRY_MS = 5000
 
 
 def view(page: Page) -> View:
@@ -150,19 +152,18 @@ def test_bookmarks_are_used_with_the_mouse(sheet: Page, studio: Studio) -> None:
     first = view(sheet)
 
     def choose_in_menu(entry: str) -> None:
+        """Right-click the sheet until the menu opens the dialog: a click is lost while the focus returns."""
         expect(sheet.locator(DIALOG)).to_have_count(0)
         x, y = middle(sheet.locator(".react-flow__controls"))
-        item = sheet.get_by_role("menuitem", name=entry)
 
-        def menu_is_open() -> bool:
-            # A menu that opens while the focus returns from a closed dialog closes again.
+        def opens_dialog() -> bool:
             sheet.mouse.click(x + 60, y + 30, button="right")
-            sheet.wait_for_timeout(100)
-            return item.is_visible()
+            with suppress(TimeoutError):
+                sheet.get_by_role("menuitem", name=entry).click(timeout=RETRY_MS)
+                sheet.locator(DIALOG).wait_for(timeout=RETRY_MS)
+            return sheet.locator(DIALOG).is_visible()
 
-        wait_until(sheet, menu_is_open)
-        item.click()
-        expect(sheet.locator(DIALOG)).to_be_visible()
+        wait_until(sheet, opens_dialog)
 
     dialog = sheet.locator(DIALOG)
     choose_in_menu("Bookmark this view")

@@ -226,3 +226,21 @@ def test_the_list_of_keys_is_printed_black_on_white_without_the_page(page: Page)
     page.emulate_media(media="screen", color_scheme="light")
     page.keyboard.press("Escape")
     expect(keys).to_be_hidden()
+
+
+TYPE_AT_ONCE = """keys => {
+  const press = (key, more = {}) =>
+    document.activeElement.dispatchEvent(
+      new KeyboardEvent('keydown', { key, bubbles: true, cancelable: true, ...more }))
+  press('k', { ctrlKey: true })
+  keys.forEach(key => press(key))
+}"""
+
+
+def test_keys_typed_before_a_list_has_the_focus_belong_to_the_list(page: Page) -> None:
+    """The keys arrive before the page can draw: none of them reaches the sheet."""
+    select_block(page, "PID")
+    page.evaluate(TYPE_AT_ONCE, [*"sh1", "Backspace", *"ow at 100", "Enter"])
+    expect(page.get_by_role("dialog")).to_be_hidden()
+    expect(page.locator(".react-flow__viewport")).to_have_attribute("style", re.compile(r"scale\(1\)"))
+    expect(block(page, "PID")).to_have_class(re.compile("selected"))

@@ -1,0 +1,28 @@
+import { useEffect } from 'react'
+import { useDialogs } from '../dialogs'
+
+const LISTS = new Set<string | null>(['find', 'commands', 'insert'])
+
+/** Keys typed after a search list was requested and before its field has the focus belong to the list. */
+export function useTypeAhead(): void {
+  useEffect(() => {
+    const onKeyDown = (event: KeyboardEvent) => {
+      const { open, typed } = useDialogs.getState()
+      const { key, ctrlKey, metaKey, altKey } = event
+      if (!LISTS.has(open) || ctrlKey || metaKey || altKey) return
+      if (document.activeElement?.closest('.pick-list')) return
+      const next = {
+        Escape: { open: null },
+        Enter: { accepted: true },
+        Backspace: { typed: typed.slice(0, -1), accepted: false },
+      }
+      useDialogs.setState(
+        next[key as keyof typeof next] ?? (key.length === 1 ? { typed: typed + key, accepted: false } : {}),
+      )
+      event.preventDefault()
+      event.stopPropagation()
+    }
+    addEventListener('keydown', onKeyDown, true)
+    return () => removeEventListener('keydown', onKeyDown, true)
+  }, [])
+}
