@@ -28,7 +28,7 @@ from armblocks.dynamics import TRACES
 from armblocks.errors import ArmblocksError
 from armblocks.formats import load_robot
 from armblocks.formats.urdf.xacro_expansion import uses_xacro
-from armblocks.formats.urdf.xml_elements import read_elements
+from armblocks.formats.xml_elements import read_elements
 from armblocks.robot import Robot
 
 PACKAGES = (

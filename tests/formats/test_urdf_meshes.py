@@ -11,9 +11,9 @@ import pytest
 
 from armblocks.errors import FormatError
 from armblocks.formats.file_findings import FileContext
-from armblocks.formats.urdf.packages import package_folder, resolved
+from armblocks.formats.meshes.mesh_file import MAX_TRIANGLES, drawn_mesh, mesh_corners
+from armblocks.formats.referenced_files import package_folder, resolved
 from armblocks.formats.urdf.reader import read_urdf
-from armblocks.formats.urdf.stl import MAX_TRIANGLES, stl_mesh
 from armblocks.robot import Robot
 from armblocks.robot.geometry import robot_bodies
 from armblocks.robot.shapes import IDENTITY, Material, Mesh
@@ -45,7 +45,7 @@ def ascii_text(corners: np.ndarray) -> bytes:
 
 
 def mesh_of(data: bytes, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Mesh:
-    return stl_mesh(data, "a.stl", np.array(scale), Material.PAINT, IDENTITY)
+    return drawn_mesh(mesh_corners(data, "a.stl", np.array(scale)), Material.PAINT, IDENTITY)
 
 
 def volume(mesh: Mesh) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.urdf.origins import origin_of
-from armblocks.formats.urdf.xml_elements import Element
+from armblocks.formats.xml_elements import Element
 from armblocks.spatial import IDENTITY3, Matrix3, Vector3, matrix3
 
 ZERO3: Matrix3 = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

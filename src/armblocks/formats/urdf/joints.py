@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from armblocks.errors import FormatError
 from armblocks.formats.file_findings import FileContext
-from armblocks.formats.urdf.origins import note, origin_of
+from armblocks.formats.urdf.origins import origin_of
 from armblocks.formats.urdf.rules import AXIS, DAMPING, LIMIT, MIMIC, NO_LIMIT, TRANSMISSION
-from armblocks.formats.urdf.xml_elements import Element
+from armblocks.formats.xml_elements import Element, note
 from armblocks.robot import Fixed, Joint, JointLimits, Motor, Prismatic, Revolute
 from armblocks.spatial import Transform, Vector3
 

@@ -4,22 +4,13 @@ from __future__ import annotations
 
 import math
 
-from armblocks.formats.file_findings import FileContext, FileFinding, Rule
+from armblocks.formats.file_findings import FileContext
 from armblocks.formats.urdf.rules import ANGLE
-from armblocks.formats.urdf.xml_elements import Element
+from armblocks.formats.xml_elements import Element, note
 from armblocks.spatial import Transform, transl, trotx, troty, trotz
 
 MAX_ANGLE = 2 * math.pi * (1 + 1e-6)
 """Angles above a whole turn are probably in degrees."""
-
-
-def note(context: FileContext, rule: Rule, element: Element, what: str, label: str = "") -> None:
-    """Add a finding about an element."""
-    context.findings.append(
-        FileFinding(
-            rule=rule, file=element.file, line=element.line, element=label or element.label, what=what
-        )
-    )
 
 
 def origin_of(element: Element, context: FileContext) -> Transform:

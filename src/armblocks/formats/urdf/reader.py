@@ -18,11 +18,10 @@ from armblocks.errors import FormatError, RobotError, UnknownNameError
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.urdf.inertials import inertial_of
 from armblocks.formats.urdf.joints import Transmission, joint_of, motor_of, transmissions_of
-from armblocks.formats.urdf.origins import note
 from armblocks.formats.urdf.rules import UNKNOWN
 from armblocks.formats.urdf.shapes import shapes_of
 from armblocks.formats.urdf.xacro_expansion import expanded, uses_xacro
-from armblocks.formats.urdf.xml_elements import Element, read_elements, shortened
+from armblocks.formats.xml_elements import Element, note, read_elements, shortened
 from armblocks.robot import Fixed, Link, Robot, deepest_tip, with_tip
 from armblocks.robot.checks import MAX_LINKS
 from armblocks.robot.shapes import Material

@@ -10,11 +10,11 @@ import numpy as np
 from armblocks.errors import FormatError
 from armblocks.files import read_bounded
 from armblocks.formats.file_findings import FileContext
-from armblocks.formats.urdf.origins import note, origin_of
-from armblocks.formats.urdf.packages import resolved
+from armblocks.formats.meshes.mesh_file import MAX_BYTES, READERS, drawn_mesh, mesh_corners
+from armblocks.formats.referenced_files import resolved
+from armblocks.formats.urdf.origins import origin_of
 from armblocks.formats.urdf.rules import MESH, SHAPE
-from armblocks.formats.urdf.stl import MAX_BYTES, stl_mesh
-from armblocks.formats.urdf.xml_elements import Element, shortened
+from armblocks.formats.xml_elements import Element, note, shortened
 from armblocks.robot.shapes import Box, Cylinder, Material, Pose, Shape, Sphere
 from armblocks.spatial import Transform, transl
 
@@ -86,13 +86,14 @@ def _mesh(
     file = kind.attributes.get("filename", "").strip()
     scale = kind.vector("scale", (1.0, 1.0, 1.0))
     suffix = PurePath(file).suffix.lower()
-    if suffix != ".stl":
+    if suffix not in READERS:
         reason = f"'{shortened(suffix)}' meshes are not supported"
     elif isinstance(path := resolved(file, context), str):
         reason = path
     else:
         try:
-            return [stl_mesh(read_bounded(path, MAX_BYTES), file, np.array(scale), material, pose_rows(pose))]
+            corners = mesh_corners(read_bounded(path, MAX_BYTES), file, np.array(scale))
+            return [drawn_mesh(corners, material, pose_rows(pose))]
         except FormatError as error:
             reason = error.what
     note(context, MESH, kind, f"the mesh '{shortened(file)}' is not shown: {reason}", link.label)

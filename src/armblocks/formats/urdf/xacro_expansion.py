@@ -11,7 +11,7 @@ from pathlib import PurePath
 from armblocks.errors import FormatError
 from armblocks.extras import require
 from armblocks.formats.file_findings import FileContext
-from armblocks.formats.urdf.xml_elements import Element, read_elements
+from armblocks.formats.xml_elements import Element, read_elements
 
 SECONDS = 5.0
 """Maximum duration of an expansion."""

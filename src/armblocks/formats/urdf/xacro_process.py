@@ -21,8 +21,8 @@ from typing import Any, NoReturn
 from armblocks.errors import ArmblocksError
 from armblocks.files import read_bounded
 from armblocks.formats.file_findings import FileContext
-from armblocks.formats.urdf.packages import package_folder, resolved
-from armblocks.formats.urdf.xml_elements import read_elements
+from armblocks.formats.referenced_files import package_folder, resolved
+from armblocks.formats.xml_elements import read_elements
 
 MAX_BYTES = 4 * 2**20
 """Maximum size of an included file."""

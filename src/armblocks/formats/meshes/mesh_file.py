@@ -1,13 +1,15 @@
-"""STL meshes, binary and ASCII, reduced to a number of triangles that can be drawn quickly."""
+"""Triangle meshes of files, reduced to a number of triangles that can be drawn quickly."""
 
 from __future__ import annotations
 
-import re
+from collections.abc import Callable, Mapping
+from pathlib import PurePath
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.errors import FormatError
+from armblocks.formats.meshes.stl import stl_corners
 from armblocks.robot.shapes import Material, Mesh, Pose
 
 MAX_BYTES = 64 * 2**20
@@ -15,17 +17,27 @@ MAX_BYTES = 64 * 2**20
 MAX_TRIANGLES = 2000
 """Maximum number of triangles of a mesh after reduction."""
 
-_HEADER = 84
-_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-_VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
+Corners = NDArray[np.float64]
+"""The corners of all triangles, (F, 3, 3), counter-clockwise seen from outside."""
+
+READERS: Mapping[str, Callable[[bytes, str], Corners]] = {".stl": stl_corners}
+"""The readers of mesh files by suffix: functions of a file's bytes and its name in messages."""
 
 
-def stl_mesh(data: bytes, name: str, scale: NDArray[np.float64], material: Material, pose: Pose) -> Mesh:
-    """The mesh of an STL file with at most ``MAX_TRIANGLES`` triangles. Raises ``FormatError``.
+def mesh_corners(data: bytes, name: str, scale: NDArray[np.float64]) -> Corners:
+    """The corners of the triangles of a mesh file, multiplied by ``scale`` along x, y, z.
 
-    ``scale``: factors along x, y, z.
+    ``name``: the file, whose suffix selects the reader. Raises ``FormatError``.
     """
-    corners = _corners(data, name).astype(np.float64) * scale
+    suffix = PurePath(name).suffix.lower()
+    if suffix not in READERS:
+        raise FormatError(
+            f"'{suffix[:20]}' meshes are not supported",
+            where=name,
+            allowed=", ".join(READERS),
+            fix="convert the mesh",
+        )
+    corners = READERS[suffix](data, name) * scale
     if not len(corners) or not np.isfinite(corners).all() or np.abs(corners).max() > 1e6:
         raise FormatError(
             "the mesh has no triangles, or points that are not finite",
@@ -33,30 +45,18 @@ def stl_mesh(data: bytes, name: str, scale: NDArray[np.float64], material: Mater
             allowed="triangles within 1000 km",
             fix="export the mesh again",
         )
-    if scale.prod() < 0:  # a mirror image: keep the corners counter-clockwise seen from outside
-        corners = corners[:, ::-1]
+    # A mirror image: the corners remain counter-clockwise seen from outside.
+    return corners[:, ::-1] if scale.prod() < 0 else corners
+
+
+def drawn_mesh(corners: Corners, material: Material, pose: Pose) -> Mesh:
+    """The mesh with at most ``MAX_TRIANGLES`` triangles."""
     points, faces = _reduced(corners)
     return Mesh(
         vertices=tuple((float(x), float(y), float(z)) for x, y, z in points),
         faces=tuple((int(a), int(b), int(c)) for a, b, c in faces),
         material=material,
         pose=pose,
-    )
-
-
-def _corners(data: bytes, name: str) -> NDArray[np.float32] | NDArray[np.float64]:
-    """The corners of all triangles, (F, 3, 3)."""
-    count = int.from_bytes(data[80:_HEADER], "little") if len(data) >= _HEADER else -1
-    if count >= 0 and len(data) >= _HEADER + count * _RECORD.itemsize and count > 0:
-        return np.frombuffer(data, _RECORD, count, _HEADER)["corners"]
-    if data.lstrip()[:5].lower() == b"solid":
-        try:
-            numbers = np.array([[float(word) for word in row] for row in _VERTEX.findall(data)])
-            return numbers.reshape(-1, 3, 3)
-        except ValueError:
-            pass
-    raise FormatError(
-        "this is not an STL mesh", where=name, allowed="binary or ASCII STL", fix="export the mesh as STL"
     )
 
 

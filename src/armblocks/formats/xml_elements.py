@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, cast
 from xml.sax.handler import ContentHandler
 
 from armblocks.errors import FormatError
+from armblocks.formats.file_findings import FileContext, FileFinding, Rule
 
 if TYPE_CHECKING:
     from xml.sax.xmlreader import AttributesImpl, Locator, XMLReader
@@ -110,6 +111,15 @@ class Element:
                 )
             values.append(value)
         return values
+
+
+def note(context: FileContext, rule: Rule, element: Element, what: str, label: str = "") -> None:
+    """Add a finding about an element."""
+    context.findings.append(
+        FileFinding(
+            rule=rule, file=element.file, line=element.line, element=label or element.label, what=what
+        )
+    )
 
 
 def shortened(text: str) -> str:
