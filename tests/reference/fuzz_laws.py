@@ -173,7 +173,9 @@ def expect_well_posed(case: Case, run: Signals) -> None:
     result. In the neighbours, ``PERTURBATION`` with a random sign is added to the signals of all
     connections, then to the signal of one connection: with all, a signal that stays at a switching value may
     have events without end. Rounding also decides whether a signal that passes through 0 is exactly 0 at an
-    instant; the first neighbour is the diagram itself where it always is.
+    instant; the first neighbour is the diagram itself where it always is. A signal that touches a switching
+    value may cross it for less than a step of the reference; then the native run of a neighbour agrees with
+    the reference.
     """
     results = [case.reference]
     candidates = [case.recipe, *neighbours(case.recipe), *neighbours_with_one_change(case.recipe)]
@@ -184,6 +186,16 @@ def expect_well_posed(case: Case, run: Signals) -> None:
             results.append(run_reference(diagram, case.times, 0.004, max_events=300, momentary=momentary))
         if k >= NEIGHBOURS and are_explained(case, run, results):
             raise InconclusiveError("a change of the signals by a rounding error changes the result")
+    for recipe in candidates[1:]:
+        with contextlib.suppress(ArmblocksError):
+            if agrees(case, case.signals(recipe.diagram())):
+                raise InconclusiveError("a change by a rounding error gives the result of the reference")
+
+
+def agrees(case: Case, run: Signals) -> bool:
+    """Return whether a run agrees with the reference, apart from single rows and tiny changes."""
+    reference = {name: case.reference[name] for name in case.run if name in case.reference}
+    return not any(different(run, reference, 1e-5, case.uncertainty))
 
 
 def are_explained(case: Case, run: Signals, results: Sequence[Signals]) -> bool:
