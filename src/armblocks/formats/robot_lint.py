@@ -15,7 +15,7 @@ from armblocks.robot.tree import BASE, KinematicTree
 INERTIA = Rule(
     code="robot-inertia",
     allowed="moments of inertia that are not negative, none above the sum of the other two",
-    remedy="check the unit and the axes of the inertia, and that it is that about the centre of mass",
+    remedy="check the unit and the axes of the inertia, and whether it is about the centre of mass",
 )
 IMPLAUSIBLE = Rule(
     code="robot-units",
@@ -24,8 +24,8 @@ IMPLAUSIBLE = Rule(
 )
 NO_MASS = Rule(
     code="robot-mass-missing",
-    allowed="mass or inertia beyond every joint, or motor inertia",
-    remedy="add the mass and the inertia of the links; poses do not need them",
+    allowed="mass or inertia that each joint moves, or motor inertia",
+    remedy="add the mass and the inertia of the links; kinematics do not depend on them",
 )
 WARNED = Rule(code="robot-warning", allowed="files that are read without warnings", remedy="see the message")
 
