@@ -21,7 +21,7 @@ export type Entries = (Entry | null)[]
 
 interface ContextMenu {
   opened: boolean
-  /** Its name for screen readers. */
+  /** The name of the menu for screen readers. */
   label: string
   /** Position, screen px. */
   at: { x: number; y: number }
@@ -38,19 +38,19 @@ export const useContextMenu = create<ContextMenu>(() => ({
   openCount: 0,
 }))
 
-let focused: Element | null = null
+let focusedElement: Element | null = null
 
 /** Open a context menu at a point of the window; the focus returns when it is closed. */
 export function openMenu(label: string, at: { x: number; y: number }, entries: Entries): void {
-  focused = document.activeElement
+  focusedElement = document.activeElement
   useContextMenu.setState((s) => ({ opened: true, label, at, entries, openCount: s.openCount + 1 }))
 }
 
 export function closeMenu(): void {
   const focusInMenu = document.activeElement?.closest('.context-menu')
   useContextMenu.setState({ opened: false })
-  if (focusInMenu && focused instanceof HTMLElement && focused.isConnected)
-    focused.focus({ preventScroll: true })
+  if (focusInMenu && focusedElement instanceof HTMLElement && focusedElement.isConnected)
+    focusedElement.focus({ preventScroll: true })
 }
 
 /** Movement of a pressed right button, px, beyond which it is a drag and opens no menu. */
@@ -59,8 +59,7 @@ export const CLICK_PX = 3
 /**
  * The handlers of an element with a context menu. Depending on the system, browsers send `contextmenu` when
  * the right button is pressed or when it is released. The menu opens at the release, unless the pointer has
- * moved.
- * The Menu key opens it at the focused element.
+ * moved by more than `CLICK_PX`. The Menu key opens the menu at the focused element.
  */
 export function useMenuHandlers(open: (at: { x: number; y: number }, target: Element) => void) {
   return {
@@ -85,6 +84,6 @@ export function useMenuHandlers(open: (at: { x: number; y: number }, target: Ele
   }
 }
 
-/** Whether the browser's menu is kept at an element: text fields need its clipboard commands. */
+/** Whether the browser's own menu opens at an element. Text fields need the clipboard commands of this menu. */
 export const hasOwnMenu = (target: EventTarget): boolean =>
   target instanceof Element && target.closest('input, textarea, [role="menu"]') !== null

@@ -1,4 +1,4 @@
-"""``jtraj`` as arrays."""
+"""Joint trajectories of ``ab.jtraj``, its errors, and the warnings about angles in degrees."""
 
 import numpy as np
 import pytest

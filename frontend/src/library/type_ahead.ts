@@ -3,7 +3,10 @@ import { useDialogs } from '../dialogs'
 
 const LISTS = new Set<string | null>(['find', 'commands', 'insert'])
 
-/** Keys typed after a search list was requested and before its field has the focus belong to the list. */
+/**
+ * Handle the keys that are typed after a search list was requested and before its field has the focus:
+ * characters go to the search text, Enter accepts the first entry, Escape closes the list.
+ */
 export function useTypeAhead(): void {
   useEffect(() => {
     const onKeyDown = (event: KeyboardEvent) => {
@@ -11,13 +14,14 @@ export function useTypeAhead(): void {
       const { key, ctrlKey, metaKey, altKey } = event
       if (!LISTS.has(open) || ctrlKey || metaKey || altKey) return
       if (document.activeElement?.closest('.pick-list')) return
-      const next = {
+      const changes = {
         Escape: { open: null },
         Enter: { accepted: true },
         Backspace: { typed: typed.slice(0, -1), accepted: false },
       }
       useDialogs.setState(
-        next[key as keyof typeof next] ?? (key.length === 1 ? { typed: typed + key, accepted: false } : {}),
+        changes[key as keyof typeof changes] ??
+          (key.length === 1 ? { typed: typed + key, accepted: false } : {}),
       )
       event.preventDefault()
       event.stopPropagation()

@@ -18,22 +18,23 @@ def cached_kernel(key: str, trace: Callable[[], TracedFunction]) -> Kernel:
     """The kernel of the equations that ``key`` identifies.
 
     ``key`` must cover everything that the equations depend on (their type, and all numbers traced into them);
-    the sources of this package are added to it. ``trace()`` is only called if the key is not in the disk
-    cache. Raises what ``trace`` and :func:`~armblocks.compiler.compile_function` raise.
+    the sources of this package are added to it. ``trace()`` is called only if the record of the key
+    or its tape is missing in the disk cache. Raises the errors of ``trace`` and of
+    :func:`~armblocks.compiler.compile_function`.
     """
     name = cache.record_name(key)
     record = cache.load(name)
-    kernel = _read(record, key, trace) if record is not None else None
+    kernel = _kernel_of(record, trace) if record is not None else None
     if kernel is None:
         traced = trace()
         tape = tape_of(traced)
         store_tape(tape)
-        cache.store(name, _write(traced, tape.digest))
+        cache.store(name, _record_of(traced, tape.digest))
         kernel = Kernel(traced.name, traced.inputs, traced.outputs, tape.digest, lambda: tape)
     return kernel
 
 
-def _write(traced: TracedFunction, digest: str) -> bytes:
+def _record_of(traced: TracedFunction, digest: str) -> bytes:
     record = {
         "name": traced.name,
         "inputs": slots_to_json(traced.inputs),
@@ -43,7 +44,7 @@ def _write(traced: TracedFunction, digest: str) -> bytes:
     return json.dumps(record).encode()
 
 
-def _read(data: bytes, key: str, trace: Callable[[], TracedFunction]) -> Kernel | None:
+def _kernel_of(data: bytes, trace: Callable[[], TracedFunction]) -> Kernel | None:
     try:
         record = json.loads(data)
         inputs, outputs = slots_from_json(record["inputs"]), slots_from_json(record["outputs"])

@@ -16,8 +16,9 @@ def entry_names(diagram: Diagram, shapes: Mapping[str, Shape]) -> Mapping[str, t
     """Names of the entries of signals, by path; signals without known names are omitted.
 
     Ports of robot blocks and of tables declare names. They apply to the signal at the port, and to all
-    vectors of the same length that elementwise blocks compute from it. A signal with two different lists of
-    names has none. ``shapes`` are those of all signals. Names are for display only.
+    vectors of the same length that elementwise blocks compute from it. A signal to which two different
+    lists of names apply is omitted. ``shapes`` has the shapes of all signals, by path. Names are for display
+    only.
     """
     flat = flat_diagram(diagram)
     if not any(_may_declare_names(block) for block in flat.blocks.values()):
@@ -34,8 +35,8 @@ def entry_names(diagram: Diagram, shapes: Mapping[str, Shape]) -> Mapping[str, t
     names_of: dict[str, set[tuple[str, ...]]] = {}
     for path, names in declared:
         if shapes.get(path) == (len(names),):
-            names_of.setdefault(groups.of(path), set()).add(names)
-    named = {path: names_of.get(groups.of(path), set()) for path in shapes}
+            names_of.setdefault(groups.representative(path), set()).add(names)
+    named = {path: names_of.get(groups.representative(path), set()) for path in shapes}
     return {path: next(iter(rows)) for path, rows in named.items() if len(rows) == 1}
 
 
@@ -61,19 +62,19 @@ class _Groups:
     """Disjoint sets of signals (union-find)."""
 
     def __init__(self) -> None:
-        self._next: dict[str, str] = {}
+        self._parent: dict[str, str] = {}
 
-    def of(self, path: str) -> str:
+    def representative(self, path: str) -> str:
         """The representative of the set of a signal."""
         root = path
-        while root in self._next:
-            root = self._next[root]
+        while root in self._parent:
+            root = self._parent[root]
         while path != root:
-            self._next[path], path = root, self._next[path]
+            self._parent[path], path = root, self._parent[path]
         return root
 
     def join(self, one: str, other: str) -> None:
         """Merge the sets of two signals."""
-        first, second = self.of(one), self.of(other)
+        first, second = self.representative(one), self.representative(other)
         if first != second:
-            self._next[second] = first
+            self._parent[second] = first

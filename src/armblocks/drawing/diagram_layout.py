@@ -112,7 +112,7 @@ def _sum_sides(diagram: Diagram, placed_boxes: Mapping[str, Box]) -> dict[str, S
     sides: dict[str, SumSides] = {}
     for name, box in sums.items():
         if len(sources[name]) < len(box.inputs):
-            continue  # an incomplete diagram: the direction of an open input is unknown
+            continue  # an incomplete diagram: the direction of an unconnected input is unknown
         ports = [port.name for port in box.inputs]
         # The straightest wire enters from the left, except the feedback wire of a loop.
         rear = {port: x > box.x if box.flipped else x < box.x for port, (x, _, _) in sources[name].items()}

@@ -1,6 +1,6 @@
 """Bookmarks of views in the editor: their edits, and the list of the bookmarks of all sheets.
 
-A bookmark belongs to the sheet that it shows. It is therefore renamed, removed and copied with its subsystem.
+A bookmark is stored in the sheet that it shows. It is therefore moved, removed and copied with its subsystem.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def added(edit: AddBookmark, sheet: Diagram, _context: object) -> Diagram:
     """Return the sheet with a new bookmark, or with another part of the sheet for an existing one."""
     name = edit.name.strip()
     if edit.replace:
-        _known(name, sheet)
+        _check_exists(name, sheet)
     else:
         check_bookmark_name(name, sheet.bookmarks, f"diagram '{sheet.name}'")
     part = Bookmark(**edit.part.model_dump())
@@ -38,7 +38,8 @@ def added(edit: AddBookmark, sheet: Diagram, _context: object) -> Diagram:
 
 def renamed(edit: RenameBookmark, sheet: Diagram, _context: object) -> Diagram:
     """Return the sheet with another name of a bookmark."""
-    part, name = sheet.bookmarks[_known(edit.name, sheet)], edit.to.strip()
+    _check_exists(edit.name, sheet)
+    part, name = sheet.bookmarks[edit.name], edit.to.strip()
     others = _without(edit.name, sheet)
     check_bookmark_name(name, others, f"diagram '{sheet.name}'")
     return dataclasses.replace(sheet, bookmarks={**others, name: part})
@@ -46,17 +47,17 @@ def renamed(edit: RenameBookmark, sheet: Diagram, _context: object) -> Diagram:
 
 def removed(edit: RemoveBookmark, sheet: Diagram, _context: object) -> Diagram:
     """Return the sheet without a bookmark."""
-    return dataclasses.replace(sheet, bookmarks=_without(_known(edit.name, sheet), sheet))
+    _check_exists(edit.name, sheet)
+    return dataclasses.replace(sheet, bookmarks=_without(edit.name, sheet))
 
 
 def _without(name: str, sheet: Diagram) -> dict[str, Bookmark]:
     return {other: part for other, part in sheet.bookmarks.items() if other != name}
 
 
-def _known(name: str, sheet: Diagram) -> str:
+def _check_exists(name: str, sheet: Diagram) -> None:
     if name not in sheet.bookmarks:
         raise UnknownNameError("bookmark", name, sheet.bookmarks, where=f"diagram '{sheet.name}'")
-    return name
 
 
 def bookmarks_of(diagram: Diagram) -> list[SheetBookmark]:

@@ -1,9 +1,9 @@
 """The edits of diagrams; each is a pure function from one diagram to the next.
 
-An edited diagram is an unchecked :class:`~armblocks.diagram.Diagram`: inputs may be open and shapes may
-disagree. The background check reports this at the blocks; it does not prevent the edit. An edit is refused
-only if the result cannot be drawn: a name in use, an unknown port, a second driver of an input, a parameter
-value that the block does not allow.
+An edited diagram is an unchecked :class:`~armblocks.diagram.Diagram`: inputs may be unconnected and
+shapes may disagree. The background check reports such errors at the blocks; they do not prevent the edit. An
+edit is refused only if the result cannot be drawn: a name in use, an unknown port, a second driver of an
+input, a parameter value that the block does not allow.
 
 Parameters arrive as JSON values and are checked by the declarations of the block. No code is executed.
 """
@@ -147,7 +147,7 @@ def _check_room(diagram: Diagram, count: int) -> None:
             f"the sheet would have {len(diagram.blocks) + count} blocks",
             where=f"diagram '{diagram.name}'",
             allowed=f"at most {MAX_BLOCKS}",
-            fix="group some of them into subsystems",
+            fix="group some blocks into subsystems",
         )
 
 
@@ -277,8 +277,8 @@ def _check_port(ref: PortRef, diagram: Diagram, *, output: bool) -> None:
 
 def _move_title(edit: MoveBlocks) -> str:
     if edit.instead and edit.places:
-        into = len(edit.wires) > len(edit.instead)
-        return f"{'insert' if into else 'disconnect'} {_name_list(list(edit.places))}"
+        inserts = len(edit.wires) > len(edit.instead)
+        return f"{'insert' if inserts else 'disconnect'} {_name_list(list(edit.places))}"
     return f"move {_name_list(list(edit.places)) if edit.places else _count_text(edit.notes, 'note')}"
 
 

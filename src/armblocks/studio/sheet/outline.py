@@ -12,17 +12,17 @@ from armblocks.studio.sheet.parameter_values import parameter_json
 
 MAX_RESULTS = 50
 MAX_TEXT_LENGTH = 60
-"""Number of displayed characters of a value."""
+"""Maximum number of displayed characters of a matching parameter, ``name = value``."""
 
 
 def outline(diagram: Diagram) -> Outline:
     """Return the sheets of a diagram as a tree."""
-    inner = {name: block for name, block in diagram.blocks.items() if isinstance(block, DiagramBlock)}
+    subsystems = {name: block for name, block in diagram.blocks.items() if isinstance(block, DiagramBlock)}
     return Outline(
         name=diagram.name,
         blocks=len(diagram.blocks),
         subsystems=[
-            outline(block.diagram).model_copy(update={"name": name}) for name, block in inner.items()
+            outline(block.diagram).model_copy(update={"name": name}) for name, block in subsystems.items()
         ],
     )
 
@@ -30,8 +30,9 @@ def outline(diagram: Diagram) -> Outline:
 def find(diagram: Diagram, text: str) -> list[FoundBlock]:
     """Return the blocks and bookmarks of all sheets that contain every word of ``text``, best first.
 
-    Words of a block are in its name, type or values, those of a bookmark in its name. A word at the beginning
-    of a name ranks first, then a word in a name, in a type, in a value.
+    A block contains a word in its name, its type or its parameter values, a bookmark in its name. A word at
+    the beginning of a name ranks first, then a word in a name, in a type, in a value. The worst rank of all
+    words is the rank of the result.
     """
     words = text.lower().split()
     ranked: list[tuple[int, int, FoundBlock]] = []
@@ -57,7 +58,7 @@ def find(diagram: Diagram, text: str) -> list[FoundBlock]:
 
 
 _NO_MATCH = 9
-"""Rank of a block that does not match."""
+"""Rank of a block or a bookmark without the word."""
 
 
 def _name_rank(name: str, word: str) -> int:
@@ -74,16 +75,14 @@ def _rank(name: str, block: Block, word: str) -> tuple[int, str]:
     for rule in block.parameters():
         if rule.kind is ParameterKind.DIAGRAM:
             continue
-        text_of_rule = f"{rule.name} = {_value_text(block.parameter_value(rule.name))}"
-        if word in text_of_rule.lower():
-            return 3, text_of_rule if len(
-                text_of_rule
-            ) <= MAX_TEXT_LENGTH else f"{text_of_rule[: MAX_TEXT_LENGTH - 1]}…"
+        text = f"{rule.name} = {_value_text(block.parameter_value(rule.name))}"
+        if word in text.lower():
+            return 3, text if len(text) <= MAX_TEXT_LENGTH else f"{text[: MAX_TEXT_LENGTH - 1]}…"
     return _NO_MATCH, ""
 
 
 def _value_text(value: object) -> str:
-    """Format a value as the dialogs show it; a robot has all its names."""
+    """Format a value as in the dialogs; for a robot, list its manufacturer, name and source."""
     if isinstance(value, Robot):
         names = dict.fromkeys((value.manufacturer, value.name, value.source))
         return ", ".join(name for name in names if name)

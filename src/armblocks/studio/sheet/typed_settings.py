@@ -1,4 +1,4 @@
-"""Conversion of typed configuration parameters to run options, and error texts for invalid ones."""
+"""Conversion of the settings that a user types to run options, and error texts for invalid settings."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ SettingValue = bool | float | str | None
 
 
 def with_settings(options: SimulationOptions, values: Mapping[str, SettingValue]) -> SimulationOptions:
-    """Return the options with some of them changed; numbers may be typed as formulas such as ``1/1000``.
+    """Return the options with the given values; numbers may be typed as formulas such as ``1/1000``.
 
-    Raises ``UnknownNameError`` or ``InputError`` for settings with which no run is possible.
+    Raises ``UnknownNameError`` or ``InputError`` for a setting that a run does not allow.
     """
     known = [field.name for field in dataclasses.fields(SimulationOptions)]
     for name in values:
@@ -39,7 +39,7 @@ def with_settings(options: SimulationOptions, values: Mapping[str, SettingValue]
 
 
 def setting_faults(options: SimulationOptions, values: Mapping[str, SettingValue]) -> dict[str, str]:
-    """Return error texts for invalid settings by name, for display while they are typed."""
+    """Return error texts for invalid settings by name, for display while the user types."""
     faults: dict[str, str] = {}
     for name, value in values.items():
         try:
