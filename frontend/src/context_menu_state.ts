@@ -84,6 +84,6 @@ export function useMenuHandlers(open: (at: { x: number; y: number }, target: Ele
   }
 }
 
-/** Whether the browser's own menu opens at an element. Text fields need the clipboard commands of this menu. */
+/** Whether the browser's menu opens at an element: text fields need the clipboard commands of this menu. */
 export const hasOwnMenu = (target: EventTarget): boolean =>
   target instanceof Element && target.closest('input, textarea, [role="menu"]') !== null
