@@ -234,9 +234,9 @@ FOUND = [
         "the shape 'cone' is not known",
     ),
     (
-        joint(LIMIT).replace(INERTIAL, '<visual><geometry><mesh filename="a.dae"/></geometry></visual>'),
+        joint(LIMIT).replace(INERTIAL, '<visual><geometry><mesh filename="a.ply"/></geometry></visual>'),
         "urdf-mesh",
-        "the mesh 'a.dae' is not shown: '.dae' meshes are not supported",
+        "the mesh 'a.ply' is not shown: '.ply' meshes are not supported",
     ),
 ]
 

@@ -9,6 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.errors import FormatError
+from armblocks.formats.meshes.dae import dae_corners
+from armblocks.formats.meshes.glb import glb_corners
+from armblocks.formats.meshes.obj import obj_corners
 from armblocks.formats.meshes.stl import stl_corners
 from armblocks.robot.shapes import Material, Mesh, Pose
 
@@ -20,7 +23,12 @@ MAX_TRIANGLES = 2000
 Corners = NDArray[np.float64]
 """The corners of all triangles, (F, 3, 3), counter-clockwise seen from outside."""
 
-READERS: Mapping[str, Callable[[bytes, str], Corners]] = {".stl": stl_corners}
+READERS: Mapping[str, Callable[[bytes, str], Corners]] = {
+    ".stl": stl_corners,
+    ".obj": obj_corners,
+    ".dae": dae_corners,
+    ".glb": glb_corners,
+}
 """The readers of mesh files by suffix: functions of a file's bytes and its name in messages."""
 
 
@@ -37,7 +45,8 @@ def mesh_corners(data: bytes, name: str, scale: NDArray[np.float64]) -> Corners:
             allowed=", ".join(READERS),
             fix="convert the mesh",
         )
-    corners = READERS[suffix](data, name) * scale
+    with np.errstate(all="ignore"):  # numbers that are not finite are refused below
+        corners = READERS[suffix](data, name) * scale
     if not len(corners) or not np.isfinite(corners).all() or np.abs(corners).max() > 1e6:
         raise FormatError(
             "the mesh has no triangles, or points that are not finite",

@@ -46,8 +46,8 @@ UNKNOWN = Rule(
 )
 MESH = Rule(
     code="urdf-mesh",
-    allowed="STL meshes that can be found",
-    remedy="give the folder of the package with packages={…}, or convert the mesh to STL",
+    allowed="STL, OBJ, COLLADA and GLB meshes that can be found",
+    remedy="give the folder of the package with packages={…}, or convert the mesh to STL or OBJ",
 )
 SHAPE = Rule(
     code="urdf-shape",
