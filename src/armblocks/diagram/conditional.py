@@ -98,7 +98,7 @@ class ResettableSubsystem(DiagramBlock):
 
     title: ClassVar[str] = "Resettable Subsystem"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A subsystem without states: the output equals the input, and a reset has no effect.",
+        shows="An integrator inside: the integral of the sine is reset by each rising edge of the pulse.",
         inputs={"reset": _PULSES},
         shown=("In1", "reset", "Out1"),
     )

@@ -22,6 +22,7 @@ from armblocks.diagram.diagram import Connection, Diagram
 from armblocks.diagram.parameter import Parameter, ParameterKind, Value, parameter
 from armblocks.diagram.port import Port, PortRef
 from armblocks.diagram.signs import Outline
+from armblocks.diagram.worked_example import WorkedExample
 from armblocks.equations import Shape
 from armblocks.errors import DiagramError, InputError
 
@@ -65,6 +66,10 @@ class Inport(Block):
 
     title: ClassVar[str] = "In"
     outline: ClassVar[Outline] = Outline.OVAL
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="At the top level of a diagram, an In block outputs its parameter value, here 1.",
+        parameters={"value": 1.0},
+    )
 
     port: int = parameter(
         0, minimum=0, doc="port number among the inputs, from 1; 0 takes the next free number"
@@ -109,6 +114,9 @@ class Outport(Block):
 
     title: ClassVar[str] = "Out"
     outline: ClassVar[Outline] = Outline.OVAL
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A sine at an Out block. In a subsystem, it would be the signal at the output port."
+    )
 
     port: int = parameter(
         0, minimum=0, doc="port number among the outputs, from 1; 0 takes the next free number"
@@ -207,6 +215,9 @@ class Subsystem(DiagramBlock):
     """A diagram inside a block. Its ports are In and Out blocks; its signals have paths name/block/port."""
 
     title: ClassVar[str] = "Subsystem"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The default content of a subsystem connects its input directly to its output."
+    )
 
 
 def port_blocks(

@@ -7,6 +7,7 @@ sines for numbers and vectors, a rotating pose for poses, a joint trajectory for
 from __future__ import annotations
 
 import itertools
+import re
 import warnings
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from armblocks import formats
-from armblocks.blocks import BLOCKS, Scope, XYGraph
+from armblocks.blocks import BLOCKS, Integrator, Scope, XYGraph
 from armblocks.diagram import (
     Block,
     BlockHandle,
@@ -26,6 +27,7 @@ from armblocks.diagram import (
     ParameterKind,
     Port,
     PortRef,
+    ResettableSubsystem,
     Shapes,
     WorkedExample,
     driver,
@@ -69,9 +71,8 @@ def caption(kind: type[Block]) -> str:
 
 def block_name(kind: type[Block]) -> str:
     """The name of the block in its example: its title in lower case, except for abbreviations."""
-    return " ".join(
-        word.lower() if word.isalpha() and word[1:].islower() else word for word in kind.title.split()
-    ).replace("/", "-")
+    words = re.compile(r"(?<![A-Za-z0-9])[A-Z][a-z]+(?![A-Za-z0-9])")
+    return words.sub(lambda word: word[0].lower(), kind.title).replace("/", "-")
 
 
 class _ExampleBuilder:
@@ -159,12 +160,22 @@ def _numbered(stem: str) -> Iterator[str]:
 def _block(kind: type[Block], parameters: Mapping[str, Any]) -> Block:
     """A block with these parameters, and with the default robot and sample time if required."""
     values = dict(parameters)
+    if kind is ResettableSubsystem:
+        values.setdefault("diagram", _integrating_diagram())
     for rule in kind.parameters():
         if rule.kind is ParameterKind.ROBOT:
             values[rule.name] = shipped_robot(values.get(rule.name, ROBOT))
         elif rule.name == "sample_time" and rule.name not in values and kind.sampled and rule.default == -1:
             values[rule.name] = SAMPLE_TIME
     return kind(**values)
+
+
+@cache
+def _integrating_diagram() -> Diagram:
+    """The content of a resettable subsystem: the default content has no state that a reset could change."""
+    builder = DiagramBuilder("Subsystem")
+    builder.output("Out1", builder.add("integrator", Integrator(), builder.input("In1")))
+    return builder.build()
 
 
 @cache

@@ -132,7 +132,7 @@ class PID(ContinuousPidBlock):
 
     title: ClassVar[str] = "PID Controller"
     sign: ClassVar[FaceSign] = Words("PID(s)")
-    example: ClassVar[WorkedExample] = pid_example("one", I=1.5, D=0.4)
+    example: ClassVar[WorkedExample] = pid_example("one", I=1.5, D=0.4, N=8.0)
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the error"), *self.further_ports())

@@ -41,7 +41,7 @@ class DegreesToRadians(Block):
     title: ClassVar[str] = "Degrees to Radians"
     sign: ClassVar[FaceSign] = Words("° → rad")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="An angle from 0 to 360 degrees, in radians from 0 to 2 pi.",
+        shows="An angle from 0 to 2 pi rad. Charts show angles in degrees.",
         inputs={"u": driver("Ramp", slope=36.0)},
         shown=("y",),
     )

@@ -40,6 +40,9 @@ class SliderGain(Block):
 
     title: ClassVar[str] = "Slider Gain"
     outline: ClassVar[Outline] = Outline.TRIANGLE
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A sine times 1.5. The gain can be changed during the run.", parameters={"gain": 1.5}
+    )
 
     gain: float = parameter(1.0, doc="the gain")
     low: float = parameter(0.0, tunable=False, doc="the lower end of the slider")
@@ -72,6 +75,7 @@ class WeightedSampleTime(Block):
     title: ClassVar[str] = "Weighted Sample Time Math"
     broadcast_parameters: ClassVar[tuple[str, ...]] = ("weight",)
     sampled: ClassVar[bool] = True
+    example: ClassVar[WorkedExample] = WorkedExample(shows="The sampled sine plus the sample time of 0.5 s.")
 
     operation: str = parameter("+", choices=tuple(_OPERATIONS), doc="operation")
     weight: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the factor of the sample time")

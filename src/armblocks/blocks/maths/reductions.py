@@ -30,8 +30,8 @@ class SumOfElements(Block):
     title: ClassVar[str] = "Sum of Elements"
     sign: ClassVar[FaceSign] = Words("Σ")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Three phases, 120 degrees apart: their sum is 0.",
-        inputs={"u": THREE_PHASES},
+        shows="The first three terms of the Fourier series of a square wave, and their sum.",
+        inputs={"u": driver("SineWave", amplitude=(1.0, 0.3333, 0.2), frequency=(1.0, 3.0, 5.0))},
     )
 
     def input_ports(self) -> tuple[Port, ...]:

@@ -49,8 +49,8 @@ class JointSensor(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A motion of the Puma's joints, measured every 0.1 s with a noise of 0.05 rad.",
         parameters={"robot": "puma560", "q_deviation": 0.05, "sample_time": 0.1},
-        inputs={"q": driver("JTraj"), "qd": driver("JTraj").at("qd")},
-        shown=("q",),
+        inputs={name: driver("JTraj").named("motion").at(name) for name in ("q", "qd")},
+        shown=("q", "q_measured"),
     )
 
     robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")

@@ -160,10 +160,7 @@ class ManualSwitch(Block):
 
     title: ClassVar[str] = "Manual Switch"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows=(
-            "The first of two signals passes; the position is a parameter and can be changed during a "
-            "session."
-        ),
+        shows="The first of two signals passes. The position is a parameter that can change during a run.",
     )
 
     position: float = parameter(1.0, minimum=1.0, maximum=2.0, doc="1 or 2")

@@ -71,7 +71,7 @@ class Display(Block):
 
     title: ClassVar[str] = "Display"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The value at the suffix of the run.",
+        shows="The value at the end of the run.",
         inputs={"u": driver("Ramp", slope=0.5)},
     )
 
@@ -173,7 +173,7 @@ class Spectrum(Block):
     )
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Two sines of 0.5 and 2 Hz with the amplitudes 1 and 0.1.",
-        parameters={"decibels": False},
+        parameters={"decibels": False, "sample_rate": 10.0},
         inputs={
             "u": driver("Sum").by(
                 u1=driver("SineWave", frequency=math.pi),

@@ -17,8 +17,10 @@ class StopSimulation(Block):
     title: ClassVar[str] = "Stop Simulation"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The run ends when the ramp exceeds 5.",
-        inputs={"u": driver("CompareToConstant", relation=">", constant=5.0).by(u=driver("Ramp"))},
-        shown=("u",),
+        inputs={
+            "u": driver("CompareToConstant", relation=">", constant=5.0).by(u=driver("Ramp").named("ramp"))
+        },
+        shown=("ramp/y", "u"),
     )
 
     def input_ports(self) -> tuple[Port, ...]:
