@@ -64,7 +64,8 @@ class DiagramBuilder:
     place, and its signals are ``"controller/error/y"``::
 
         with builder.subsystem("controller", reference, position) as inner:
-            error = inner.add("error", Sum(signs="+-"), inner.input("reference"), inner.input("position"))
+            inputs = inner.input("reference"), inner.input("position")
+            error = inner.add("error", Sum(signs="+-"), *inputs)
             inner.output("force", inner.add("gain", Gain(gain=5.0), error))
         builder.connect(builder["controller"], motor["force"])
 

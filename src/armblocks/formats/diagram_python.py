@@ -39,7 +39,7 @@ from armblocks.robot import Robot
 
 _Named = TypeVar("_Named", Robot, str)
 _RESERVED_NAMES = ("ab", "builder", "diagram", "result")
-_MAX_LINE_LENGTH = 92
+_MAX_LINE_LENGTH = 88
 _FRICTION_METHODS = {
     "": "",
     "none": ".nofriction()",
@@ -129,7 +129,7 @@ class _ProgramWriter:
 
         argument_texts = keyword_arguments(block.parameters())
         if not isinstance(block, DiagramBlock):
-            return f"{block.type_name()}({', '.join(argument_texts)})"
+            return _block_call(block.type_name(), argument_texts)
         if _is_whole_link(block):
             expression = _library_block(block.diagram.link)
         elif block.diagram.link:
@@ -345,6 +345,14 @@ def _call(head: str, arguments: list[str]) -> list[str]:
     if len(line) <= _MAX_LINE_LENGTH:
         return [line]
     return [f"{head}(", *(f"    {argument}," for argument in arguments), ")"]
+
+
+def _block_call(name: str, arguments: list[str]) -> str:
+    """The call of a block type as an argument of ``add``: one line, or one line for each parameter."""
+    line = f"{name}({', '.join(arguments)})"
+    if len("    " + line + ",") <= _MAX_LINE_LENGTH:
+        return line
+    return "\n".join([f"{name}(", *(f"        {argument}," for argument in arguments), "    )"])
 
 
 def _wrapped(kinds: list[str]) -> str:
