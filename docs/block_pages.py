@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import inspect
+import math
 import re
 from collections.abc import Iterable, Iterator
+from typing import cast
 
 from light_pictures import simplified
 
@@ -24,6 +26,7 @@ from armblocks.diagram import (
 from armblocks.drawing import block_picture, diagram_picture
 from armblocks.face.block_examples import caption, example_block
 from armblocks.formats import diagram_to_bytes, diagram_to_python, load_robot
+from armblocks.pictures.picture import Picture
 from armblocks.pictures.style import theme_variables
 from armblocks.pictures.svg import page_rules, svg_inline
 from armblocks.report.figures import Figure, motion_figures, view_figures
@@ -31,6 +34,10 @@ from armblocks.report.motion import motions
 
 FIGURE_WIDTH = 736.0
 """Width of the theme's text column, px. Figures of this width have their nominal font size."""
+
+
+MIN_SCALE = 0.6
+"""Smallest scale of the drawing of a diagram, so that its names remain legible."""
 
 
 def block_pages() -> Iterator[tuple[str, str]]:
@@ -154,7 +161,7 @@ def port_table(block: Block) -> list[str]:
         ("recorded", block.record_ports()),
     )
     rows = [
-        (f"`{port.name}`", side, shape_text(port), port.unit, prose(port.doc))
+        (f"`{port.name}`", side, shape_text(port), unit_text(port.unit), prose(port.doc))
         for side, ports in sides
         for port in ports
     ]
@@ -176,7 +183,7 @@ def parameter_table(kind: type[Block]) -> list[str]:
         (
             f"`{rule.name}`",
             prose(allowed(rule)),
-            rule.unit,
+            unit_text(rule.unit),
             default_text(rule),
             "yes" if rule.tunable else "",
             prose(rule.doc),
@@ -201,8 +208,15 @@ def allowed(rule: Parameter) -> str:
             for n in rule.dimensions
         )
         words = ", ".join([shapes, *words.split(", ")[1:]])
+    words = words.removeprefix("a ").removeprefix("an ")
     infinite = not rule.finite and rule.kind in (ParameterKind.NUMBER, ParameterKind.ARRAY)
-    return f"{words}, may be infinite" if infinite else words.removeprefix("a ").removeprefix("an ")
+    words = f"{words}, may be infinite" if infinite else words
+    return re.sub("([<>]=?) ", "\\1\N{NO-BREAK SPACE}", words)  # no line break between sign and number
+
+
+def unit_text(unit: str) -> str:
+    """A unit as printed: ``rad/s2`` as rad/s², without line breaks."""
+    return unit.replace("2", "²").replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def default_text(rule: Parameter) -> str:
@@ -216,7 +230,18 @@ def default_text(rule: Parameter) -> str:
         return f"a diagram of {' and '.join(f'`{name}`' for name in rule.default.blocks)}"
     if callable(rule.default):
         return f"`{getattr(rule.default, '__name__', repr(rule.default))}`"
-    return f"`{rule.default!r}`"
+    return f"`{literal(rule.default)}`"
+
+
+def literal(value: object) -> str:
+    """A default as Python code: arrays as lists, and fractions of pi by name."""
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(literal, cast('tuple[object, ...]', value)))}]"
+    if isinstance(value, float) and len(repr(value)) > 8:
+        for divisor in (1, 2, 4):
+            if abs(value) == math.pi / divisor:
+                return ("-" if value < 0 else "") + ("pi" if divisor == 1 else f"pi/{divisor}")
+    return repr(value)
 
 
 def behaviour(diagram: Diagram) -> list[str]:
@@ -230,7 +255,7 @@ def behaviour(diagram: Diagram) -> list[str]:
         *(("discrete state", state) for state in block.discrete_states(shapes)),
         *(("mode", state) for state in block.modes(shapes)),
     ]
-    rows = [(f"`{state.name}`", role, state.unit, prose(state.doc)) for role, state in states]
+    rows = [(f"`{state.name}`", role, unit_text(state.unit), prose(state.doc)) for role, state in states]
     rows += [
         (f"`{guard.name}`", f"event {DIRECTIONS[guard.direction]}", "", prose(guard.doc))
         for guard in block.guards(shapes)
@@ -264,9 +289,7 @@ def worked_example(kind: type[Block], diagram: Diagram) -> list[str]:
     drawing = diagram_picture(diagram, result)
     lines = ["## Example", "", prose(caption(kind)), ""]
     lines += [figure_html(figure) for figure in figures]
-    size = f' style="width:{drawing.width:.0f}px"'
-    drawing_html = svg_inline(drawing, "diagram").replace("<svg ", f"<svg{size} ", 1)
-    lines += [f'<figure class="drawing">{drawing_html}</figure>', ""]
+    lines += [drawing_html(drawing, "diagram"), ""]
     lines += ["```python", diagram_to_python(diagram).rstrip(), "```", ""]
     data = diagram_to_bytes(diagram, load_robot).decode()
     lines += [
@@ -280,6 +303,16 @@ def worked_example(kind: type[Block], diagram: Diagram) -> list[str]:
         "",
     ]
     return lines
+
+
+def drawing_html(drawing: Picture, name: str) -> str:
+    """HTML of the drawing of a diagram; ``name`` is unique on the page.
+
+    A drawing that is wider than the page is reduced to at most ``MIN_SCALE``; beyond it, the drawing scrolls.
+    """
+    size = f' style="width:{drawing.width:.0f}px;min-width:{MIN_SCALE * drawing.width:.0f}px"'
+    svg = svg_inline(drawing, name).replace("<svg ", f"<svg{size} ", 1)
+    return f'<figure class="drawing">{svg}</figure>'
 
 
 def figure_html(figure: Figure) -> str:
@@ -304,7 +337,11 @@ def style_sheet() -> str:
 RULES = """
 article figure{margin:1.2rem 0}article figure svg,.symbol svg{display:block;max-width:100%;height:auto}
 article figure.wide svg{width:100%}article figure.narrow svg{max-width:400px;width:100%}
+article figure.drawing{overflow-x:auto}
+article h1{font-size:2.1em}article .highlight pre{font-size:.79rem}
 article table.docutils{margin-left:0}
+article table.docutils:has(th:nth-child(5)){font-size:.875rem}
+article table.docutils:has(th:nth-child(5)) td:last-child{min-width:9rem}
 .symbol.alone{float:right;margin:0 0 1rem 1.5rem}
 .block-list{display:grid;grid-template-columns:repeat(auto-fill,minmax(320px,1fr));gap:.4rem 1.6rem}
 .block-entry{display:grid;grid-template-columns:112px 1fr;gap:.8rem;align-items:center}

@@ -7,15 +7,15 @@ import re
 import warnings
 from pathlib import Path
 
-from block_pages import block_pages, prose, style_sheet
+from block_pages import block_pages, drawing_html, prose, style_sheet
 from function_tables import function_tables
 from reference_signatures import arm_page
 from robot_pages import robots_page
+from tutorial_figure import controller_figure
 
 import armblocks as ab
 from armblocks.drawing import diagram_picture
 from armblocks.integration.butcher_tableau import ButcherTableau
-from armblocks.pictures.svg import svg_inline
 from armblocks.simulation.tableaux import TABLEAUX
 
 
@@ -31,6 +31,7 @@ def write_generated_pages(folder: Path) -> None:
         "function-tables.txt": function_tables(),
         "arm.txt": arm_page(),
         "public-names.txt": public_names(),
+        "controller-figure.txt": controller_figure(),
         "static/pictures.css": style_sheet(),
         **dict(block_pages()),
     }
@@ -57,9 +58,7 @@ def examples_page() -> str:
         warnings.simplefilter("ignore", ab.errors.InertiaWarning)
         for name in ab.list_examples():
             diagram = ab.load_diagram(name)
-            drawing = diagram_picture(diagram)
-            size = f' style="width:{drawing.width:.0f}px"'
-            svg = svg_inline(drawing, f"example-{name}").replace("<svg ", f"<svg{size} ", 1)
+            drawing = drawing_html(diagram_picture(diagram), f"example-{name}")
             kinds = sorted({block.type_name() for block in diagram.blocks.values()})
             links = ", ".join(f"[{kind}](blocks/{kind}.md)" for kind in kinds)
             description = diagram.description[:1].upper() + diagram.description[1:]
@@ -69,7 +68,7 @@ def examples_page() -> str:
                 f"{prose(description)}. The run ends at {diagram.settings.stop_time:g} s.",
                 "",
             ]
-            lines += [f'<figure class="drawing">{svg}</figure>', "", f"Blocks: {links}.", ""]
+            lines += [drawing, "", f"Blocks: {links}.", ""]
     return "\n".join(lines) + "\n"
 
 
@@ -90,13 +89,18 @@ def _first_sentence(value: object) -> str:
 
 
 def solver_table() -> str:
-    """Markdown table of all solvers."""
-    headings = ("name", "other names", "order", "step", "kind", "method", "source")
+    """Markdown table of all solvers, followed by the list of their sources."""
+    headings = ("name", "other names", "order", "step", "kind", "method")
     lines = ["| " + " | ".join(headings) + " |", "|---" * len(headings) + "|"]
     for tableau in TABLEAUX:
         aliases = ", ".join(f"`{alias}`" for alias in tableau.aliases)
         step = "adaptive" if tableau.adaptive else "fixed"
         kind = "explicit" if isinstance(tableau, ButcherTableau) else "for stiff systems"
-        cells = (f"`{tableau.name}`", aliases, str(tableau.order), step, kind, tableau.title, tableau.source)
+        cells = (f"`{tableau.name}`", aliases, str(tableau.order), step, kind, tableau.title)
         lines.append("| " + " | ".join(cells) + " |")
+    names: dict[str, list[str]] = {}
+    for tableau in TABLEAUX:
+        names.setdefault(tableau.source, []).append(f"`{tableau.name}`")
+    lines += ["", "Sources of the methods:", ""]
+    lines += [f"- {', '.join(solvers)}: {source}." for source, solvers in names.items()]
     return "\n".join(lines) + "\n"

@@ -11,7 +11,7 @@ from block_pages import prose, table
 import armblocks as ab
 from armblocks.pictures.svg import svg_inline
 from armblocks.rendering import arm_picture
-from armblocks.robot.dh_table import dh_table
+from armblocks.robot import Robot
 
 POSES = {
     "kr180": (0.5, 0.2, 0.3, 0.0),
@@ -41,6 +41,27 @@ def robots_page() -> str:
     return "\n".join(lines)
 
 
+def _dh_table(robot: Robot) -> Iterator[str]:
+    """The D-H table with its convention; nothing for a robot with a link that has no D-H row."""
+    rows = [(link.name, link.dh) for link in robot.moving_links if link.dh is not None]
+    if len(rows) < len(robot.links):
+        return
+    conventions = " and ".join(dict.fromkeys(row.convention.value for _, row in rows))
+    yield from (f"D-H table ({conventions}); `q` is the joint coordinate:", "")
+    cells = [
+        (
+            f"`{name}`",
+            f"{row.theta:.4g}" if row.sigma else "`q`",
+            "`q`" if row.sigma else f"{row.d:.4g}",
+            f"{row.a:.4g}",
+            f"{row.alpha * 180 / np.pi:g}°",
+            f"{row.offset:.4g}",
+        )
+        for name, row in rows
+    ]
+    yield from table(("joint", "theta, rad", "d, m", "a, m", "alpha", "offset"), cells)
+
+
 def _robot(name: str) -> Iterator[str]:
     arm = ab.load_robot(name)
     robot = arm.robot
@@ -51,8 +72,7 @@ def _robot(name: str) -> Iterator[str]:
     yield from (f"## {name}", "", f'<figure class="narrow">{picture}</figure>', "")
     joints = f"{robot.n} joints: {robot.joint_letters} (R revolute, P prismatic)"
     yield from (f"{title}. {joints}.", "")
-    if lines := dh_table(robot):
-        yield from ("```text", *lines, "```", "")
+    yield from _dh_table(robot)
     unit_symbols = {"rad": "°", "m": " m"}
     rows: list[tuple[str, ...]] = []
     for k, (joint, unit) in enumerate(zip(robot.joint_names, robot.joint_units)):
