@@ -120,4 +120,4 @@ def test_pictures_of_the_studio_are_shown_in_both_themes() -> None:
         source = [page.read_text(encoding="utf-8")]
         namespace["show_by_theme"](None, page.stem, source)
         assert "<picture>" not in source[0]
-        assert source[0].count("{.only-light}") == source[0].count("{.only-dark}")
+        assert source[0].count("only-light") == source[0].count("only-dark")
