@@ -4,7 +4,7 @@
 
     ArmblocksError(ValueError)
     ├── InputError            a call was given a wrong shape, dtype, value or option
-    ├── UnknownNameError      a name that is not in a list of known names; suggests the nearest
+    ├── UnknownNameError      an unknown name; suggests the nearest known names
     ├── RobotError            a robot description that contradicts itself
     ├── DiagramError          a diagram that cannot be built
     │   └── AlgebraicLoopError
@@ -16,8 +16,6 @@
     ArmblocksWarning(UserWarning)
     ├── InertiaWarning        an inertia that no body can have
     └── LimitWarning          a joint beyond its range or speed
-
-A message has four parts: *what* was found, *where*, what was *allowed*, and what to do (*fix*).
 """
 
 from __future__ import annotations
