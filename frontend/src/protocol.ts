@@ -66,10 +66,10 @@ export interface AskMask {
   block?: string;
 }
 /**
- * Show a document again: after a reload, after a lost connection, or in a second page.
+ * Show a document again: after a reload, after a lost connection, or in a second client.
  *
  * A server that was restarted and does not have the document open recovers it from its journal, or else
- * opens the file ``path`` or the shipped ``origin``, under the same key. Edits that the page sends again
+ * opens the file ``path`` or the shipped ``origin``, under the same key. Edits that the client sends again
  * then find their document. ``inside`` is the path of the displayed sheet of a diagram.
  */
 export interface Attach {
@@ -521,9 +521,9 @@ export interface SetSettings {
   };
 }
 /**
- * Close a document on this page; ``discard`` is required if it has unsaved edits.
+ * Close a document on this client; ``discard`` is required if it has unsaved edits.
  *
- * A document that another page shows stays open there, with its edits; the reply is then ``False``.
+ * A document that another client shows stays open there, with its edits; the reply is then ``False``.
  */
 export interface Close {
   kind: "close";
@@ -833,7 +833,7 @@ export interface StoreFile {
   replace?: boolean;
 }
 /**
- * Trust a Python file with the content that the page has shown, or withdraw the trust.
+ * Trust a Python file with the content that the client has shown, or withdraw the trust.
  *
  * The request is refused if the content of the file no longer has this ``digest``.
  */
@@ -1128,9 +1128,9 @@ export interface Recovery {
   missing: string;
 }
 /**
- * A complete document, for a page that shows it from now on.
+ * A complete document, for a client that shows it from now on.
  *
- * ``notes``: warnings issued while its file was read. ``in_front``: whether the page brings it to the front.
+ * ``notes``: warnings issued while its file was read. ``in_front``: whether it is brought to the front.
  */
 export interface Opened {
   kind: "opened";

@@ -16,8 +16,8 @@ import pytest
 from armblocks.diagram import Diagram
 from armblocks.formats import diagram_to_bytes, load_robot, write_robot
 from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.protocol.clients import StudioClient
 from armblocks.studio.protocol.message import Request, messages_of
-from armblocks.studio.protocol.page import Page
 from armblocks.studio.server.hub import Hub
 
 NESTED = "…nested…"
@@ -238,8 +238,8 @@ def test_every_kind_of_message_answers_hostile_values_with_an_error(folder: Path
 
     async def main() -> None:
         hub = Hub(ProjectFolder(folder))
-        page = Page(receive, receive_bytes)
-        await hub.welcome(page)
+        client = StudioClient(receive, receive_bytes)
+        await hub.welcome(client)
         number = 0
 
         async def send(request: dict[str, Any]) -> dict[str, Any]:
@@ -247,7 +247,7 @@ def test_every_kind_of_message_answers_hostile_values_with_an_error(folder: Path
             number += 1
             text = json.dumps({"number": number, "request": request})
             text = text.replace(json.dumps(NESTED), "[" * 2000 + "]" * 2000)
-            await hub.answer(page, text)
+            await hub.answer(client, text)
             assert events[-1]["number"] == number
             return events[-1]
 

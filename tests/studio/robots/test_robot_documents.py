@@ -1,4 +1,4 @@
-"""Robots as documents: open, drop, edit, save, read-outs, and the notifications of all pages."""
+"""Robots as documents: open, drop, edit, save, read-outs, and the notifications of all clients."""
 
 from __future__ import annotations
 
@@ -20,33 +20,33 @@ from armblocks.formats import DocumentKind, kind_of_data, load_robot, read_robot
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol.messages.documents import MAX_DROPPED_BYTES
 from armblocks.studio.robots.readings import readings, singularity
-from armblocks.studio.server.hub import Hub, Page
+from armblocks.studio.server.hub import Hub, StudioClient
 
 PRINTED = Path(__file__).parents[2] / "formats" / "kr180_as_printed.m"
 
 
 class Client:
-    """A hub and a connected page."""
+    """A hub and a connected client."""
 
     def __init__(self, folder: Path) -> None:
         self.received: list[dict[str, Any]] = []
         self.hub = Hub(ProjectFolder(folder))
-        self.page = self.new_page(self.received)
+        self.connection = self.new_client(self.received)
         self._number = 0
 
-    def new_page(self, received: list[dict[str, Any]]) -> Page:
+    def new_client(self, received: list[dict[str, Any]]) -> StudioClient:
         async def receive(text: str) -> None:
             received.append(json.loads(text))
 
         async def receive_bytes(data: bytes) -> None:
             raise AssertionError("samples arrived without a run")
 
-        return Page(receive, receive_bytes)
+        return StudioClient(receive, receive_bytes)
 
     async def reply(self, kind: str, **values: Any) -> dict[str, Any]:
         self._number += 1
         request = {"number": self._number, "request": {"kind": kind, **values}}
-        await self.hub.answer(self.page, json.dumps(request))
+        await self.hub.answer(self.connection, json.dumps(request))
         return next(e for e in self.received if e["kind"] == "reply" and e["number"] == self._number)
 
     async def ask(self, kind: str, **values: Any) -> Any:
@@ -60,7 +60,7 @@ class Client:
         return f"{fault['where']}: {fault['what']}"
 
     def shown(self) -> dict[str, Any]:
-        """The content and state that the page shows of a robot."""
+        """The content and state that the client shows of a robot."""
         events = [event for event in self.received if event.get("state", {}).get("kind") == "robot"]
         contents = [event.get("content") or (event.get("change") or {}).get("content") for event in events]
         return {**next(content for content in reversed(contents) if content), **events[-1]["state"]}
@@ -69,7 +69,7 @@ class Client:
 def run_scenario(folder: Path, scenario: Callable[[Client], Awaitable[None]]) -> None:
     async def main() -> None:
         client = Client(folder)
-        await client.hub.welcome(client.page)
+        await client.hub.welcome(client.connection)
         await scenario(client)
         client.hub.close()
 
@@ -202,7 +202,7 @@ def test_two_pages_show_each_other_s_edits(tmp_path: Path) -> None:
         key = await client.ask("open_shipped", document_kind="robot", name="puma560")
         assert client.shown()["origin"] == "puma560"
         other_received: list[dict[str, Any]] = []
-        other = client.new_page(other_received)
+        other = client.new_client(other_received)
         await client.hub.welcome(other)
         request = {"number": 1, "request": {"kind": "attach", "document_kind": "robot", "document": key}}
         await client.hub.answer(other, json.dumps(request))
@@ -217,9 +217,9 @@ def test_two_pages_show_each_other_s_edits(tmp_path: Path) -> None:
         assert other_received[-1]["state"]["version"] == 8
         arm = ab.Arm(client.hub.documents[key].document.value)
         assert_allclose(pose, arm.link_poses([0.0] * 6), atol=1e-14)
-        client.hub.remove_page(other)
+        client.hub.remove_client(other)
         late: list[dict[str, Any]] = []
-        await client.hub.welcome(client.new_page(late))
+        await client.hub.welcome(client.new_client(late))
         assert [(state["document"], state["version"]) for state in late[0]["documents"]] == [(key, 8)]
         await client.ask("undo", document=key)
         assert other_received[-1]["state"]["version"] == 8

@@ -18,7 +18,7 @@ import pytest
 
 from armblocks.errors import SimulationError
 from armblocks.studio.documents.project_folder import ProjectFolder
-from armblocks.studio.protocol.page import Page
+from armblocks.studio.protocol.clients import StudioClient
 from armblocks.studio.runs import process as run_process
 from armblocks.studio.runs import report as run_report
 from armblocks.studio.runs import worker as run_worker
@@ -32,13 +32,13 @@ TIMEOUT_SECONDS = 60.0
 
 
 class Client:
-    """A page that runs models and collects the messages of the runs."""
+    """A client that runs models and collects the messages of the runs."""
 
     def __init__(self, folder: Path) -> None:
         self.hub = Hub(ProjectFolder(folder))
         self.events: list[dict[str, Any]] = []
         self.received = asyncio.Event()
-        self.page = Page(self._receive, self._receive_frame)
+        self.connection = StudioClient(self._receive, self._receive_frame)
         self._number = 0
 
     async def _receive(self, text: str) -> None:
@@ -51,7 +51,7 @@ class Client:
     async def ask(self, kind: str, **values: Any) -> Any:
         self._number += 1
         await self.hub.answer(
-            self.page, json.dumps({"number": self._number, "request": {"kind": kind, **values}})
+            self.connection, json.dumps({"number": self._number, "request": {"kind": kind, **values}})
         )
         reply = next(e for e in reversed(self.events) if e["kind"] == "reply")
         assert reply["fault"] is None, reply["fault"]
@@ -76,7 +76,7 @@ class Client:
 def run_scenario(folder: Path, scenario: Callable[[Client], Awaitable[None]]) -> None:
     async def main() -> None:
         client = Client(folder)
-        await client.hub.welcome(client.page)
+        await client.hub.welcome(client.connection)
         try:
             await scenario(client)
         finally:
@@ -243,13 +243,13 @@ def test_a_killed_worker_is_reported_and_its_samples_remain(tmp_path: Path) -> N
         async def receive(text: str | bytes) -> None:
             late.append(text)
 
-        other = Page(receive, receive)
+        other = StudioClient(receive, receive)
         await client.hub.welcome(other)
         request = {"kind": "attach", "document": document, "document_kind": "diagram"}
         attach = {"number": 1, "request": request}
         await client.hub.answer(other, json.dumps(attach))
         assert any(isinstance(text, bytes) for text in late), (
-            "a page that connects later receives the samples"
+            "a client that connects later receives the samples"
         )
 
     run_scenario(tmp_path, scenario)

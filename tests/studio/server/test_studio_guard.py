@@ -13,7 +13,7 @@ import pytest
 from starlette.routing import Mount, Route, WebSocketRoute
 
 from armblocks.studio.documents.project_folder import ProjectFolder
-from armblocks.studio.protocol.page import Page
+from armblocks.studio.protocol.clients import StudioClient
 from armblocks.studio.server.guard import Guard, Keys
 from armblocks.studio.server.web_app import FutureHub, studio_app
 
@@ -164,8 +164,8 @@ def test_hostile_parameters_cause_no_server_error_and_reveal_no_file(
         events.append(json.loads(text))
 
     async def opened() -> str:
-        hub, page = await future_hub.ready(), Page(receive, receive)
-        await hub.answer(page, '{"number": 1, "request": {"kind": "new", "document_kind": "diagram"}}')
+        hub, client = await future_hub.ready(), StudioClient(receive, receive)
+        await hub.answer(client, '{"number": 1, "request": {"kind": "new", "document_kind": "diagram"}}')
         return events[-1]["value"]
 
     document = asyncio.run(opened())

@@ -1,4 +1,4 @@
-"""Documents, files and pages: saving, errors, notifications."""
+"""Documents, files and clients: saving, errors, notifications."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from page_requests import Events, run_scenario
+from client_requests import Events, run_scenario
 
 from armblocks.blocks import BLOCKS
 from armblocks.errors import ArmblocksError, FormatError, InputError
 from armblocks.formats import load_diagram
 from armblocks.studio.built_page import built_page
-from armblocks.studio.protocol.page import Page
+from armblocks.studio.protocol.clients import StudioClient
 from armblocks.studio.runs import worker as run_worker
 from armblocks.studio.server.hub import Hub
 from armblocks.studio.server.launch import serve
@@ -109,7 +109,7 @@ def test_a_group_needs_blocks_and_a_free_name(tmp_path: Path) -> None:
         with pytest.raises(ArmblocksError, match="there is no subsystem named 'error'"):
             await ask("show_sheet", document=key, inside=["error"])
         await ask("undo", document=key)
-        await ask("undo", document=key)  # the subsystem is removed, so the page shows the top sheet
+        await ask("undo", document=key)  # the subsystem is removed, so the client shows the top sheet
 
     events = run_scenario(tmp_path, scenario)
     opened = [event for event in events if event["kind"] == "opened"]
@@ -175,7 +175,7 @@ def test_a_document_is_closed_only_on_the_page_that_closes_it(tmp_path: Path) ->
         async def receive(text: str) -> None:
             received.append(json.loads(text))
 
-        other = Page(receive, receive)  # type: ignore[arg-type]
+        other = StudioClient(receive, receive)  # type: ignore[arg-type]
         await hub.welcome(other)
         attach = {"kind": "attach", "document": key, "document_kind": "diagram"}
         await hub.answer(other, json.dumps({"number": 1, "request": attach}))
@@ -199,7 +199,7 @@ def test_pages_that_do_not_show_a_document_are_notified_of_unsaved_changes(tmp_p
         async def receive(text: str) -> None:
             received.append(json.loads(text))
 
-        await hub.welcome(Page(receive, receive))  # type: ignore[arg-type]
+        await hub.welcome(StudioClient(receive, receive))  # type: ignore[arg-type]
         key = await ask("new", document_kind="diagram")
         await ask("change", document=key, key="1", edit={"kind": "add", "blocks": [GAIN]})
         assert [state["dirty"] for state in received[-1]["documents"]] == [True]

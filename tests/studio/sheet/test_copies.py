@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from page_requests import Events, run_scenario
+from client_requests import Events, run_scenario
 
 import armblocks as ab
 from armblocks.blocks import BLOCKS, Gain

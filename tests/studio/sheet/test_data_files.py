@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from page_requests import Events, run_scenario
+from client_requests import Events, run_scenario
 
 from armblocks.errors import ArmblocksError
 from armblocks.studio.server.hub import Hub

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from client_requests import Events, run_scenario
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from page_requests import Events, run_scenario
 
 import armblocks as ab
 from armblocks.blocks import BLOCKS, Constant, Gain, Scope

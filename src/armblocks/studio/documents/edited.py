@@ -1,4 +1,4 @@
-"""An edited value with undo and redo history, and the author page of each version."""
+"""An edited value with undo and redo history, and the client that made each version."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MAX_VERSIONS = 1000
 
 @dataclass(frozen=True)
 class Version(Generic[Value]):
-    """A former value, its version number, and the page that made it."""
+    """A former value, its version number, and the client that made it."""
 
     number: int
     author: str
@@ -36,7 +36,7 @@ class Outcome(NamedTuple, Generic[Value]):
 
 
 class Edited(History[Value], ABC):
-    """A value that several pages may edit; see :class:`~armblocks.studio.documents.history.History`."""
+    """A value that several clients may edit; see :class:`~armblocks.studio.documents.history.History`."""
 
     kind: ClassVar[DocumentKind]
     edits: ClassVar[type[Edit]]
@@ -48,10 +48,10 @@ class Edited(History[Value], ABC):
         self._versions = deque([Version(version, "", value)], maxlen=MAX_VERSIONS)
 
     def perform(self, request: Alteration) -> None:
-        """Apply the request of a page.
+        """Apply the request of a client.
 
         Raises the errors of the edit itself. Raises ``InputError`` if there is nothing to undo or redo, or if
-        another page has changed the same aspects since the version ``request.base``. The value is then
+        another client has changed the same aspects since the version ``request.base``. The value is then
         unchanged.
         """
         others = self._changed_by_others(request)
@@ -94,7 +94,7 @@ class Edited(History[Value], ABC):
             )
 
     def _changed_by_others(self, request: Alteration) -> set[Aspect]:
-        """The aspects that other pages have changed since the version on which the request is based."""
+        """The aspects that other clients have changed since the version on which the request is based."""
         if request.base is None or request.base == self.version:
             return set()
         if not self._versions[0].number <= request.base <= self.version:

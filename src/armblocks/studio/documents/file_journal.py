@@ -8,7 +8,7 @@ Each record is a JSON object; ``version`` is the version after it, ``at`` the ti
     The complete canonical document of a version, written before the first edit and every
     :data:`SNAPSHOT_EVERY` edits. Serialisation runs in a thread, so some later edits may precede the record.
 ``perform``
-    A request of a page that was applied, unchanged; ``continued`` where it extended the previous undo step.
+    A request of a client that was applied, unchanged; ``continued`` where it extended the previous undo step.
 ``replace``
     A new value that replaced the document as one undo step.
 ``saved``

@@ -28,8 +28,8 @@ class History(Generic[Value]):
 
     Values share their unchanged parts, so the history needs little memory.
 
-    ``version`` increases with every change, undo and redo included, and is never reused: two pages that show
-    the same version show the same value. ``saved`` is the value in the file, or ``None`` if no file
+    ``version`` increases with every change, undo and redo included, and is never reused: two clients that
+    show the same version show the same value. ``saved`` is the value in the file, or ``None`` if no file
     contains one of these values. ``continued`` is true if the last replacement extended the previous step.
     """
 

@@ -55,7 +55,7 @@ class OpenFile(Generic[EditedT]):
     saving: asyncio.Lock = dataclasses.field(default_factory=asyncio.Lock)
 
     def state(self) -> document_messages.DocumentState:
-        """The state of the document as pages show it."""
+        """The state of the document as clients show it."""
         document = self.document
         return document_messages.DocumentState(
             document=self.key,
@@ -90,7 +90,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         self.kind = kind
         self._open: dict[str, OpenedT] = {}
         self._renamed_keys: dict[str, str] = {}
-        """Keys that pages of an earlier server use for documents that are now open under another key."""
+        """Keys that clients of an earlier server use for documents that are now open under another key."""
         self.recoverable = RecoverableFiles(folder, state_folder.journals, kind)
         self._notify: Callable[[OpenedT], Awaitable[None]] | None = None
 
@@ -137,7 +137,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         return self.add(self.kind.new(), key=key)
 
     def attach(self, key: str, path: str | None = None, origin: str = "") -> OpenedT:
-        """Reopen a document for a page; see :class:`~armblocks.studio.protocol.messages.documents.Attach`."""
+        """Reopen a document for a client: :class:`~armblocks.studio.protocol.messages.documents.Attach`."""
         with contextlib.suppress(UnknownNameError):
             return self[key]
         if key in self.recoverable:
@@ -343,7 +343,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
     ) -> None:
         """Write to the journal; a new journal starts with a snapshot of the value before the change.
 
-        A disk error does not prevent edits: pages are notified, and the next change tries again.
+        A disk error does not prevent edits: clients are notified, and the next change tries again.
         """
         try:
             if open_file.journal is None:

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 from typing import Any, Generic
 
 from armblocks.studio.documents.open_files import OpenedT, OpenFiles
+from armblocks.studio.protocol.clients import StudioClient
 from armblocks.studio.protocol.messages.documents import Content, ContentChange
-from armblocks.studio.protocol.page import Page
 
 Place = tuple[str, ...]
-"""The part of a document that a page shows: the path of the sheet of a diagram; always ``()`` for a robot."""
+"""The part of a document that a client shows: the path of the sheet of a diagram, ``()`` for a robot."""
 
 
 @dataclass(frozen=True)
@@ -42,22 +42,22 @@ class Presenter(ABC, Generic[OpenedT]):
         """Open the documents of a file from outside the project."""
 
     def place(self, open_file: OpenedT, requested: Place, *, known: bool) -> Place:
-        """Return the part to show on a page; ``known``: the page shows the document already."""
+        """Return the part to show in a client; ``known``: the client shows the document already."""
         return ()
 
     @abstractmethod
     def content(self, open_file: OpenedT, place: Place) -> Content:
-        """Return the data of a document that a page displays."""
+        """Return the data of a document that a client displays."""
 
     @abstractmethod
     def change(self, open_file: OpenedT, before: Any, place: Place) -> ContentChange:
         """The difference to ``before``; raises ``UnknownNameError`` if the part was added or removed."""
 
-    def on_shown(self, page: Page, open_file: OpenedT, *, known: bool) -> None:
-        """Called after a page was sent a document; ``known``: the page showed the document before."""
+    def on_shown(self, client: StudioClient, open_file: OpenedT, *, known: bool) -> None:
+        """Called after a client was sent a document; ``known``: the client showed the document before."""
 
     def on_changed(self, open_file: OpenedT) -> None:
-        """Called after a document changed and its pages were notified."""
+        """Called after a document changed and its clients were notified."""
 
     async def on_saved(self, open_file: OpenedT) -> None:
         """Called after the file of a document was written."""

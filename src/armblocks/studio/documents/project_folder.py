@@ -192,7 +192,7 @@ class ProjectFolder:
                 yield (Path(folder) / name).relative_to(self.root).as_posix()
 
     def robot_path(self, name: str, shipped: tuple[str, ...]) -> str:
-        """Return the argument of ``load_robot`` for a robot named by a page; raise an error for other
+        """Return the argument of ``load_robot`` for a robot named by a client; raise an error for other
         files."""
         if name in shipped:
             return name

@@ -22,7 +22,7 @@ class RecoverableFiles:
         self._kind = kind
         self._read: dict[str, JournaledFile[Any]] = {}
         self._unread: dict[str, Path] = {}
-        """Journals that could not be read, by the key under which pages refer to them."""
+        """Journals that could not be read, by the key under which clients refer to them."""
         for path in sorted(journals.glob(f"*.{kind.name}")):
             if in_use(path):  # another running server uses it
                 continue
@@ -36,7 +36,7 @@ class RecoverableFiles:
         return key in self._read or key in self._unread
 
     def descriptions(self) -> list[document_messages.Recovery]:
-        """Descriptions of the unsaved documents, for pages."""
+        """Descriptions of the unsaved documents, for clients."""
         descriptions = [self._offer(entry) for entry in self._read.values() if entry.document.dirty]
         return [*descriptions, *(self._unread_offer(key, path) for key, path in self._unread.items())]
 
@@ -88,7 +88,7 @@ class RecoverableFiles:
         )
 
     def _unread_offer(self, key: str, path: Path) -> document_messages.Recovery:
-        """Description of a journal that cannot be read, for pages."""
+        """Description of a journal that cannot be read, for clients."""
         last = path.stat().st_mtime if path.exists() else 0.0
         return document_messages.Recovery(
             kind=self._kind.name,

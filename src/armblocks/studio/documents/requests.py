@@ -1,4 +1,4 @@
-"""The open documents of both kinds: handlers of requests, and notifications to pages."""
+"""The open documents of both kinds: handlers of requests, and notifications to clients."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from armblocks.studio.documents.open_files import OpenFile
 from armblocks.studio.documents.presenter import Opening, Place, Presenter
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol.answers import Answers
+from armblocks.studio.protocol.clients import Clients, StudioClient
 from armblocks.studio.protocol.messages import documents as document_messages
-from armblocks.studio.protocol.page import Page, Pages
 
 
 class DocumentRequests:
-    """Handles the requests about documents and notifies all pages that show a changed document."""
+    """Handles the requests about documents and notifies all clients that show a changed document."""
 
     def __init__(
         self,
         folder: ProjectFolder,
-        pages: Pages,
+        clients: Clients,
         presenters: Mapping[document_messages.DocumentKind, Presenter[Any]],
     ) -> None:
         self._folder = folder
-        self._pages = pages
+        self._clients = clients
         self._presenters = presenters
 
     def register(self, answers: Answers) -> None:
@@ -84,22 +84,22 @@ class DocumentRequests:
 
     async def show(
         self,
-        page: Page,
+        client: StudioClient,
         open_file: OpenFile[Any],
         place: Place = (),
         notes: Sequence[str] = (),
         *,
         in_front: bool = True,
     ) -> str:
-        """Show a document on a page; return its key."""
-        presenter, known = self._presenters[open_file.document.kind], open_file.key in page.shows
-        page.shows[open_file.key] = place = presenter.place(open_file, place, known=known)
+        """Show a document in a client; return the key of the document."""
+        presenter, known = self._presenters[open_file.document.kind], open_file.key in client.shows
+        client.shows[open_file.key] = place = presenter.place(open_file, place, known=known)
         content = presenter.content(open_file, place)
         event = document_messages.Opened(
             state=open_file.state(), content=content, notes=list(notes), in_front=in_front
         )
-        await page.notify(event)
-        presenter.on_shown(page, open_file, known=known)
+        await client.notify(event)
+        presenter.on_shown(client, open_file, known=known)
         await self.notify_list()
         return open_file.key
 
@@ -111,29 +111,31 @@ class DocumentRequests:
 
     # -- opening ---------------------------------------------------------------------------------------------
 
-    async def _open(self, page: Page, request: document_messages.Open) -> list[str]:
-        return await self._show_all(page, self._presenter_of_file(request.path).open_file(request.path))
+    async def _open(self, client: StudioClient, request: document_messages.Open) -> list[str]:
+        return await self._show_all(client, self._presenter_of_file(request.path).open_file(request.path))
 
-    async def _open_shipped(self, page: Page, request: document_messages.OpenShipped) -> str:
-        return await self.show(page, self._presenters[request.document_kind].files.open_shipped(request.name))
+    async def _open_shipped(self, client: StudioClient, request: document_messages.OpenShipped) -> str:
+        return await self.show(
+            client, self._presenters[request.document_kind].files.open_shipped(request.name)
+        )
 
-    async def _new(self, page: Page, request: document_messages.New) -> str:
-        return await self.show(page, self._presenters[request.document_kind].files.new())
+    async def _new(self, client: StudioClient, request: document_messages.New) -> str:
+        return await self.show(client, self._presenters[request.document_kind].files.new())
 
-    async def _attach(self, page: Page, request: document_messages.Attach) -> str:
+    async def _attach(self, client: StudioClient, request: document_messages.Attach) -> str:
         files = self._presenters[request.document_kind].files
         open_file = files.attach(request.document, request.path, request.origin)
-        return await self.show(page, open_file, tuple(request.inside), in_front=request.in_front)
+        return await self.show(client, open_file, tuple(request.inside), in_front=request.in_front)
 
-    async def _drop(self, page: Page, request: document_messages.Drop) -> list[str]:
+    async def _drop(self, client: StudioClient, request: document_messages.Drop) -> list[str]:
         data = _dropped_data(request)
         is_robot = formats.kind_of_data(data, request.name) is formats.DocumentKind.ROBOT
         presenter = self._presenters["robot" if is_robot else "diagram"]
-        return await self._show_all(page, presenter.dropped(data, request.name))
+        return await self._show_all(client, presenter.dropped(data, request.name))
 
-    async def _show_all(self, page: Page, opening: Opening[Any]) -> list[str]:
-        """Show the first document of a file on the page; the others appear in its list of documents."""
-        await self.show(page, opening.opened[0], notes=opening.notes)
+    async def _show_all(self, client: StudioClient, opening: Opening[Any]) -> list[str]:
+        """Show the first document of a file in the client; its list of documents has the others."""
+        await self.show(client, opening.opened[0], notes=opening.notes)
         return [open_file.key for open_file in opening.opened]
 
     def _presenter_of_file(self, path: str) -> Presenter[Any]:
@@ -144,7 +146,7 @@ class DocumentRequests:
 
     # -- changing, saving, closing ---------------------------------------------------------------------------
 
-    async def _alter(self, _: Page, request: document_messages.Alteration) -> int:
+    async def _alter(self, _: StudioClient, request: document_messages.Alteration) -> int:
         presenter, open_file = self._with_key(request.document)
         before, number = open_file.document.value, open_file.document.version
         was_dirty = open_file.document.dirty
@@ -153,17 +155,17 @@ class DocumentRequests:
         elif not presenter.files.perform(open_file, request):
             return number
         await self._notify_change(open_file, before, number)
-        if open_file.document.dirty != was_dirty:  # the lists of pages that do not show the document
+        if open_file.document.dirty != was_dirty:  # the lists of clients that do not show the document
             await self.notify_list()
         return open_file.document.version
 
-    async def _ignore_file_change(self, _: Page, request: document_messages.IgnoreFileChange) -> None:
+    async def _ignore_file_change(self, _: StudioClient, request: document_messages.IgnoreFileChange) -> None:
         presenter, open_file = self._with_key(request.document)
         presenter.files.ignore_file_change(open_file)
         await self.notify_state(open_file)
         await self.notify_list()
 
-    async def _save(self, _: Page, request: document_messages.Save) -> str:
+    async def _save(self, _: StudioClient, request: document_messages.Save) -> str:
         presenter, open_file = self._with_key(request.document)
         try:
             path = await presenter.files.save(open_file, request.path, overwrite=request.overwrite)
@@ -173,21 +175,21 @@ class DocumentRequests:
         await self.notify_list()
         return path
 
-    async def _close(self, page: Page, request: document_messages.Close) -> bool:
+    async def _close(self, client: StudioClient, request: document_messages.Close) -> bool:
         presenter, open_file = self._with_key(request.document)
-        shared = any(other is not page for other in self._pages.showing(open_file.key))
+        shared = any(other is not client for other in self._clients.showing(open_file.key))
         if not shared:
             presenter.files.close(open_file, discard=request.discard)
-        page.shows.pop(open_file.key, None)
+        client.shows.pop(open_file.key, None)
         await self.notify_list()
         return not shared
 
-    async def _recover(self, page: Page, request: document_messages.Recover) -> str | None:
+    async def _recover(self, client: StudioClient, request: document_messages.Recover) -> str | None:
         files = [presenter.files for presenter in self._presenters.values()]
         recoverable = next((kind for kind in files if request.document in kind.recoverable), files[0])
         open_file = await recoverable.recover(request)
         if open_file is not None:
-            return await self.show(page, open_file)
+            return await self.show(client, open_file)
         await self.notify_list()
         return None
 
@@ -200,13 +202,13 @@ class DocumentRequests:
     # -- notifications ---------------------------------------------------------------------------------------
 
     async def notify_list(self) -> None:
-        """Notify all pages of the open and recoverable documents."""
-        await self._pages.notify(
+        """Notify all clients of the open and recoverable documents."""
+        await self._clients.notify(
             document_messages.Documents(documents=self.states(), recoveries=self.recoveries())
         )
 
     async def notify_state(self, open_file: OpenFile[Any]) -> None:
-        """Notify the pages of a document of its state; its content has not changed."""
+        """Notify the clients of a document of its state; its content has not changed."""
         await self._notify_versions(open_file, open_file.document.value, open_file.document.version)
 
     async def _notify_change(self, open_file: OpenFile[Any], before: Any, number: int) -> None:
@@ -214,15 +216,15 @@ class DocumentRequests:
         self._presenters[open_file.document.kind].on_changed(open_file)
 
     async def _notify_versions(self, open_file: OpenFile[Any], before: Any, number: int) -> None:
-        """Send each page of a document the changes in the part that the page shows."""
+        """Send each client of a document the changes in the part that the client shows."""
         presenter = self._presenters[open_file.document.kind]
-        for page in self._pages.showing(open_file.key):
+        for client in self._clients.showing(open_file.key):
             try:
-                change = presenter.change(open_file, before, page.shows[open_file.key])
+                change = presenter.change(open_file, before, client.shows[open_file.key])
             except UnknownNameError:  # the part was removed, or an undo has just restored it
-                await self.show(page, open_file, in_front=False)
+                await self.show(client, open_file, in_front=False)
                 continue
-            await page.notify(
+            await client.notify(
                 document_messages.Changed(state=open_file.state(), before=number, change=change)
             )
 

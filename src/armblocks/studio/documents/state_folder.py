@@ -1,7 +1,7 @@
 """Private files of the studio, outside the project folder, with access rights for their user only.
 
 There is one folder for each project folder. It contains the journals of unsaved documents, the list of recent
-files, and the session secret with which pages reconnect after a restart of the server.
+files, and the session secret with which clients reconnect after a restart of the server.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SESSION_SECONDS = 12 * 3600.0
 
 @dataclass(frozen=True)
 class Session:
-    """The port of the server and the session cookie with which pages reconnect after a restart."""
+    """The port of the server and the session cookie with which clients reconnect after a restart."""
 
     port: int
     secret: str

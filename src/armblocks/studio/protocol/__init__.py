@@ -1,1 +1,1 @@
-"""The protocol between front end and server (messages, frames of samples), and the connected pages."""
+"""The protocol between front end and server (messages, frames of samples), and the connected clients."""

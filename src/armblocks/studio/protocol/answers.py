@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from armblocks.studio.protocol.message import ReplyT, Request
 
 if TYPE_CHECKING:
-    from armblocks.studio.protocol.page import Page
+    from armblocks.studio.protocol.clients import StudioClient
 
 RequestT = TypeVar("RequestT", bound=Request[Any])
-Answer = Callable[["Page", RequestT], Awaitable[Any]]
+Answer = Callable[["StudioClient", RequestT], Awaitable[Any]]
 
 
 class Answers:
@@ -24,9 +24,9 @@ class Answers:
         """Register the handler of a class of requests; the handler returns the value of the reply."""
         self._handlers[request] = answer
 
-    async def reply_to(self, page: Page, request: Request[ReplyT]) -> ReplyT:
+    async def reply_to(self, client: StudioClient, request: Request[ReplyT]) -> ReplyT:
         """Return the value of the reply to a request. Raises ``ArmblocksError`` if the request is refused."""
-        return await self._handlers[type(request)](page, request)
+        return await self._handlers[type(request)](client, request)
 
     @property
     def handlers(self) -> Mapping[type[Request[Any]], Answer[Any]]:

@@ -1,4 +1,4 @@
-"""The queue of messages to one page, so that a slow page never blocks the server."""
+"""The queue of messages to one client, so that a slow client never blocks the server."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from collections.abc import Awaitable, Callable
 Payload = str | bytes
 """A message as JSON, or a frame of samples."""
 CONGESTED_BYTES = 4 * 2**20
-"""Queue size in bytes above which samples of a run are added only as fast as the page receives them."""
+"""Queue size in bytes above which samples of a run are added only as fast as the client receives them."""
 MAX_BYTES = 64 * 2**20
-"""Queue size in bytes above which the connection is closed. A responsive page reconnects later."""
+"""Queue size in bytes above which the connection is closed. A responsive client reconnects later."""
 
 
 class Outbox:
@@ -28,7 +28,7 @@ class Outbox:
         self._room = asyncio.Event()
         self._room.set()
         self.closed = False
-        """Whether the queue is closed: the page has disconnected, or the queue exceeded its size limit."""
+        """Whether the queue is closed: the client has disconnected, or the queue exceeded its size limit."""
 
     @property
     def congested(self) -> bool:

@@ -1,4 +1,4 @@
-"""An open robot with its undo history and the pages that edit it."""
+"""An open robot with its undo history and the clients that edit it."""
 
 from __future__ import annotations
 

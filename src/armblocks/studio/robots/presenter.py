@@ -21,7 +21,7 @@ Result = TypeVar("Result")
 
 
 class RobotPresenter(Presenter[OpenRobot]):
-    """Shows the tables of robots on pages; ``robot_saved`` is called with a robot whose file was written."""
+    """Shows the tables of robots in clients; ``robot_saved`` is called with every saved robot."""
 
     def __init__(
         self,

@@ -13,8 +13,8 @@ from armblocks.robot import Robot
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.documents.requests import DocumentRequests
 from armblocks.studio.protocol.answers import Answers
+from armblocks.studio.protocol.clients import StudioClient
 from armblocks.studio.protocol.messages import robots as robot_messages
-from armblocks.studio.protocol.page import Page
 from armblocks.studio.protocol.robot_scene import RobotScene
 from armblocks.studio.robots.presenter import RobotPresenter
 from armblocks.studio.robots.readings import readings
@@ -51,33 +51,37 @@ class RobotRequests:
         answers.on(robot_messages.AskPicture, self._picture)
         answers.on(robot_messages.AskReadings, self._readings)
 
-    async def _open_of_block(self, page: Page, request: robot_messages.RobotOfBlock) -> str:
+    async def _open_of_block(self, client: StudioClient, request: robot_messages.RobotOfBlock) -> str:
         robot = self._block_robot(request.document, request.inside, request.block)
         path = Path(robot.source)
         if path.suffix.lower() == ".json" and path.is_relative_to(self._folder.root) and path.is_file():
             opening = self._presenter.open_file(path.relative_to(self._folder.root).as_posix())
-            return await self._documents.show(page, opening.opened[0], notes=opening.notes)
+            return await self._documents.show(client, opening.opened[0], notes=opening.notes)
         is_shipped = robot.source in formats.list_robots()
         open_file = (
             self._robots.add(robot, origin=robot.source) if is_shipped else self._robots.open_value(robot)
         )
-        return await self._documents.show(page, open_file)
+        return await self._documents.show(client, open_file)
 
-    async def _tables(self, _: Page, request: robot_messages.AskRobotTables) -> robot_messages.RobotTables:
+    async def _tables(
+        self, _: StudioClient, request: robot_messages.AskRobotTables
+    ) -> robot_messages.RobotTables:
         return robot_tables()
 
-    async def _scene(self, _: Page, request: robot_messages.AskScene) -> RobotScene:
+    async def _scene(self, _: StudioClient, request: robot_messages.AskScene) -> RobotScene:
         return scene_of(self._robot(request.document, request.inside, request.block))
 
-    async def _pose(self, _: Page, request: robot_messages.AskPose) -> list[list[list[float]]]:
+    async def _pose(self, _: StudioClient, request: robot_messages.AskPose) -> list[list[list[float]]]:
         return link_frames_of(self._robot(request.document, request.inside, request.block), request.q)
 
-    async def _picture(self, _: Page, request: robot_messages.AskPicture) -> str:
+    async def _picture(self, _: StudioClient, request: robot_messages.AskPicture) -> str:
         robot = self._robot(request.document, request.inside, request.block)
         link_frames_of(robot, request.q)  # raises for a wrong number of coordinates
         return await asyncio.to_thread(arm_picture_svg, robot, request.q, _PICTURE_SIZE, request.theme)
 
-    async def _readings(self, _: Page, request: robot_messages.AskReadings) -> robot_messages.Readings:
+    async def _readings(
+        self, _: StudioClient, request: robot_messages.AskReadings
+    ) -> robot_messages.Readings:
         open_file = self._robots[request.document]
         async with open_file.reading:  # concurrent requests compile the arm only once
             return await asyncio.to_thread(readings, open_file.arm, request.q, request.qd, request.qdd)

@@ -26,7 +26,7 @@ def robot_tables() -> robot_messages.RobotTables:
 
 
 def robot_content(robot: Robot) -> robot_messages.RobotContent:
-    """Return the data of a robot that a page displays."""
+    """Return the data of a robot that a client displays."""
     return robot_messages.RobotContent(
         name=robot.name,
         convention=_convention(robot),

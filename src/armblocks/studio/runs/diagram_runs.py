@@ -10,9 +10,9 @@ from typing import Any
 from armblocks.diagram import Diagram
 from armblocks.errors import InputError, UnknownNameError
 from armblocks.studio.protocol.answers import Answers
+from armblocks.studio.protocol.clients import Clients, StudioClient
 from armblocks.studio.protocol.message import Message
 from armblocks.studio.protocol.messages import runs as run_messages
-from armblocks.studio.protocol.page import Page, Pages
 from armblocks.studio.runs.process import RunProcess
 from armblocks.studio.runs.record import RunRecord
 from armblocks.studio.runs.report import report_of
@@ -20,18 +20,18 @@ from armblocks.studio.runs.workers import Workers
 from armblocks.studio.sheet.open_documents import OpenDocuments
 
 FIRST_WORKER_DELAY_SECONDS = 1.5
-"""Delay of the first worker process after a page was opened, so that the page can draw first, s."""
+"""Delay of the first worker process after a client has connected, so that the client can draw first, s."""
 
 
 class DiagramRuns:
-    """Starts runs, passes commands to them, and sends their messages to all pages that show the diagram."""
+    """Starts runs, passes commands to them, and sends their messages to all clients that show the diagram."""
 
     def __init__(
-        self, pages: Pages, diagrams: OpenDocuments, job: Callable[[Diagram], dict[str, Any]]
+        self, clients: Clients, diagrams: OpenDocuments, job: Callable[[Diagram], dict[str, Any]]
     ) -> None:
         self.processes: dict[str, RunProcess] = {}
         self.workers = Workers()
-        self._pages = pages
+        self._clients = clients
         self._diagrams = diagrams
         self._job = job
         self._records: dict[str, RunRecord] = {}
@@ -47,10 +47,10 @@ class DiagramRuns:
         """The key of the run of a diagram, or ``None``."""
         return next((run.key for run in self.processes.values() if run.document == document), None)
 
-    def on_shown(self, page: Page, document: str) -> None:
-        """Send a page that opened a diagram the record of its run, and start the process of the next run."""
+    def on_shown(self, client: StudioClient, document: str) -> None:
+        """Send a client that opened a diagram the record of its run; start the process of the next run."""
         if (run := self.run_key(document)) is not None:
-            self._send_later(page, run, 0)
+            self._send_later(client, run, 0)
         self.workers.prepare(after=FIRST_WORKER_DELAY_SECONDS)
 
     async def report(self, document: str) -> bytes:
@@ -73,20 +73,22 @@ class DiagramRuns:
 
     # -- requests --------------------------------------------------------------------------------------------
 
-    async def _run(self, _: Page, request: run_messages.Run) -> str:
+    async def _run(self, _: StudioClient, request: run_messages.Run) -> str:
         open_file = self._diagrams[request.document]
         key, record = secrets.token_hex(8), RunRecord()
 
         async def notify(event: Message | bytes) -> None:
             payload = event if isinstance(event, bytes) else event.model_dump_json()
             record.append(payload)
-            for page in [
-                page for page in self._pages.showing(open_file.key) if key not in page.records_in_progress
+            for client in [
+                client
+                for client in self._clients.showing(open_file.key)
+                if key not in client.records_in_progress
             ]:
-                if page.congested:
-                    self._send_later(page, key, len(record) - 1)
+                if client.congested:
+                    self._send_later(client, key, len(record) - 1)
                 else:
-                    await page.send(payload)
+                    await client.send(payload)
 
         worker = await self.workers.take()
         for other in list(self.processes.values()):
@@ -100,32 +102,32 @@ class DiagramRuns:
         run.start(job)
         return run.key
 
-    async def _command(self, _: Page, request: run_messages.RunCommand) -> None:
+    async def _command(self, _: StudioClient, request: run_messages.RunCommand) -> None:
         if request.run not in self.processes:
             raise UnknownNameError("run", request.run, self.processes)
         self.processes[request.run].send_command(request)
 
-    # -- messages to pages -----------------------------------------------------------------------------------
+    # -- messages to clients ---------------------------------------------------------------------------------
 
-    def _send_later(self, page: Page, run: str, begin: int) -> None:
-        """Send a page the messages of a run from number ``begin`` on, as fast as the page receives them.
+    def _send_later(self, client: StudioClient, run: str, begin: int) -> None:
+        """Send a client the messages of a run from number ``begin`` on, as fast as the client receives them.
 
-        This is for pages that have just connected or are congested. Live messages of the run are withheld
-        from the page until it has received the record.
+        This is for clients that have just connected or are congested. Live messages of the run are withheld
+        from the client until it has received the record.
         """
-        page.records_in_progress[run] = begin
-        task = asyncio.get_running_loop().create_task(self._notify(page, run))
+        client.records_in_progress[run] = begin
+        task = asyncio.get_running_loop().create_task(self._notify(client, run))
         self._send_tasks.add(task)
         task.add_done_callback(self._send_tasks.discard)
 
-    async def _notify(self, page: Page, run: str) -> None:
+    async def _notify(self, client: StudioClient, run: str) -> None:
         record = self._records[run]
         while (
-            page.records_in_progress[run] < len(record)
+            client.records_in_progress[run] < len(record)
             and self._records.get(run) is record
-            and page in self._pages
+            and client in self._clients
         ):
-            page.records_in_progress[run] += 1
-            await page.send(record[page.records_in_progress[run] - 1])
-            await page.room()
-        del page.records_in_progress[run]
+            client.records_in_progress[run] += 1
+            await client.send(record[client.records_in_progress[run] - 1])
+            await client.room()
+        del client.records_in_progress[run]

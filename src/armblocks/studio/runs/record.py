@@ -1,5 +1,5 @@
-"""The stored messages of a run, for pages that connect later: after a reload, after a lost connection, or as
-a second page.
+"""The stored messages of a run, for clients that connect later: after a reload, after a lost connection, or
+as a second client.
 
 The messages are in an unnamed temporary file, so that a long run needs little memory. The system deletes
 the file when the process ends. If the disk is full, no more samples are stored, but the final message of the

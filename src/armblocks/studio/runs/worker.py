@@ -47,7 +47,7 @@ MAX_MEMORY_BYTES = 8 * 2**30
 """Limit of the address space of a worker, bytes."""
 MAX_CPU_SECONDS = 3600
 MAX_NUMBERS = 16_000_000
-"""Limit of the numbers of one run that a page receives (128 MB); longer records are reduced to extremes."""
+"""Limit of the numbers of one run that a client receives (128 MB); longer records are reduced to extremes."""
 
 
 def work(pipe: Connection) -> None:
@@ -61,7 +61,7 @@ def work(pipe: Connection) -> None:
 
 
 def stride_of(run: DiagramRun) -> int:
-    """Number of samples that are reduced to their extremes; 1 unless the samples fill the page's memory."""
+    """Number of samples that are reduced to their extremes; 1 unless the samples fill the client's memory."""
     numbers = run.simulation.planned * (1 + run.simulation.compiled.signals_layout.size)
     return 1 if numbers <= MAX_NUMBERS else math.ceil(2 * numbers / MAX_NUMBERS)
 

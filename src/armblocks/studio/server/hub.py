@@ -1,4 +1,4 @@
-"""The hub of one server: it connects pages, documents and runs, on one event loop."""
+"""The hub of one server: it connects clients, documents and runs, on one event loop."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from armblocks.studio.documents.requests import DocumentRequests
 from armblocks.studio.documents.state_folder import StateFolder
 from armblocks.studio.documents.trusted_files import TrustedFiles
 from armblocks.studio.protocol.answers import Answers
+from armblocks.studio.protocol.clients import Clients, InvalidRequestError, StudioClient
 from armblocks.studio.protocol.envelope import Envelope, Reply
 from armblocks.studio.protocol.message import Fault
 from armblocks.studio.protocol.messages.studio import FileList, Files, Ping, Welcome
-from armblocks.studio.protocol.page import InvalidRequestError, Page, Pages
 from armblocks.studio.robots.open_robots import OpenRobots
 from armblocks.studio.robots.presenter import RobotPresenter
 from armblocks.studio.robots.requests import RobotRequests
@@ -59,23 +59,23 @@ _REQUEST_NUMBER = re.compile(r'\s*\{\s*"number"\s*:\s*(\d{1,15})\s*,')
 
 
 class Hub:
-    """Parses the requests of pages, passes them to their handlers, and sends the replies."""
+    """Parses the requests of clients, passes them to their handlers, and sends the replies."""
 
     def __init__(self, folder: ProjectFolder) -> None:
         self._folder = folder
         self._state = StateFolder(folder.root)
-        self._pages = Pages()
+        self._clients = Clients()
         data = ProjectData(folder, TrustedFiles(self._state))
         checks = Checks(data, self._resolve_robot)
         self._diagrams = OpenDocuments(folder, self._state, self._resolve_robot, data)
-        self.runs = DiagramRuns(self._pages, self._diagrams, checks.job)
+        self.runs = DiagramRuns(self._clients, self._diagrams, checks.job)
         lines = LinesOfSheets()
         robots = RobotPresenter(OpenRobots(folder, self._state), folder, self._robot_saved)
         self._diagram_presenter = DiagramPresenter(
-            self._diagrams, self._pages, self.runs, lines, checks.check
+            self._diagrams, self._clients, self.runs, lines, checks.check
         )
         self.documents = DocumentRequests(
-            folder, self._pages, {"diagram": self._diagram_presenter, "robot": robots}
+            folder, self._clients, {"diagram": self._diagram_presenter, "robot": robots}
         )
         self.answers = Answers()
         self.answers.on(Ping, self._ping)
@@ -102,12 +102,12 @@ class Hub:
         self.documents.end()
         self.runs.close()
 
-    # -- pages -----------------------------------------------------------------------------------------------
+    # -- clients ---------------------------------------------------------------------------------------------
 
-    async def welcome(self, page: Page) -> None:
-        """Add a page that has connected, and send it the welcome message."""
-        self._pages.add(page)
-        await page.notify(
+    async def welcome(self, client: StudioClient) -> None:
+        """Add a client that has connected, and send it the welcome message."""
+        self._clients.add(client)
+        await client.notify(
             Welcome(
                 version=version("armblocks"),
                 library=list(library()),
@@ -122,14 +122,14 @@ class Hub:
             )
         )
 
-    def remove_page(self, page: Page) -> None:
-        """Remove a page that has disconnected; its documents stay open for a reconnection."""
-        self._pages.discard(page)
+    def remove_client(self, client: StudioClient) -> None:
+        """Remove a client that has disconnected; its documents stay open for a reconnection."""
+        self._clients.discard(client)
 
-    async def answer(self, page: Page, text: str) -> None:
+    async def answer(self, client: StudioClient, text: str) -> None:
         """Handle one request; every request with a number gets a reply, also an invalid one.
 
-        A page repeats a request without a reply, so invalid requests and defects are reported in a reply.
+        A client repeats a request without a reply, so invalid requests and defects are reported in a reply.
         Raises ``InvalidRequestError`` for a text without a request number.
         """
         try:
@@ -138,22 +138,22 @@ class Hub:
             match = _REQUEST_NUMBER.match(text)
             if match is None:
                 raise InvalidRequestError(str(error)) from None
-            await page.notify(Reply(number=int(match[1]), fault=INVALID_REQUEST))
+            await client.notify(Reply(number=int(match[1]), fault=INVALID_REQUEST))
             return
         number, fault, value = envelope.number, None, None
         try:
-            value = await self.answers.reply_to(page, envelope.request)
+            value = await self.answers.reply_to(client, envelope.request)
         except ArmblocksError as error:
             fault = Fault(what=error.what, where=error.where, allowed=error.allowed, fix=error.fix)
         except Exception as error:
             LOG.exception("a request failed because of a defect")
             fault = DEFECT.model_copy(update={"what": f"{DEFECT.what} ({type(error).__name__})"})
-        await page.notify(Reply(number=number, value=value, fault=fault))
+        await client.notify(Reply(number=number, value=value, fault=fault))
 
-    async def _ping(self, _: Page, request: Ping) -> None:
+    async def _ping(self, _: StudioClient, request: Ping) -> None:
         pass
 
-    async def _files(self, _: Page, request: Files) -> FileList:
+    async def _files(self, _: StudioClient, request: Files) -> FileList:
         return FileList(files=self._folder.files(), recent=self._recent())
 
     def _recent(self) -> list[str]:

@@ -37,9 +37,9 @@ def serve(
 ) -> None:
     """Serve until Ctrl-C. ``announce`` receives the login link. ``port`` 0 selects a free port.
 
-    With ``port`` 0, the port of the previous server for this folder is tried first, and its pages reconnect
+    With ``port`` 0, the port of the previous server for this folder is tried first, and its clients reconnect
     to this server, unless ``new_session``. The socket is bound to 127.0.0.1, so only this machine can
-    connect. Raises ``InputError`` if the port is in use, ``FormatError`` if the page is not built.
+    connect. Raises ``InputError`` if the port is in use, ``FormatError`` if the front end is not built.
     """
     import uvicorn
 
@@ -79,7 +79,7 @@ def serve(
 
 
 def _previous_listener(state_folder: StateFolder) -> socket.socket | None:
-    """Listen at the port of the previous server, if it is free, so that its pages can reconnect."""
+    """Listen at the port of the previous server, if it is free, so that its clients can reconnect."""
     last = state_folder.session()
     if last is not None:
         with contextlib.suppress(InputError):

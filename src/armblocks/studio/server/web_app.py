@@ -25,8 +25,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from armblocks.errors import ArmblocksError
 from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.protocol.clients import InvalidRequestError, StudioClient
 from armblocks.studio.protocol.outbox import Outbox
-from armblocks.studio.protocol.page import InvalidRequestError, Page
 from armblocks.studio.server.guard import Guard, Keys
 
 if TYPE_CHECKING:
@@ -144,30 +144,30 @@ class Endpoints:
         return Response(data, media_type="text/html")
 
     async def websocket(self, socket: WebSocket) -> None:
-        """Serve the websocket of a page until it disconnects."""
+        """Serve the websocket of a client until it disconnects."""
         await socket.accept()
         outbox = Outbox(socket.send_text, socket.send_bytes)
-        hub, page = await self.hub.ready(), Page(outbox.put, outbox.put, outbox)
+        hub, client = await self.hub.ready(), StudioClient(outbox.put, outbox.put, outbox)
         sending = asyncio.create_task(outbox.send_all())
-        await hub.welcome(page)
+        await hub.welcome(client)
         try:
             while (text := await _received(socket, sending)) is not None:
-                await hub.answer(page, text)
+                await hub.answer(client, text)
         except (InvalidRequestError, KeyError):
             await socket.close(1008, "this is not a request of the studio")
         except WebSocketDisconnect:
             pass
         finally:
-            hub.remove_page(page)
+            hub.remove_client(client)
             sending.cancel()
             await asyncio.gather(sending, return_exceptions=True)
 
 
 async def _received(socket: WebSocket, sending: asyncio.Task[None]) -> str | None:
-    """Return the next message of the page; ``None`` after a failed transmission to the page.
+    """Return the next message of the client; ``None`` after a failed transmission to the client.
 
     After a failed transmission, ``receive_text`` raises an error that is not a ``WebSocketDisconnect``, even
-    if messages of the page are still queued.
+    if messages of the client are still queued.
     """
     receiving = asyncio.create_task(socket.receive_text())
     try:

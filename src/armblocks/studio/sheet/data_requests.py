@@ -17,9 +17,9 @@ from armblocks.studio.documents.dropped import dropped_bytes
 from armblocks.studio.documents.project_data import SOURCE_SUFFIXES, ProjectData
 from armblocks.studio.documents.trusted_files import digest_of
 from armblocks.studio.protocol.answers import Answers
+from armblocks.studio.protocol.clients import StudioClient
 from armblocks.studio.protocol.message import Fault
 from armblocks.studio.protocol.messages import data_files as data_messages
-from armblocks.studio.protocol.page import Page
 from armblocks.studio.sheet.table_preview import table_preview
 
 _INVISIBLE = re.compile(
@@ -48,7 +48,9 @@ class DataRequests:
         answers.on(data_messages.ReadSource, self._source)
         answers.on(data_messages.TrustSource, self._trust)
 
-    async def _files(self, _: Page, request: data_messages.DataFileList) -> list[data_messages.DataFile]:
+    async def _files(
+        self, _: StudioClient, request: data_messages.DataFileList
+    ) -> list[data_messages.DataFile]:
         suffixes = TABLE_SUFFIXES if request.holds == "table" else SOURCE_SUFFIXES
         return await asyncio.to_thread(self._files_with, suffixes)
 
@@ -63,7 +65,9 @@ class DataRequests:
                 continue
         return found
 
-    async def _preview(self, _: Page, request: data_messages.PreviewTable) -> data_messages.TablePreview:
+    async def _preview(
+        self, _: StudioClient, request: data_messages.PreviewTable
+    ) -> data_messages.TablePreview:
         path = self._folder.path(request.file, TABLE_SUFFIXES)
 
         def read() -> data_messages.TablePreview:
@@ -75,7 +79,7 @@ class DataRequests:
 
         return await asyncio.to_thread(read)
 
-    async def _store(self, _: Page, request: data_messages.StoreFile) -> data_messages.StoredFile:
+    async def _store(self, _: StudioClient, request: data_messages.StoreFile) -> data_messages.StoredFile:
         data = dropped_bytes(request.content, request.name[:80])
         name = PurePath(request.name).name
         path = self._folder.path(name, TABLE_SUFFIXES)
@@ -95,7 +99,9 @@ class DataRequests:
             self._recheck()
         return data_messages.StoredFile(path=name, stored=stored)
 
-    async def _source(self, _: Page, request: data_messages.ReadSource) -> data_messages.FunctionSource:
+    async def _source(
+        self, _: StudioClient, request: data_messages.ReadSource
+    ) -> data_messages.FunctionSource:
         path = self._folder.path(request.file, SOURCE_SUFFIXES)
         source = self._data.source(path)
         fault: Fault | None = None
@@ -129,7 +135,7 @@ class DataRequests:
             fault=fault,
         )
 
-    async def _trust(self, _: Page, request: data_messages.TrustSource) -> None:
+    async def _trust(self, _: StudioClient, request: data_messages.TrustSource) -> None:
         path = self._folder.path(request.file, SOURCE_SUFFIXES)
         shown = self._data.shown(path)
         if request.trusted and digest_of(self._data.source(path)) != request.digest:
@@ -144,7 +150,7 @@ class DataRequests:
 
 
 def _argument(argument: Parameter) -> str:
-    """The text of an argument for the page; an argument with a default is not an input."""
+    """The text of an argument for the client; an argument with a default is not an input."""
     stars = {Parameter.VAR_POSITIONAL: "*", Parameter.VAR_KEYWORD: "**"}.get(argument.kind, "")
     return f"{stars}{argument.name}{'' if argument.default is Parameter.empty else '=…'}"
 

@@ -1,4 +1,4 @@
-"""An open diagram with its undo history and the pages that edit it."""
+"""An open diagram with its undo history and the clients that edit it."""
 
 from __future__ import annotations
 

@@ -87,7 +87,7 @@ class LinesOfSheets:
 
 
 def has_ports(wire: Connection, sheet: Diagram) -> bool:
-    """Whether both ports of a wire exist on the sheet; a page may show an earlier version of it."""
+    """Whether both ports of a wire exist on the sheet; a client may show an earlier version of it."""
     source, target = sheet.blocks.get(wire.source.block), sheet.blocks.get(wire.target.block)
     return (
         source is not None

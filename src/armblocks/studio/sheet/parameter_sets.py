@@ -60,7 +60,7 @@ def saved(edit: SaveParameterSet, diagram: Diagram, _context: object) -> Diagram
 
 
 def _read(diagram: Diagram, path: str, typed: Any, where: str) -> Any:
-    """The value of a parameter from a page; texts of choices are not formulas."""
+    """The value of a parameter from a client; texts of choices are not formulas."""
     try:
         return checked_entry(diagram, path, typed, where)
     except ArmblocksError:

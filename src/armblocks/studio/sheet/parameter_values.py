@@ -17,7 +17,7 @@ from armblocks.formats.data_files import DataFiles, TableReference
 from armblocks.robot import Robot
 
 ResolveRobot = Callable[[str], Robot]
-"""Finds a robot by the name that a page uses: a shipped name or a file of the project."""
+"""Finds a robot by the name that a client uses: a shipped name or a file of the project."""
 
 _NUMERIC = (ParameterKind.NUMBER, ParameterKind.ARRAY, ParameterKind.INTEGER)
 _ALLOWED = "a number, or an array such as [1 2; 3 4]; pi, + - * / ^ and brackets may be used"
@@ -32,7 +32,7 @@ def parameter_value(
     scope: Scope | None = None,
     data: DataFiles | None = None,
 ) -> Any:
-    """Return the checked value of a parameter that a page sends; ``None`` selects the default.
+    """Return the checked value of a parameter that a client sends; ``None`` selects the default.
 
     A text that contains mask parameters of the diagram, ``scope``, is stored as a formula. ``data`` reads
     tables and functions of files. Raises ``InputError`` with the location ``where`` (a block) and the
@@ -87,7 +87,7 @@ def _matrix(text: str, where: str) -> Any:
 
 
 def tuned_value(typed: Any, where: str) -> Any:
-    """Return the trial value of a parameter from a page, as text or as numbers."""
+    """Return the trial value of a parameter from a client, as text or as numbers."""
     return number_value(typed, where) if isinstance(typed, str) else _with_infinities(typed)
 
 

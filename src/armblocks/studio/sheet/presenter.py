@@ -10,6 +10,7 @@ from typing import Protocol
 from armblocks.diagram import Diagram
 from armblocks.errors import UnknownNameError
 from armblocks.studio.documents.presenter import Opening, Place, Presenter
+from armblocks.studio.protocol.clients import Clients, StudioClient
 from armblocks.studio.protocol.messages.sheets import (
     Checked,
     DiagramChange,
@@ -17,7 +18,6 @@ from armblocks.studio.protocol.messages.sheets import (
     Finding,
     WireKind,
 )
-from armblocks.studio.protocol.page import Page, Pages
 from armblocks.studio.sheet.drawing_data import outer_comment, sheet, sheet_change
 from armblocks.studio.sheet.lines import LinesOfSheets, changed_lines
 from armblocks.studio.sheet.nesting import inside, linked_part
@@ -34,8 +34,8 @@ class RunsOfDiagrams(Protocol):
         """The key of the run of a diagram, or ``None``."""
         ...
 
-    def on_shown(self, page: Page, document: str) -> None:
-        """Called after a page was sent a diagram."""
+    def on_shown(self, client: StudioClient, document: str) -> None:
+        """Called after a client was sent a diagram."""
         ...
 
 
@@ -44,12 +44,12 @@ CheckDiagram = Callable[[Diagram], Awaitable[tuple[list[Finding], dict[str, Wire
 
 
 class DiagramPresenter(Presenter[OpenDocument]):
-    """Shows on each page the sheet of a diagram that the page has selected."""
+    """Shows in each client the sheet of a diagram that the client has selected."""
 
     def __init__(
         self,
         files: OpenDocuments,
-        pages: Pages,
+        clients: Clients,
         runs: RunsOfDiagrams,
         lines: LinesOfSheets,
         check: CheckDiagram,
@@ -58,7 +58,7 @@ class DiagramPresenter(Presenter[OpenDocument]):
         self._check_diagram = check
         self._lines = lines
         self._documents = files
-        self._pages = pages
+        self._clients = clients
         self._runs = runs
 
     def dropped(self, data: bytes, name: str) -> Opening[OpenDocument]:
@@ -66,7 +66,7 @@ class DiagramPresenter(Presenter[OpenDocument]):
         return Opening([self._documents.open_bytes(data, name)])
 
     def place(self, open_file: OpenDocument, requested: Place, *, known: bool) -> Place:
-        """Return the path of the sheet; the top sheet if a reconnecting page shows a deleted one."""
+        """Return the path of the sheet; the top sheet if a reconnecting client shows a deleted one."""
         try:
             inside(open_file.document.diagram, requested)
         except UnknownNameError:
@@ -105,10 +105,10 @@ class DiagramPresenter(Presenter[OpenDocument]):
             outer_comment=outer_comment(diagram, place),
         )
 
-    def on_shown(self, page: Page, open_file: OpenDocument, *, known: bool) -> None:
-        """Send the page the run of the diagram, and start the background check."""
+    def on_shown(self, client: StudioClient, open_file: OpenDocument, *, known: bool) -> None:
+        """Send the client the run of the diagram, and start the background check."""
         if not known:
-            self._runs.on_shown(page, open_file.key)
+            self._runs.on_shown(client, open_file.key)
         self.on_changed(open_file)
 
     def on_changed(self, open_file: OpenDocument) -> None:
@@ -123,4 +123,4 @@ class DiagramPresenter(Presenter[OpenDocument]):
         findings, wires = await self._check_diagram(diagram)
         if open_file.document.version == checked_version:
             event = Checked(document=open_file.key, version=checked_version, findings=findings, wires=wires)
-            await self._pages.notify_showing(open_file.key, event)
+            await self._clients.notify_showing(open_file.key, event)

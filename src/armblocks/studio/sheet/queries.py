@@ -13,9 +13,9 @@ from armblocks.errors import UnknownNameError
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.documents.requests import DocumentRequests
 from armblocks.studio.protocol.answers import Answers
+from armblocks.studio.protocol.clients import StudioClient
 from armblocks.studio.protocol.messages import sheets as sheet_messages
 from armblocks.studio.protocol.messages.sheet_edits import SetMask
-from armblocks.studio.protocol.page import Page
 from armblocks.studio.sheet.bookmarks import bookmarks_of
 from armblocks.studio.sheet.clipping import clipped
 from armblocks.studio.sheet.edits import connection
@@ -62,11 +62,11 @@ class SheetQueries:
     def _sheet(self, document: str, path: Sequence[str] = ()) -> Diagram:
         return inside(self._diagrams[document].document.diagram, path)
 
-    async def _show_sheet(self, page: Page, request: sheet_messages.ShowSheet) -> None:
-        await self._documents.show(page, self._diagrams[request.document], tuple(request.inside))
+    async def _show_sheet(self, client: StudioClient, request: sheet_messages.ShowSheet) -> None:
+        await self._documents.show(client, self._diagrams[request.document], tuple(request.inside))
 
     async def _route(
-        self, _: Page, request: sheet_messages.RouteWires
+        self, _: StudioClient, request: sheet_messages.RouteWires
     ) -> dict[str, sheet_messages.WireLines]:
         sheet = self._sheet(request.document, request.inside)
         lines = self._lines.for_sheet(request.document, tuple(request.inside))
@@ -79,34 +79,34 @@ class SheetQueries:
         after = lines.route_dragged(sheet, places, connections, bends, request.passed)
         return {source: shown for source, shown in after.items() if before.get(source) != shown}
 
-    async def _outline(self, _: Page, request: sheet_messages.AskOutline) -> sheet_messages.Outline:
+    async def _outline(self, _: StudioClient, request: sheet_messages.AskOutline) -> sheet_messages.Outline:
         return outline(self._sheet(request.document))
 
-    async def _mask(self, _: Page, request: sheet_messages.AskMask) -> SetMask:
+    async def _mask(self, _: StudioClient, request: sheet_messages.AskMask) -> SetMask:
         path = [*request.inside, request.block] if request.block else request.inside
         return mask_of(self._sheet(request.document, path)).model_copy(update={"block": request.block})
 
     async def _parameter_sets(
-        self, _: Page, request: sheet_messages.AskParameterSets
+        self, _: StudioClient, request: sheet_messages.AskParameterSets
     ) -> sheet_messages.ParameterSetTable:
         return parameter_set_table(self._sheet(request.document), request.also)
 
     async def _bookmarks(
-        self, _: Page, request: sheet_messages.AskBookmarks
+        self, _: StudioClient, request: sheet_messages.AskBookmarks
     ) -> list[sheet_messages.SheetBookmark]:
         return bookmarks_of(self._sheet(request.document))
 
-    async def _copy(self, _: Page, request: sheet_messages.Copy) -> str:
+    async def _copy(self, _: StudioClient, request: sheet_messages.Copy) -> str:
         sheet = self._sheet(request.document, request.inside)
         return clipped(sheet, request.blocks, request.notes, self._resolve_robot, self._folder.root)
 
-    async def _find(self, _: Page, request: sheet_messages.Find) -> list[sheet_messages.FoundBlock]:
+    async def _find(self, _: StudioClient, request: sheet_messages.Find) -> list[sheet_messages.FoundBlock]:
         return find(self._sheet(request.document), request.text)
 
-    async def _typed_settings(self, _: Page, request: sheet_messages.TypedSettings) -> dict[str, str]:
+    async def _typed_settings(self, _: StudioClient, request: sheet_messages.TypedSettings) -> dict[str, str]:
         return setting_faults(self._sheet(request.document).settings, request.values)
 
-    async def _typed_value(self, _: Page, request: sheet_messages.TypedValue) -> Any:
+    async def _typed_value(self, _: StudioClient, request: sheet_messages.TypedValue) -> Any:
         known, scope = BLOCKS[request.type].parameters(), dict[str, Value]()
         if request.document:
             level = self._sheet(request.document, request.inside)

@@ -1,4 +1,4 @@
-"""The preview of a table file, which a page shows before a block uses the file."""
+"""The preview of a table file, which a client shows before a block uses the file."""
 
 from __future__ import annotations
 

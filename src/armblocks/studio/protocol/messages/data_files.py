@@ -118,7 +118,7 @@ class ReadSource(Request[FunctionSource]):
 
 
 class TrustSource(Request[None]):
-    """Trust a Python file with the content that the page has shown, or withdraw the trust.
+    """Trust a Python file with the content that the client has shown, or withdraw the trust.
 
     The request is refused if the content of the file no longer has this ``digest``.
     """

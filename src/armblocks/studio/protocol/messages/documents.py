@@ -108,10 +108,10 @@ class New(Request[str]):
 
 
 class Attach(Request[str]):
-    """Show a document again: after a reload, after a lost connection, or in a second page.
+    """Show a document again: after a reload, after a lost connection, or in a second client.
 
     A server that was restarted and does not have the document open recovers it from its journal, or else
-    opens the file ``path`` or the shipped ``origin``, under the same key. Edits that the page sends again
+    opens the file ``path`` or the shipped ``origin``, under the same key. Edits that the client sends again
     then find their document. ``inside`` is the path of the displayed sheet of a diagram.
     """
 
@@ -122,14 +122,14 @@ class Attach(Request[str]):
     path: str | None = None
     origin: str = ""
     in_front: bool = True
-    """Whether the page brings the document to the front."""
+    """Whether the client brings the document to the front."""
 
 
 class Alteration(Request[int]):
     """A request that changes a document.
 
     Each request has a unique ``key``: a request that is sent again after a lost connection is applied once.
-    ``base`` is the version that the page ``author`` showed; the request is refused if another page has
+    ``base`` is the version that the client ``author`` showed; the request is refused if another client has
     changed the same aspects since. The reply is the new version.
     """
 
@@ -193,9 +193,9 @@ class Save(Request[str]):
 
 
 class Close(Request[bool]):
-    """Close a document on this page; ``discard`` is required if it has unsaved edits.
+    """Close a document on this client; ``discard`` is required if it has unsaved edits.
 
-    A document that another page shows stays open there, with its edits; the reply is then ``False``.
+    A document that another client shows stays open there, with its edits; the reply is then ``False``.
     """
 
     kind: Literal["close"] = "close"
@@ -227,9 +227,9 @@ class Documents(Event):
 
 
 class Opened(Event):
-    """A complete document, for a page that shows it from now on.
+    """A complete document, for a client that shows it from now on.
 
-    ``notes``: warnings issued while its file was read. ``in_front``: whether the page brings it to the front.
+    ``notes``: warnings issued while its file was read. ``in_front``: whether it is brought to the front.
     """
 
     kind: Literal["opened"] = "opened"

@@ -1,4 +1,4 @@
-"""Runs: requests and events between page, server and the process of a run."""
+"""Runs: requests and events between client, server and the process of a run."""
 
 from __future__ import annotations
 

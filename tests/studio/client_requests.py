@@ -1,4 +1,4 @@
-"""A page that sends requests to a hub, without a network."""
+"""A client that sends requests to a hub, without a network."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 from armblocks.errors import InputError
 from armblocks.studio.documents.project_folder import ProjectFolder
-from armblocks.studio.server.hub import Hub, Page
+from armblocks.studio.server.hub import Hub, StudioClient
 
 Events = list[dict[str, Any]]
 
@@ -21,7 +21,7 @@ def run_scenario(
     *,
     runs: bool = False,
 ) -> Events:
-    """Let a page send requests to a hub; return the events that it received. ``runs``: models may run."""
+    """Let a client send requests to a hub; return the events that it received. ``runs``: models may run."""
     received: Events = []
 
     async def main() -> None:
@@ -33,14 +33,14 @@ def run_scenario(
         async def receive_bytes(data: bytes) -> None:
             assert runs, "samples arrived without a run"
 
-        page = Page(receive, receive_bytes)
-        await hub.welcome(page)
+        client = StudioClient(receive, receive_bytes)
+        await hub.welcome(client)
         number = 0
 
         async def ask(kind: str, **values: Any) -> Any:
             nonlocal number
             number += 1
-            await hub.answer(page, json.dumps({"number": number, "request": {"kind": kind, **values}}))
+            await hub.answer(client, json.dumps({"number": number, "request": {"kind": kind, **values}}))
             reply = next(
                 event for event in received if event["kind"] == "reply" and event["number"] == number
             )

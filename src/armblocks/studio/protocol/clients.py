@@ -1,4 +1,4 @@
-"""The connected pages, with their connections and the documents that they show."""
+"""The connected clients, with their connections and the documents that they show."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ if TYPE_CHECKING:
     from armblocks.studio.protocol.message import Message
 
 DISCONNECTED = (RuntimeError, ConnectionError, WebSocketDisconnect)
-"""Exceptions raised by sending to a disconnected page."""
+"""Exceptions raised by sending to a disconnected client."""
 SendText = Callable[[str], Awaitable[None]]
 SendBytes = Callable[[bytes], Awaitable[None]]
 
 
 class InvalidRequestError(ValueError):
-    """The text from a page is not a request of the studio."""
+    """The text from a client is not a request of the studio."""
 
 
 @dataclass(eq=False)
-class Page:
+class StudioClient:
     """One connected browser page. The hub manages its documents, runs and robots."""
 
     send_text: SendText
@@ -49,7 +49,7 @@ class Page:
             await self.outbox.room()
 
     async def notify(self, event: Message) -> None:
-        """Send an event; a disconnected page is ignored."""
+        """Send an event; a disconnected client is ignored."""
         await self.send(event.model_dump_json())
 
     async def send(self, payload: Payload) -> None:
@@ -58,34 +58,34 @@ class Page:
             await (self.send_text(payload) if isinstance(payload, str) else self.send_bytes(payload))
 
 
-class Pages:
-    """The pages that are connected to one server."""
+class Clients:
+    """The clients that are connected to one server."""
 
     def __init__(self) -> None:
-        self._connected: set[Page] = set()
+        self._connected: set[StudioClient] = set()
 
-    def __contains__(self, page: Page) -> bool:
-        return page in self._connected
+    def __contains__(self, client: StudioClient) -> bool:
+        return client in self._connected
 
-    def __iter__(self) -> Iterator[Page]:
+    def __iter__(self) -> Iterator[StudioClient]:
         return iter(list(self._connected))
 
-    def add(self, page: Page) -> None:
-        """Add a page that has connected."""
-        self._connected.add(page)
+    def add(self, client: StudioClient) -> None:
+        """Add a client that has connected."""
+        self._connected.add(client)
 
-    def discard(self, page: Page) -> None:
-        """Remove a page that has disconnected."""
-        self._connected.discard(page)
+    def discard(self, client: StudioClient) -> None:
+        """Remove a client that has disconnected."""
+        self._connected.discard(client)
 
-    def showing(self, document: str) -> list[Page]:
-        """The pages that show a document."""
-        return [page for page in self if document in page.shows]
+    def showing(self, document: str) -> list[StudioClient]:
+        """The clients that show a document."""
+        return [client for client in self if document in client.shows]
 
     async def notify(self, event: Message) -> None:
-        """Send an event to every page."""
-        await asyncio.gather(*(page.notify(event) for page in self))
+        """Send an event to every client."""
+        await asyncio.gather(*(client.notify(event) for client in self))
 
     async def notify_showing(self, document: str, event: Message) -> None:
-        """Send an event to every page that shows a document."""
-        await asyncio.gather(*(page.notify(event) for page in self.showing(document)))
+        """Send an event to every client that shows a document."""
+        await asyncio.gather(*(client.notify(event) for client in self.showing(document)))

@@ -1,4 +1,4 @@
-"""A slow page does not block the server, uses bounded memory, and loses no messages."""
+"""A slow client does not block the server, uses bounded memory, and loses no messages."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ import pytest
 
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol import outbox as outbox_module
+from armblocks.studio.protocol.clients import StudioClient
 from armblocks.studio.protocol.outbox import Outbox
-from armblocks.studio.protocol.page import Page
 from armblocks.studio.server.hub import Hub
 
 TIMEOUT_SECONDS = 180.0
 
 
 class Listener:
-    """A page at the other end of an outbox, which receives only when permitted."""
+    """A client at the other end of an outbox, which receives only when permitted."""
 
     def __init__(self) -> None:
         self.may_receive = asyncio.Event()
         self.received: list[str | bytes] = []
         self.changed = asyncio.Event()
         self.outbox = Outbox(self._receive, self._receive)
-        self.page = Page(self.outbox.put, self.outbox.put, self.outbox)
+        self.connection = StudioClient(self.outbox.put, self.outbox.put, self.outbox)
         self.sending = asyncio.create_task(self.outbox.send_all())
 
     async def _receive(self, message: str | bytes) -> None:
@@ -47,7 +47,7 @@ class Listener:
                 await self.changed.wait()
 
     async def ask(self, hub: Hub, number: int, kind: str, **values: Any) -> Any:
-        await hub.answer(self.page, json.dumps({"number": number, "request": {"kind": kind, **values}}))
+        await hub.answer(self.connection, json.dumps({"number": number, "request": {"kind": kind, **values}}))
         reply = await self.until("reply", number=number)
         assert reply["fault"] is None
         return reply["value"]
@@ -58,12 +58,12 @@ def with_pages(folder: Path, scenario: Callable[[Hub, Listener, Listener], Await
         hub, fast, suspended = Hub(ProjectFolder(folder)), Listener(), Listener()
         fast.may_receive.set()
         for listener in (fast, suspended):
-            await hub.welcome(listener.page)
+            await hub.welcome(listener.connection)
         try:
             await scenario(hub, fast, suspended)
         finally:
             for listener in (fast, suspended):
-                hub.remove_page(listener.page)
+                hub.remove_client(listener.connection)
                 listener.sending.cancel()
             hub.close()
 
@@ -85,7 +85,7 @@ def test_a_page_suspended_during_a_run_does_not_delay_others_and_gets_all_messag
         document = await fast.ask(hub, 1, "open_shipped", document_kind="diagram", name="falling_pendulum")
         request = {"kind": "attach", "document": document, "document_kind": "diagram"}
         attach = {"number": 1, "request": request}
-        await hub.answer(suspended.page, json.dumps(attach))
+        await hub.answer(suspended.connection, json.dumps(attach))
         before = suspended.outbox._size  # pyright: ignore[reportPrivateUsage]
         run = await fast.ask(hub, 2, "run", document=document)
         await fast.until("run_progress", run=run, state="done")
@@ -111,7 +111,7 @@ def test_the_connection_of_an_unresponsive_page_is_closed(
         attach = {"kind": "attach", "document": document, "document_kind": "diagram"}
         for number in range(100):
             await hub.answer(
-                suspended.page,
+                suspended.connection,
                 json.dumps({"number": number, "request": attach}),
             )
             if suspended.outbox.closed:
