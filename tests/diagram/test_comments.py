@@ -56,11 +56,11 @@ SEEDS = range(12)
 def with_zeros(diagram: Diagram, name: str) -> Diagram:
     """The diagram with a block deleted and a Constant 0 of the same shape at every output."""
     shapes = infer_shapes(diagram).outputs
-    carried = flatten_hierarchy(diagram).carried
+    contents = flatten_hierarchy(diagram).contents
     blocks = {key: block for key, block in diagram.blocks.items() if key != name}
     wires = [wire for wire in diagram.connections if name not in (wire.source.block, wire.target.block)]
     for port in diagram.blocks[name].output_ports():
-        source = carried.get(PortRef(name, port.name), PortRef(name, port.name))
+        source = contents.get(PortRef(name, port.name), PortRef(name, port.name))
         assert isinstance(source, PortRef)
         zero = f"{name} {port.name} zero"
         blocks[zero] = Constant(value=np.zeros(shapes[source.block][source.port]))

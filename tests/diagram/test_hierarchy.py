@@ -378,7 +378,7 @@ def test_a_sink_shows_all_signals_of_a_bus() -> None:
     assert view.labels == ("motor.speed", "motor.torque", "other")
     result = ab.simulate(diagram, stop_time=1.0)
     assert [result[f"scope/{signal}"][-1] for signal in view.signals] == [2.0, 3.0, 4.0]
-    assert flatten_hierarchy(diagram).carried[PortRef("bus", "bus")].paths() == (  # pyright: ignore[reportAttributeAccessIssue]
+    assert flatten_hierarchy(diagram).contents[PortRef("bus", "bus")].paths() == (  # pyright: ignore[reportAttributeAccessIssue]
         "motor",
         "motor.speed",
         "motor.torque",

@@ -4,7 +4,7 @@ from armblocks.diagram.block import Block, Shapes, Signals
 from armblocks.diagram.block_equations import BlockEquations, block_equations
 from armblocks.diagram.bookmarks import Bookmark
 from armblocks.diagram.builder import BlockHandle, DiagramBuilder
-from armblocks.diagram.bus import Bus, Carried
+from armblocks.diagram.bus import Bus, PortContent
 from armblocks.diagram.check import check_diagram
 from armblocks.diagram.comments import Comment, check_comment, commented_paths, is_inside, open_inputs
 from armblocks.diagram.conditional import (
@@ -86,7 +86,6 @@ __all__ = [
     "BusAssignment",
     "BusCreator",
     "BusSelector",
-    "Carried",
     "Comment",
     "Condition",
     "Connection",
@@ -114,6 +113,7 @@ __all__ = [
     "ParameterKind",
     "Placement",
     "Port",
+    "PortContent",
     "PortRef",
     "ResettableSubsystem",
     "Shapes",

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from armblocks.diagram.block import Block
-from armblocks.diagram.bus import Carried
+from armblocks.diagram.bus import PortContent
 from armblocks.diagram.diagram import Connection, Diagram
 from armblocks.diagram.passes.netlist import Netlist
 from armblocks.diagram.passes.order import resolved
@@ -19,7 +19,7 @@ from armblocks.equations import Shape
 class FlatForm:
     """A flat diagram, and its relation to the hierarchy. Names are paths from the top level.
 
-    ``levels``: the diagram of every subsystem by its path, with ``""`` for the top. ``carried``: the signal
+    ``levels``: the diagram of every subsystem by its path, with ``""`` for the top. ``contents``: the signal
     or bus at output ports that pass on signals of other ports. ``aliases``: other names of signals, such as a
     subsystem's ports. ``views``: the views, by block. ``declared_shapes``: ports with a declared shape.
     ``origins``: for blocks that the passes add, such as the control of a conditional subsystem, the block of
@@ -29,7 +29,7 @@ class FlatForm:
 
     diagram: Diagram
     levels: Mapping[str, Diagram]
-    carried: Mapping[PortRef, Carried] = field(default_factory=dict[PortRef, Carried])
+    contents: Mapping[PortRef, PortContent] = field(default_factory=dict[PortRef, PortContent])
     views: tuple[tuple[str, View], ...] = ()
     aliases: Mapping[str, PortRef] = field(default_factory=dict[str, PortRef])
     declared_shapes: Mapping[PortRef, tuple[PortRef, Shape]] = field(
@@ -55,7 +55,7 @@ def flat_form(net: Netlist) -> FlatForm:
     return FlatForm(
         diagram=_as_diagram(net),
         levels=levels,
-        carried=net.carried,
+        contents=net.contents,
         views=net.views,
         aliases=net.aliases,
         declared_shapes=net.declared_shapes,

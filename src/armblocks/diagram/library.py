@@ -24,8 +24,8 @@ class UnimportedBlock:
 
     def imported(self) -> type[Block]:
         """The block type."""
-        kind: type[Block] = getattr(importlib.import_module(self.module), self.name)
-        return kind
+        block_type: type[Block] = getattr(importlib.import_module(self.module), self.name)
+        return block_type
 
 
 class BlockLibrary(Mapping[str, type[Block]]):
@@ -36,26 +36,26 @@ class BlockLibrary(Mapping[str, type[Block]]):
     """
 
     def __init__(self, families: Mapping[str, Iterable[type[Block] | UnimportedBlock]]) -> None:
-        self._members = {family: tuple(kinds) for family, kinds in families.items()}
-        self._kinds = {kind.type_name(): kind for kinds in self._members.values() for kind in kinds}
+        self._members = {family: tuple(members) for family, members in families.items()}
+        self._types = {member.type_name(): member for members in self._members.values() for member in members}
 
     def __getitem__(self, name: str) -> type[Block]:
         try:
-            kind = self._kinds[name]
+            block_type = self._types[name]
         except KeyError:
-            raise UnknownNameError("block type", name, self._kinds) from None
-        if isinstance(kind, UnimportedBlock):
-            self._kinds[name] = kind = kind.imported()
-        return kind
+            raise UnknownNameError("block type", name, self._types) from None
+        if isinstance(block_type, UnimportedBlock):
+            self._types[name] = block_type = block_type.imported()
+        return block_type
 
     def __contains__(self, name: object) -> bool:
-        return name in self._kinds
+        return name in self._types
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._kinds)
+        return iter(self._types)
 
     def __len__(self) -> int:
-        return len(self._kinds)
+        return len(self._types)
 
     def with_kinds(self, family: str, kinds: Iterable[type[Block]]) -> BlockLibrary:
         """This library with further types of one family.
@@ -64,7 +64,7 @@ class BlockLibrary(Mapping[str, type[Block]]):
         """
         added = tuple(kinds)
         for kind in added:
-            if kind.type_name() in self._kinds:
+            if kind.type_name() in self._types:
                 raise DiagramError(
                     f"there is a block type named '{kind.type_name()}' already",
                     where=f"{kind.__module__}.{kind.__qualname__}",
@@ -77,16 +77,17 @@ class BlockLibrary(Mapping[str, type[Block]]):
     def families(self) -> Mapping[str, tuple[type[Block], ...]]:
         """The types of each family, both in display order."""
         return {
-            family: tuple(self[kind.type_name()] for kind in kinds) for family, kinds in self._members.items()
+            family: tuple(self[member.type_name()] for member in members)
+            for family, members in self._members.items()
         }
 
     @cached_property
     def _family_of(self) -> Mapping[str, str]:
-        return {kind.type_name(): family for family, kinds in self._members.items() for kind in kinds}
+        return {member.type_name(): family for family, members in self._members.items() for member in members}
 
     def family_of(self, kind: type[Block]) -> str:
         """The family of a type; raises an error for a type that is not in the library."""
         name = kind.type_name()
-        if name not in self._kinds or self[name] is not kind:
-            raise UnknownNameError("block type", name, self._kinds)
+        if name not in self._types or self[name] is not kind:
+            raise UnknownNameError("block type", name, self._types)
         return self._family_of[name]

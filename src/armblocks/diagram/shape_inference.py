@@ -124,7 +124,7 @@ def signals_without_comments(levels: Mapping[str, Diagram]) -> KnownSignals:
     active_levels = {path: level for path, level in levels.items() if not is_inside(path, sinks)}
     try:
         form = flat_form(dataclasses.replace(net, blocks=active_blocks, levels=active_levels))
-        return KnownSignals(carried=form.carried, shapes=known_shapes(form.diagram))
+        return KnownSignals(contents=form.contents, shapes=known_shapes(form.diagram))
     except ArmblocksError:
         return KnownSignals()
 

@@ -26,11 +26,11 @@ def named_signals(form: FlatForm) -> Iterator[tuple[str, PortRef]]:
     for level, diagram in active_levels(form.levels).items():
         for ref, name in diagram.signal_names.items():
             port = PortRef(joined(level, ref.block), ref.port)
-            path, carried = joined(level, name), form.carried.get(port, port)
-            if isinstance(carried, Bus):
-                elements += ((f"{path}.{element}", source) for element, source in carried.leaves())
+            path, content = joined(level, name), form.contents.get(port, port)
+            if isinstance(content, Bus):
+                elements += ((f"{path}.{element}", source) for element, source in content.leaves())
             else:
-                yield path, carried
+                yield path, content
     yield from elements
 
 

@@ -363,7 +363,7 @@ class _SignalContents:
 
     levels: Mapping[str, Diagram]
     views: Mapping[str, View]
-    carried: Mapping[PortRef, PortRef | Bus]
+    contents: Mapping[PortRef, PortRef | Bus]
     outputs: Mapping[str, Shapes]
 
     @classmethod
@@ -374,14 +374,14 @@ class _SignalContents:
         except DiagramError:
             return cls(levels_of(diagram), {}, {}, {})
         views = {name: view for name, view in diagram_views(diagram) if view.kind in _TREND_KINDS}
-        return cls(form.levels, views, form.carried, outputs)
+        return cls(form.levels, views, form.contents, outputs)
 
     def kind(self, source: PortRef) -> WireKind:
         """The content of an output port of the hierarchy."""
-        carried = self.carried.get(source, source)
-        if isinstance(carried, Bus):
+        content = self.contents.get(source, source)
+        if isinstance(content, Bus):
             return WireKind.BUS
-        return WireKind(min(len(self.outputs.get(carried.block, {}).get(carried.port, ())), 2))
+        return WireKind(min(len(self.outputs.get(content.block, {}).get(content.port, ())), 2))
 
 
 def _notes(diagram: Diagram) -> list[Mark]:

@@ -18,9 +18,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from armblocks.diagram.block import Block
-from armblocks.diagram.bus import Bus, Carried
+from armblocks.diagram.bus import Bus, PortContent
 from armblocks.diagram.grounded import Bypass
-from armblocks.diagram.passes.contents import Contents
+from armblocks.diagram.passes.contents import ContentSearch
 from armblocks.diagram.passes.netlist import Netlist, Replacement, Replacements
 from armblocks.diagram.port import PortRef
 from armblocks.diagram.virtual_wiring import BusCreator
@@ -58,7 +58,7 @@ def _copied(net: Netlist) -> dict[str, _CopiedBlock]:
     """The blocks that receive a bus, by path, with the structure of the bus."""
     copied: dict[str, _CopiedBlock] = {}
     replaced = dict(net.replaced)
-    contents = Contents(replaced, net.where)
+    search = ContentSearch(replaced, net.where)
     pending = {path: block for path, block in net.blocks.items() if block.bus_inputs()}
     sources: dict[str, dict[str, PortRef]] = {path: {} for path in pending}
     for target, source in net.drivers.items():
@@ -70,16 +70,16 @@ def _copied(net: Netlist) -> dict[str, _CopiedBlock]:
         for path, block in list(pending.items()):
             for port in block.bus_inputs():
                 try:
-                    carried = contents.of(sources[path][port])
+                    content = search.content(sources[path][port])
                 except DiagramError:
                     continue  # raised again once all buses are known, if the error persists
-                if isinstance(carried, Bus):
+                if isinstance(content, Bus):
                     copied[path] = _CopiedBlock(
-                        path=path, block=block, structure_input=port, structure=carried, sources=sources[path]
+                        path=path, block=block, structure_input=port, structure=content, sources=sources[path]
                     )
                     replaced[path] = copied[path].replacements()
                     # Earlier results may refer to the original block.
-                    contents = Contents(replaced, net.where)
+                    search = ContentSearch(replaced, net.where)
                     del pending[path]
                     progress = True
                     break
@@ -118,24 +118,24 @@ class _CopiedBlock:
                 contents[f"{port}.{element}"] = Replacement((self.sources[port],), selected)
         return contents
 
-    def _joined(self, port: str) -> Callable[[Sequence[Carried]], Carried]:
+    def _joined(self, port: str) -> Callable[[Sequence[PortContent]], PortContent]:
         """The bus at an output: the outputs of the copies, in the structure of the input bus."""
         bus = _renamed(self.structure, "", lambda element: PortRef(self.copy(element), port))
         return lambda _: bus
 
-    def _selected(self, port: str, element: str) -> Callable[[Sequence[Carried]], Carried]:
+    def _selected(self, port: str, element: str) -> Callable[[Sequence[PortContent]], PortContent]:
         return lambda contents: self._element(port, contents[0], element)
 
-    def _element(self, port: str, carried: Carried, element: str) -> Carried:
+    def _element(self, port: str, content: PortContent, element: str) -> PortContent:
         """The signal at an input of a copy. Raises ``DiagramError`` where the input buses differ."""
-        if isinstance(carried, Bus):
-            paths = {path for path, _ in carried.leaves()}
-            signal = carried.element(element)
+        if isinstance(content, Bus):
+            paths = {path for path, _ in content.leaves()}
+            signal = content.element(element)
             if paths == set(self.elements) and signal is not None:
                 return signal
-            text = f"a bus with {_listed(path for path, _ in carried.leaves())}"
+            text = f"a bus with {_listed(path for path, _ in content.leaves())}"
         else:
-            text = f"the single signal '{carried}'"
+            text = f"the single signal '{content}'"
         raise DiagramError(
             f"input '{self.structure_input}' is a bus with {_listed(self.elements)}, "
             f"but input '{port}' is {text}",
@@ -146,11 +146,11 @@ class _CopiedBlock:
 
 
 def _renamed(bus: Bus, prefix: str, source: Callable[[str], PortRef]) -> Bus:
-    elements: dict[str, Carried] = {}
-    for name, carried in bus.elements.items():
+    elements: dict[str, PortContent] = {}
+    for name, content in bus.elements.items():
         path = f"{prefix}{name}"
-        inner = isinstance(carried, Bus)
-        elements[name] = _renamed(carried, f"{path}.", source) if inner else source(path)
+        inner = isinstance(content, Bus)
+        elements[name] = _renamed(content, f"{path}.", source) if inner else source(path)
     return Bus(elements)
 
 

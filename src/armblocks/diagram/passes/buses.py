@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from armblocks.diagram.bus import Bus, Carried
+from armblocks.diagram.bus import Bus, PortContent
 from armblocks.diagram.passes.netlist import Netlist, Replacement, Replacements
 from armblocks.diagram.port import PortRef
 from armblocks.diagram.virtual_wiring import BusAssignment, BusCreator, BusSelector, listed
@@ -42,7 +42,7 @@ def resolve_buses(net: Netlist) -> Netlist:
     return net.with_replaced(replaced)
 
 
-_Content = Callable[[Sequence[Carried]], Carried]
+_Content = Callable[[Sequence[PortContent]], PortContent]
 
 
 def _creation(block: BusCreator) -> _Content:
@@ -55,29 +55,29 @@ def _selection(where: str, path: str) -> _Content:
 
 
 def _assignment(where: str, paths: Sequence[str]) -> _Content:
-    def content(contents: Sequence[Carried]) -> Bus:
+    def content(contents: Sequence[PortContent]) -> Bus:
         bus = _bus(contents[0], where)
-        for path, carried in zip(paths, contents[1:]):
+        for path, element in zip(paths, contents[1:]):
             _element(bus, path, where)
-            bus = bus.replaced(path, carried)
+            bus = bus.replaced(path, element)
         return bus
 
     return content
 
 
-def _bus(carried: Carried, where: str) -> Bus:
-    if isinstance(carried, Bus):
-        return carried
+def _bus(content: PortContent, where: str) -> Bus:
+    if isinstance(content, Bus):
+        return content
     raise DiagramError(
-        f"the input 'bus' is the single signal '{carried}'",
+        f"the input 'bus' is the single signal '{content}'",
         where=where,
         allowed="a bus",
         fix="connect a Bus Creator",
     )
 
 
-def _element(bus: Bus, element: str, where: str) -> Carried:
-    carried = bus.element(element)
-    if carried is None:
+def _element(bus: Bus, element: str, where: str) -> PortContent:
+    content = bus.element(element)
+    if content is None:
         raise UnknownNameError("bus element", element, bus.paths(), where=where)
-    return carried
+    return content

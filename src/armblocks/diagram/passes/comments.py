@@ -12,7 +12,7 @@ import dataclasses
 from collections.abc import Callable, Sequence
 
 from armblocks.diagram.block import Block
-from armblocks.diagram.bus import Bus, Carried
+from armblocks.diagram.bus import Bus, PortContent
 from armblocks.diagram.comments import is_inside, passed_ports
 from armblocks.diagram.grounded import Bypass, Grounded
 from armblocks.diagram.passes.netlist import KnownSignals, Netlist, Replacement, Replacements
@@ -73,7 +73,7 @@ class _Comments:
         contents = {port.name: self.known.at(PortRef(path, port.name)) for port in ports}
         if not ports:
             return
-        if not any(isinstance(carried, Bus) for carried in contents.values()):
+        if not any(isinstance(content, Bus) for content in contents.values()):
             self.blocks[path] = Grounded.of({port.name: self._shape(path, port) for port in ports})
             return
         self.blocks[path] = Bypass.of((), tuple(contents))
@@ -82,12 +82,12 @@ class _Comments:
             for port in ports
         }
 
-    def _zeros(self, path: str, port: Port, carried: Carried) -> Carried:
+    def _zeros(self, path: str, port: Port, content: PortContent) -> PortContent:
         """Zeros with the structure of a signal or bus."""
-        if isinstance(carried, PortRef):
+        if isinstance(content, PortRef):
             return self._zero(path, port.name, self._shape(path, port))
-        zeros = carried
-        for element, source in carried.leaves():
+        zeros = content
+        for element, source in content.leaves():
             shape = self.known.shapes.get(source, ())
             zeros = zeros.replaced(element, self._zero(path, f"{port.name}.{element}", shape))
         return zeros
@@ -143,10 +143,10 @@ _Description = Shape | dict[str, Shape | None]
 """The shape of a signal, or the shapes of the elements of a bus."""
 
 
-def _description_of(known: KnownSignals, carried: Carried) -> _Description | None:
-    if isinstance(carried, PortRef):
-        return known.shapes.get(carried)
-    return {element: known.shapes.get(source) for element, source in carried.leaves()}
+def _description_of(known: KnownSignals, content: PortContent) -> _Description | None:
+    if isinstance(content, PortRef):
+        return known.shapes.get(content)
+    return {element: known.shapes.get(source) for element, source in content.leaves()}
 
 
 def _shapes_fit(one: _Description, other: _Description) -> bool:
@@ -164,5 +164,5 @@ def _text(description: _Description) -> str:
     )
 
 
-def _constant_content(carried: Carried) -> Callable[[Sequence[Carried]], Carried]:
-    return lambda _: carried
+def _constant_content(content: PortContent) -> Callable[[Sequence[PortContent]], PortContent]:
+    return lambda _: content

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from armblocks.diagram.bus import Carried
+from armblocks.diagram.bus import PortContent
 from armblocks.diagram.passes.netlist import Replacements
 from armblocks.diagram.port import PortRef
 from armblocks.errors import DiagramError
 
 
-class Contents:
-    """Finds the signal or bus at output ports; ``carried`` caches the results."""
+class ContentSearch:
+    """Finds the signal or bus at output ports; ``found`` caches the results."""
 
     def __init__(self, replaced: Mapping[str, Replacements], where: str) -> None:
         self._replaced = replaced
         self._where = where
-        self.carried: dict[PortRef, Carried] = {}
+        self.found: dict[PortRef, PortContent] = {}
 
-    def of(self, ref: PortRef) -> Carried:
+    def content(self, ref: PortRef) -> PortContent:
         """The signal or bus at an output port; uses an explicit stack, so that paths may be long.
 
         Raises ``DiagramError`` where replacements form a cycle, and the errors of their contents.
@@ -26,16 +26,16 @@ class Contents:
         route = {ref: None}
         while route:
             last = next(reversed(route))
-            if last in self.carried:
+            if last in self.found:
                 del route[last]
                 continue
             if last.block not in self._replaced:
-                self.carried[last] = last
+                self.found[last] = last
                 continue
             entry = self._replaced[last.block][last.port]
-            missing = next((source for source in entry.sources if source not in self.carried), None)
+            missing = next((source for source in entry.sources if source not in self.found), None)
             if missing is None:
-                self.carried[last] = entry.content([self.carried[source] for source in entry.sources])
+                self.found[last] = entry.content([self.found[source] for source in entry.sources])
             elif missing in route:
                 loop = [str(port) for port in route][list(route).index(missing) :][::-1]
                 raise DiagramError(
@@ -46,4 +46,4 @@ class Contents:
                 )
             else:
                 route[missing] = None
-        return self.carried[ref]
+        return self.found[ref]

@@ -42,10 +42,10 @@ def _expanded(net: Netlist, path: str, view: View) -> View:
     labels: list[str] = []
     view_labels = view.labels or ("",) * len(view.signals)
     for signal, label in zip(view.signals, view_labels):
-        carried = net.at(path, signal)
-        if isinstance(carried, Bus):
-            signals += [f"{signal}.{element}" for element, _ in carried.leaves()]
-            labels += [f"{label}.{element}" if label else element for element, _ in carried.leaves()]
+        content = net.at(path, signal)
+        if isinstance(content, Bus):
+            signals += [f"{signal}.{element}" for element, _ in content.leaves()]
+            labels += [f"{label}.{element}" if label else element for element, _ in content.leaves()]
         else:
             signals.append(signal)
             labels.append(label)

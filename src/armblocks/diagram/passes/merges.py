@@ -28,7 +28,7 @@ def resolve_merges(net: Netlist) -> Netlist:
         return net
     blocks: dict[str, Block] = dict(net.blocks)
     drivers, gates, origins = dict(net.drivers), dict(net.gates), dict(net.origins)
-    carried = dict(net.carried)
+    contents = dict(net.contents)
     for path, block in merges.items():
         outer: Gate = gates.pop(path, {})
         resettable = RESTART in outer
@@ -40,21 +40,21 @@ def resolve_merges(net: Netlist) -> Netlist:
             if active is None:  # a subsystem that is commented out
                 inactive = f"{path}.works{number}"
                 blocks[inactive], origins[inactive] = Grounded.of({"y": ()}), path
-                active = carried[PortRef(inactive, "y")] = PortRef(inactive, "y")
+                active = contents[PortRef(inactive, "y")] = PortRef(inactive, "y")
             drivers[PortRef(path, f"works{number}")] = active
     return dataclasses.replace(
-        net, blocks=blocks, drivers=drivers, gates=gates, origins=origins, carried=carried
+        net, blocks=blocks, drivers=drivers, gates=gates, origins=origins, contents=contents
     )
 
 
 def _active_signal(net: Netlist, path: str, port: str) -> PortRef | None:
     """The signal that is 1 while the subsystem of an input is active; ``None`` if it never is."""
-    carried = net.at(path, port)
-    if isinstance(carried, PortRef) and isinstance(net.blocks[carried.block], Grounded):
+    content = net.at(path, port)
+    if isinstance(content, PortRef) and isinstance(net.blocks[content.block], Grounded):
         return None
-    if isinstance(carried, PortRef) and isinstance(net.blocks[carried.block], HeldOutput):
-        return net.drivers[PortRef(carried.block, "works")]
-    source = f"'{carried}'" if isinstance(carried, PortRef) else "a bus"
+    if isinstance(content, PortRef) and isinstance(net.blocks[content.block], HeldOutput):
+        return net.drivers[PortRef(content.block, "works")]
+    source = f"'{content}'" if isinstance(content, PortRef) else "a bus"
     raise DiagramError(
         f"input '{port}' is {source}, which is not an output of a conditional subsystem",
         where=f"block '{path}' (Merge)",

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from armblocks.diagram.bus import Carried
+from armblocks.diagram.bus import PortContent
 from armblocks.diagram.levels import level_of, name_of
 from armblocks.diagram.passes.netlist import Netlist
 from armblocks.diagram.port import PortRef
@@ -29,11 +29,11 @@ def resolve_names(net: Netlist) -> Netlist:
 def _aliases(net: Netlist) -> dict[str, PortRef]:
     aliases: dict[str, PortRef] = {}
 
-    def add(name: str, carried: Carried) -> None:
-        if isinstance(carried, PortRef):
-            aliases[name] = carried
+    def add(name: str, content: PortContent) -> None:
+        if isinstance(content, PortRef):
+            aliases[name] = content
         else:
-            aliases.update({f"{name}.{path}": source for path, source in carried.leaves()})
+            aliases.update({f"{name}.{path}": source for path, source in content.leaves()})
 
     for path, block in net.blocks.items():
         for port in block.input_ports():
@@ -42,9 +42,9 @@ def _aliases(net: Netlist) -> dict[str, PortRef]:
         if path not in net.replaced:
             continue
         for port in outputs:
-            add(f"{path}/{port.name}", net.carried[PortRef(path, port.name)])
+            add(f"{path}/{port.name}", net.contents[PortRef(path, port.name)])
         if len(outputs) == 1:
-            add(path, net.carried[PortRef(path, outputs[0].name)])
+            add(path, net.contents[PortRef(path, outputs[0].name)])
     for path, block in net.blocks.items():
         if isinstance(block, Outport):
             add(path, net.at(path, "u"))

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from armblocks.diagram.block import Block
-from armblocks.diagram.bus import Carried
+from armblocks.diagram.bus import PortContent
 from armblocks.diagram.diagram import Diagram, Gate
 from armblocks.diagram.levels import joined
 from armblocks.diagram.port import PortRef, View
@@ -20,7 +20,7 @@ from armblocks.equations import Shape
 from armblocks.errors import DiagramError
 
 
-def _first(contents: Sequence[Carried]) -> Carried:
+def _first(contents: Sequence[PortContent]) -> PortContent:
     return contents[0]
 
 
@@ -33,7 +33,7 @@ class Replacement:
     """
 
     sources: tuple[PortRef, ...]
-    content: Callable[[Sequence[Carried]], Carried] = _first
+    content: Callable[[Sequence[PortContent]], PortContent] = _first
 
 
 Replacements = Mapping[str, Replacement]
@@ -44,17 +44,17 @@ Replacements = Mapping[str, Replacement]
 class KnownSignals:
     """Known contents and shapes of the signals in the model without comments."""
 
-    carried: Mapping[PortRef, Carried] = field(default_factory=dict[PortRef, Carried])
+    contents: Mapping[PortRef, PortContent] = field(default_factory=dict[PortRef, PortContent])
     shapes: Mapping[PortRef, Shape] = field(default_factory=dict[PortRef, Shape])
 
-    def at(self, ref: PortRef) -> Carried:
+    def at(self, ref: PortRef) -> PortContent:
         """The signal or bus at an output port of the hierarchy."""
-        return self.carried.get(ref, ref)
+        return self.contents.get(ref, ref)
 
     def shape(self, ref: PortRef) -> Shape | None:
         """The shape at an output port of the hierarchy; ``None`` for a bus and an unknown shape."""
-        carried = self.at(ref)
-        return self.shapes.get(carried) if isinstance(carried, PortRef) else None
+        content = self.at(ref)
+        return self.shapes.get(content) if isinstance(content, PortRef) else None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,7 +85,7 @@ class Netlist:
     """Blocks that share the parameters of another block: see ``Diagram.shares``."""
     origins: Mapping[str, str] = field(default_factory=dict[str, str])
     """For every block that a pass has added, the path of its origin in the hierarchy."""
-    carried: Mapping[PortRef, Carried] = field(default_factory=dict[PortRef, Carried])
+    contents: Mapping[PortRef, PortContent] = field(default_factory=dict[PortRef, PortContent])
     """The signal or bus at every output port; empty before the pass ``signals``."""
     views: tuple[tuple[str, View], ...] = ()
     """The views, each with its block; empty before the pass ``displays``."""
@@ -119,17 +119,17 @@ class Netlist:
         """A copy of the netlist with replacements for further blocks."""
         return dataclasses.replace(self, replaced={**self.replaced, **replaced})
 
-    def at(self, path: str, port: str) -> Carried:
+    def at(self, path: str, port: str) -> PortContent:
         """The signal or bus at an input port, after the pass ``signals``."""
-        return self.carried[self.drivers[PortRef(path, port)]]
+        return self.contents[self.drivers[PortRef(path, port)]]
 
     def one_signal(self, path: str, port: str) -> PortRef:
         """The signal at an input port, after the pass ``signals``. Raises ``DiagramError`` for a bus."""
-        carried = self.at(path, port)
-        if isinstance(carried, PortRef):
-            return carried
+        content = self.at(path, port)
+        if isinstance(content, PortRef):
+            return content
         raise DiagramError(
-            f"input '{port}' receives a bus with the elements {', '.join(carried.elements)}",
+            f"input '{port}' receives a bus with the elements {', '.join(content.elements)}",
             where=self.label(path),
             allowed="a single signal",
             fix="put a Bus Selector in between",

@@ -54,11 +54,11 @@ def _wires(diagram: Diagram) -> dict[str, WireKind]:
         for port, shape in outputs.items()
     }
     named = {str(ref): kind for ref, kind in kinds.items()}
-    for port, carried in form.carried.items():
-        if isinstance(carried, Bus):
+    for port, content in form.contents.items():
+        if isinstance(content, Bus):
             named[str(port)] = WireKind(shape=[], unit="", bus=True)
-        elif carried in kinds:
-            named[str(port)] = kinds[carried]
+        elif content in kinds:
+            named[str(port)] = kinds[content]
     return named
 
 
