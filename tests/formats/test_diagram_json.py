@@ -336,7 +336,7 @@ def with_change(*path: str | int, value: object) -> bytes:
 GAIN = ("blocks", "gain")
 FAULTS: list[tuple[bytes, type[ArmblocksError], str]] = [
     (b"{}", FormatError, "the key 'format' is missing"),
-    (b"[]", FormatError, "the value is an array of 0. Allowed: an object"),
+    (b"[]", FormatError, "the value is an array of 0 elements. Allowed: an object"),
     (with_change("format", value=7), FormatError, "the format version is 7.*update armblocks"),
     (
         with_change(*GAIN, "type", value="Gian"),

@@ -1,7 +1,7 @@
 """A strict JSON reader, whose messages have file, line and the path inside the document.
 
-It requires UTF-8, limits size and depth, and rejects duplicate keys, NaN and infinity (``json`` alone accepts
-``NaN`` and ``1e999``). :mod:`armblocks.formats.canonical_json` writes JSON.
+The reader requires UTF-8, limits size and depth, and rejects duplicate keys, NaN and infinity (``json`` alone
+accepts ``NaN`` and ``1e999``). :mod:`armblocks.formats.canonical_json` writes JSON.
 """
 
 from __future__ import annotations
@@ -101,7 +101,9 @@ class Node:
         word, known = self.text(), list(choices)
         if word not in known:
             raise self.error(
-                f"'{_short(word)}' is not known here", allowed=", ".join(known), fix=_nearest(word, known)
+                f"'{_short(word)}' is not known here",
+                allowed=", ".join(known),
+                fix=_nearest(word, known) or "choose an allowed value",
             )
         return word
 
@@ -112,7 +114,7 @@ class Node:
 def read_document(data: bytes, name: str, max_bytes: int, max_depth: int = MAX_DEPTH) -> Node:
     """The root of a JSON document. ``name`` is the name of the file in messages.
 
-    ``max_bytes`` and ``max_depth`` limit its size and the nesting of objects and arrays.
+    ``max_bytes`` and ``max_depth`` limit the size of the document and the nesting of objects and arrays.
 
     Raises ``FormatError`` for a text that is not strict JSON or exceeds the limits.
     """
@@ -121,14 +123,14 @@ def read_document(data: bytes, name: str, max_bytes: int, max_depth: int = MAX_D
             "the document is too large",
             where=name,
             allowed=f"at most {max_bytes} bytes",
-            fix="split it, or store long tables in separate files",
+            fix="split the document, or store long tables in separate files",
         )
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         raise FormatError(
-            "the file is not UTF-8 text", where=f"{name}:{line}", fix="save it as UTF-8"
+            "the file is not UTF-8 text", where=f"{name}:{line}", fix="save the file as UTF-8"
         ) from error
     document = Document(name, text)
     _check_depth(document, max_depth)
@@ -144,12 +146,12 @@ def read_document(data: bytes, name: str, max_bytes: int, max_depth: int = MAX_D
         raise FormatError(
             f"the file is not valid JSON: {error.msg} (column {error.colno})",
             where=f"{name}:{error.lineno}",
-            fix="correct that place: a comma, a bracket or a quote may be missing",
+            fix="correct this line: a comma, a bracket or a quote may be missing",
         ) from error
     except _RejectedError as rejection:
         line = _line_with(text, rejection.token_text)
         raise FormatError(
-            rejection.what, where=f"{name}:{line}", allowed=rejection.allowed, fix="correct that line"
+            rejection.what, where=f"{name}:{line}", allowed=rejection.allowed, fix="correct this line"
         ) from None
     root = Node(document, (), value)
     _check_text(root)
@@ -168,9 +170,13 @@ def describe(value: object) -> str:
         case int() | float():
             return f"the number {value!r}"
         case list():
-            return f"an array of {len(cast('list[object]', value))}"
+            return _array_text(len(cast("list[object]", value)))
         case _:
             return "an object"
+
+
+def _array_text(length: int) -> str:
+    return f"an array of {length} element{'' if length == 1 else 's'}"
 
 
 def path_text(path: KeyPath) -> str:
@@ -217,7 +223,7 @@ def closed_members(node: Node, known: Iterable[str], required: Iterable[str] = (
             raise member.error(
                 f"the key '{_short(key)}' is not known here",
                 allowed=", ".join(names),
-                fix=_nearest(key, names),
+                fix=_nearest(key, names) or f"remove '{_short(key)}'",
             )
     for key in required:
         if key not in members:
@@ -351,4 +357,4 @@ def _short(text: str) -> str:
 
 def _nearest(word: str, known: list[str]) -> str:
     matches = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
-    return f"did you mean '{matches[0]}'?" if matches else "remove it"
+    return f"did you mean '{matches[0]}'?" if matches else ""
