@@ -16,7 +16,7 @@ export function ContextMenu() {
     <Menu
       key={openCount}
       opened={opened}
-      onChange={(next) => !next && closeMenu()}
+      onChange={(isOpen) => !isOpen && closeMenu()}
       position="bottom-start"
       offset={2}
       shadow="md"

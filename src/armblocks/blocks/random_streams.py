@@ -23,6 +23,7 @@ SEED_BITS = 16
 _M1, _M2 = 4294967087.0, 4294944443.0
 _A12, _A13N, _A21, _A23N = 1403580.0, 810728.0, 527612.0, 1370589.0
 _START = 12345.0
+"""Each initial term of both recurrences."""
 
 _Matrix = tuple[tuple[int, ...], ...]
 _NAMES = tuple(f"s{recurrence}{lag}" for recurrence in (1, 2) for lag in (3, 2, 1))
@@ -67,7 +68,7 @@ def draw(x: Signals) -> tuple[SX, dict[str, SX]]:
 
 
 def normal_quantile(probability: SX) -> SX:
-    """The quantile of the standard normal distribution at p, 0 < p < 1; relative error about 1e-16.
+    """The quantile of the standard normal distribution for a probability in (0, 1); relative error 1e-16.
 
     M. J. Wichura, Algorithm AS 241: The percentage points of the normal distribution, Applied Statistics
     37(3), 1988 (PPND16).

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 class RunMethod:
-    """Creates the native loops of a run, and reports the methods and the reasons for them."""
+    """Creates the native loops of a run, and reports the methods and the reasons for their choice."""
 
     def __init__(
         self,
@@ -125,9 +125,9 @@ class RunMethod:
             self._reason = f"auto: {stiff.title}, because the previous run detected stiffness"
         if checkpoint is not None:
             assert self._tableau is not None  # the settings name a method
-            own = checkpoint.method == self._tableau.name
+            same_method = checkpoint.method == self._tableau.name
             native = self._integrator(self._tableau)
-            if not own or not fits(checkpoint, native.workspace, native.sizes):
+            if not same_method or not fits(checkpoint, native.workspace, native.sizes):
                 raise damaged_state(state, self._compiled.name)
         accuracy = "exactly as the previous run" if checkpoint is not None else "with a restart of the solver"
         self._start_reason = f"; continues from {state.time:g} s, {accuracy}"
@@ -159,10 +159,10 @@ def _starting_point(compiled: CompiledSystem, p: Array) -> RunPoint:
     )
     for layout, values in ((compiled.states, start.x), (compiled.discrete, start.z)):
         for slot in layout:
-            given = values[layout.ranges[slot.name]]
-            if not np.isfinite(given).all():
+            initial_value = values[layout.ranges[slot.name]]
+            if not np.isfinite(initial_value).all():
                 raise SimulationError(
-                    f"the initial value of state '{slot.name}' is {given.tolist()}",
+                    f"the initial value of state '{slot.name}' is {initial_value.tolist()}",
                     where=compiled.name,
                     allowed="finite numbers",
                     fix="change the block's initial value",

@@ -14,7 +14,7 @@ class RobotEdit(Edit):
 
 
 class SetCell(RobotEdit):
-    """Type into one cell of a link, or of the robot if ``link`` is empty."""
+    """Set the text of one cell of a link, or of the robot if ``link`` is empty."""
 
     kind: Literal["cell"] = "cell"
     link: str
@@ -47,7 +47,7 @@ class RemoveJoint(RobotEdit):
 
 
 class MoveJoint(RobotEdit):
-    """Exchange a link of a chain with its neighbour."""
+    """Exchange a link of a chain with the previous link (``by`` is -1) or with the next one (1)."""
 
     kind: Literal["move_joint"] = "move_joint"
     link: str
@@ -55,7 +55,7 @@ class MoveJoint(RobotEdit):
 
 
 class SetConvention(RobotEdit):
-    """Interpret the D-H rows by the other convention, or convert them for the same arm (``keep_arm``)."""
+    """Interpret the D-H rows in another convention, or with ``keep_arm`` convert them for the same arm."""
 
     kind: Literal["convention"] = "convention"
     convention: Literal["standard", "modified"]
