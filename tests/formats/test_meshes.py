@@ -223,11 +223,11 @@ INVALID = [
     ("suffix", "data", "words"), INVALID, ids=[f"{s}{k}" for k, (s, _, _) in enumerate(INVALID)]
 )
 def test_invalid_meshes_are_refused(suffix: str, data: str | bytes, words: str) -> None:
-    began = time.perf_counter()
+    began = time.process_time()
     with pytest.raises(FormatError) as refused:
         corners(data, suffix)
     assert words in str(refused.value)
-    assert time.perf_counter() - began < 10
+    assert time.process_time() - began < 10
 
 
 def test_nodes_that_multiply_are_refused_in_bounded_time() -> None:
@@ -237,12 +237,12 @@ def test_nodes_that_multiply_are_refused_in_bounded_time() -> None:
         for k in range(40)
     )
     library = f'<library_nodes>{nodes}<node id="n40">{INSTANCE}</node></library_nodes>'
-    began = time.perf_counter()
+    began = time.process_time()
     with pytest.raises(FormatError, match="too many nodes"):
         corners(dae('<node><instance_node url="#n0"/></node>', libraries=library), ".dae")
     with pytest.raises(FormatError, match="too many nodes"):
         corners(glb_box([*({"children": [k + 1, k + 1]} for k in range(40)), {"mesh": 0}]), ".glb")
-    assert time.perf_counter() - began < 10
+    assert time.process_time() - began < 10
 
 
 @settings(max_examples=150, deadline=None)

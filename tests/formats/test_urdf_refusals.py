@@ -97,14 +97,14 @@ INVALID_FILES = [
 
 @pytest.mark.parametrize(("text", "words"), INVALID_FILES, ids=[words[:50] for _, words in INVALID_FILES])
 def test_invalid_files_are_refused_with_file_line_and_reason(text: str, words: str) -> None:
-    began = time.perf_counter()
+    began = time.process_time()
     with pytest.raises(ArmblocksError) as refused:
         read_urdf(text.encode(), "r.urdf", FileContext())
     assert words in str(refused.value)
     assert str(refused.value).startswith("r.urdf")
     assert len(str(refused.value)) < 400
     assert "Fix: " in str(refused.value)
-    assert time.perf_counter() - began < 5
+    assert time.process_time() - began < 5
 
 
 def test_a_hint_names_the_decimal_point() -> None:
@@ -120,20 +120,20 @@ def test_the_file_has_a_maximum_size(tmp_path: Path) -> None:
 
 
 def test_one_attribute_of_many_megabytes_is_read_in_bounded_time() -> None:
-    began = time.perf_counter()
+    began = time.process_time()
     with pytest.raises(FormatError, match="is not a number"):
         read_urdf(inertial("1" * (4 * 2**20)).encode(), "r.urdf", FileContext())
-    assert time.perf_counter() - began < 5
+    assert time.process_time() - began < 5
 
 
 def test_a_chain_of_1000_links_is_read(tmp_path: Path) -> None:
     links = "".join(f'<link name="l{k}"/>' for k in range(1000))
     joints = "".join(jointed(f"l{k}", f"l{k + 1}", name=f"j{k}") for k in range(999))
-    began = time.perf_counter()
+    began = time.process_time()
     robot = read_urdf(tree(joints, links=links).encode(), "r.urdf", FileContext())
     assert robot.n == 999
     assert robot.links[-1].name == "l999"
-    assert time.perf_counter() - began < 5
+    assert time.process_time() - began < 5
 
 
 BASE = random_urdf(0, links=4)

@@ -97,7 +97,7 @@ def test_an_expansion_without_an_end_is_stopped(tmp_path: Path, monkeypatch: pyt
     began = time.perf_counter()
     with pytest.raises(FormatError, match=r"the expansion takes more than 1.5 s|ended without a result"):
         load_robot(written(tmp_path, '<link name="${9**9**9**9}"/>'))
-    assert time.perf_counter() - began < 5
+    assert time.perf_counter() - began < 60  # without the limit it would take years
 
 
 def test_document_types_are_refused_in_included_files_too(tmp_path: Path) -> None:

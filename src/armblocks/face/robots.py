@@ -24,7 +24,7 @@ def load_robot(
 ) -> Arm:
     """A shipped robot by name (``"kr180"``), or a robot from a file.
 
-    Files: ``.json``, ``.urdf``, ``.xacro``, and toolbox scripts ``.m``.
+    Files: ``.json``, ``.urdf``, ``.xacro``, MJCF ``.xml``, and toolbox scripts ``.m``.
 
     ``name`` selects one of several robots in a script. ``friction_model``: the formula of another toolbox
     release, see :class:`FrictionModel`; by default that of the file. ``tip``: the link that carries the tool,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, cast
 from xml.sax.handler import ContentHandler
@@ -83,22 +83,26 @@ class Element:
         """The number of an attribute; ``default`` if it is absent."""
         if attribute not in self.attributes and default is not None:
             return default
-        (value,) = self._numbers(attribute, self.required(attribute, "a number"), 1)
+        self.required(attribute, "a number")
+        (value,) = self.numbers(attribute, (1,))
         return value
 
     def vector(self, attribute: str, default: tuple[float, float, float]) -> tuple[float, float, float]:
         """Three numbers of an attribute, separated by spaces; ``default`` if it is absent."""
         if attribute not in self.attributes:
             return default
-        x, y, z = self._numbers(attribute, self.attributes[attribute], 3)
+        x, y, z = self.numbers(attribute, (3,))
         return x, y, z
 
-    def _numbers(self, attribute: str, text: str, count: int) -> list[float]:
+    def numbers(self, attribute: str, counts: Collection[int]) -> list[float]:
+        """The numbers of an attribute that is present; ``counts``: how many there may be."""
+        text = self.attributes[attribute]
         words = re.split(r"\s*,\s+|\s+", text.strip())  # a comma before a space separates, as a space does
-        if len(words) != count:
+        if len(words) not in counts:
+            allowed = f"{min(counts)} to {max(counts)}" if len(counts) > 1 else str(max(counts))
             raise self.error(
                 f"the attribute '{attribute}' has {len(words)} values: '{shortened(text)}'",
-                allowed=f"{count} number{'s' * (count > 1)}, separated by spaces",
+                allowed=f"{allowed} number{'s' * (max(counts) > 1)}, separated by spaces",
             )
         values: list[float] = []
         for word in words:

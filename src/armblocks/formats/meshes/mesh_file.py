@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import PurePath
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from armblocks.errors import FormatError
 from armblocks.formats.meshes.dae import dae_corners
@@ -17,6 +17,8 @@ from armblocks.robot.shapes import Material, Mesh, Pose
 
 MAX_BYTES = 64 * 2**20
 """Maximum size of a mesh file."""
+MAX_LENGTH = 1e6
+"""Maximum magnitude of the coordinates of a mesh, m."""
 MAX_TRIANGLES = 2000
 """Maximum number of triangles of a mesh after reduction."""
 
@@ -32,7 +34,7 @@ READERS: Mapping[str, Callable[[bytes, str], Corners]] = {
 """The readers of mesh files by suffix: functions of a file's bytes and its name in messages."""
 
 
-def mesh_corners(data: bytes, name: str, scale: NDArray[np.float64]) -> Corners:
+def mesh_corners(data: bytes, name: str, scale: ArrayLike = (1.0, 1.0, 1.0)) -> Corners:
     """The corners of the triangles of a mesh file, multiplied by ``scale`` along x, y, z.
 
     ``name``: the file, whose suffix selects the reader. Raises ``FormatError``.
@@ -46,16 +48,20 @@ def mesh_corners(data: bytes, name: str, scale: NDArray[np.float64]) -> Corners:
             fix="convert the mesh",
         )
     with np.errstate(all="ignore"):  # numbers that are not finite are refused below
-        corners = READERS[suffix](data, name) * scale
-    if not len(corners) or not np.isfinite(corners).all() or np.abs(corners).max() > 1e6:
+        corners = scaled(READERS[suffix](data, name), np.asarray(scale))
+    if not len(corners) or not np.isfinite(corners).all() or np.abs(corners).max() > MAX_LENGTH:
         raise FormatError(
             "the mesh has no triangles, or points that are not finite",
             where=name,
             allowed="triangles within 1000 km",
             fix="export the mesh again",
         )
-    # A mirror image: the corners remain counter-clockwise seen from outside.
-    return corners[:, ::-1] if scale.prod() < 0 else corners
+    return corners
+
+
+def scaled(corners: Corners, scale: NDArray[np.float64]) -> Corners:
+    """The triangles multiplied by ``scale`` along x, y, z; a mirror image keeps its outside outside."""
+    return (corners * scale)[:, ::-1] if scale.prod() < 0 else corners * scale
 
 
 def drawn_mesh(corners: Corners, material: Material, pose: Pose) -> Mesh:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import PurePath
 
-import numpy as np
-
 from armblocks.errors import FormatError
 from armblocks.files import read_bounded
 from armblocks.formats.file_findings import FileContext
@@ -92,7 +90,7 @@ def _mesh(
         reason = path
     else:
         try:
-            corners = mesh_corners(read_bounded(path, MAX_BYTES), file, np.array(scale))
+            corners = mesh_corners(read_bounded(path, MAX_BYTES), file, scale)
             return [drawn_mesh(corners, material, pose_rows(pose))]
         except FormatError as error:
             reason = error.what

@@ -1,0 +1,1 @@
+"""Robots from MJCF, the model files of MuJoCo."""

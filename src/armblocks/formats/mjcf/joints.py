@@ -1,0 +1,122 @@
+"""Joints of MJCF: kind, axis, limits, friction, and the torque limits that actuators give."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from armblocks.formats.file_findings import FileContext
+from armblocks.formats.mjcf.rules import FRICTION, LIMIT, STIFFNESS, TENDON
+from armblocks.formats.mjcf.settings import Defaults, Settings, sections
+from armblocks.formats.xml_elements import Element, note, shortened
+from armblocks.robot import Joint, JointLimits, Motor, Prismatic, Revolute
+from armblocks.spatial import Vector3
+
+_KINDS: Mapping[str, type[Joint]] = {"hinge": Revolute, "slide": Prismatic}
+_TRANSMISSIONS_OF_TENDONS = ("tendon", "cranksite", "slidersite")
+
+
+class PlacedJoint(NamedTuple):
+    """A joint, the ``position`` of its axis in the frame of its body (m), and its motor."""
+
+    joint: Joint
+    position: Vector3
+    motor: Motor | None
+
+
+def joint_of(
+    element: Element, settings: Settings, torques: Mapping[str, float], context: FileContext
+) -> PlacedJoint:
+    """The joint of an element with its defaults. Raises ``FormatError`` for other kinds than hinge and slide.
+
+    In MJCF the pose of a body is that at the joint coordinate ``ref``, so the offset is ``-ref``.
+    """
+    kind = element.attributes.get("type", "hinge").strip()
+    if kind not in _KINDS:
+        freedoms = " with 3 degrees of freedom" if kind == "ball" else ""
+        raise element.error(
+            f"the joint is of type '{shortened(kind)}'{freedoms}, which is not supported",
+            allowed="hinge, slide; free joints of bodies in the world",
+            fix="replace it by hinges",
+        )
+    axis = element.vector("axis", (0.0, 0.0, 1.0))
+    if not 1e-10 < math.hypot(*axis) < math.inf:
+        raise element.error(
+            "the axis of the joint is zero", allowed="a direction such as 0 0 1", fix="set the axis"
+        )
+    unit = settings.angle_unit if kind == "hinge" else 1.0
+    if _first(element, "stiffness") != 0.0:
+        note(context, STIFFNESS, element, "the spring of the joint is left out")
+    limits = JointLimits(
+        position=_range(element, unit, settings, context),
+        torque=torques.get(element.attributes.get("name", ""), _force_limit(element, "actuatorfrcrange")),
+    )
+    joint = _KINDS[kind](axis=axis, offset=-unit * element.number("ref", 0.0), limits=limits)
+    return PlacedJoint(joint, element.vector("pos", (0.0, 0.0, 0.0)), _motor_of(element, context))
+
+
+def _first(element: Element, attribute: str) -> float:
+    """The first number of an attribute (stiffness and damping may be polynomials); 0 if it is absent."""
+    return element.numbers(attribute, range(1, 9))[0] if attribute in element.attributes else 0.0
+
+
+def _range(
+    element: Element, unit: float, settings: Settings, context: FileContext
+) -> tuple[float, float] | None:
+    limited = element.attributes.get("limited", "auto").strip()
+    if "range" not in element.attributes or limited == "false":
+        return None
+    if limited == "auto" and not settings.limits_by_range:
+        return None
+    low, high = (unit * value for value in element.numbers("range", (2,)))
+    if low > high or (low == high == 0.0):
+        note(context, LIMIT, element, f"the range from {low:g} to {high:g} is left out")
+        return None
+    return low, high
+
+
+def _motor_of(element: Element, context: FileContext) -> Motor | None:
+    """The motor with the armature as rotor inertia, and with the friction of the joint."""
+    damping, friction = _first(element, "damping"), element.number("frictionloss", 0.0)
+    armature = element.number("armature", 0.0)
+    if min(damping, friction, armature) < 0.0:
+        given = f"damping {damping:g}, frictionloss {friction:g}, armature {armature:g}"
+        what = f"{given}: negative values are left out"
+        note(context, FRICTION, element, what)
+        damping, friction, armature = (max(value, 0.0) for value in (damping, friction, armature))
+    if damping == friction == armature == 0.0:
+        return None
+    return Motor(
+        inertia=armature, gear_ratio=1.0, viscous_friction=damping, coulomb_friction=(friction, -friction)
+    )
+
+
+def _force_limit(element: Element, attribute: str, factor: float = 1.0) -> float | None:
+    """The magnitude of a range of forces that is symmetric about zero; ``None`` without one."""
+    if attribute not in element.attributes:
+        return None
+    low, high = element.numbers(attribute, (2,))
+    limit = max(-low, high) * abs(factor)
+    return limit if 0.0 < limit < math.inf else None
+
+
+def torque_limits(root: Element, defaults: Defaults, context: FileContext) -> dict[str, float]:
+    """The largest torque (N m or N) of the actuators of each joint, by the joint's name.
+
+    It is the force range of the actuator, or the control range of a motor, times the magnitude of the gear.
+    """
+    limits: dict[str, float] = {}
+    for given in sections(root, "actuator"):
+        actuator = defaults.applied(given)
+        if any(name in actuator.attributes for name in _TRANSMISSIONS_OF_TENDONS):
+            note(context, TENDON, actuator, "the actuator does not act on a joint; it is left out")
+            continue
+        joint = actuator.attributes.get("joint", "").strip()
+        gear = actuator.numbers("gear", range(1, 7))[0] if "gear" in actuator.attributes else 1.0
+        force = _force_limit(actuator, "forcerange", gear)
+        if force is None and actuator.tag == "motor":
+            force = _force_limit(actuator, "ctrlrange", gear)
+        if joint and force is not None:
+            limits[joint] = max(force, limits.get(joint, 0.0))
+    return limits

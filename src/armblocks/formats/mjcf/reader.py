@@ -1,0 +1,249 @@
+"""Robots from MJCF: the tree of the bodies of ``<worldbody>``.
+
+A body with several joints becomes a series of links: one without mass for each joint but the last. Each of
+them has the name of its joint; the last one has the name of the body. A body whose joint is free is fixed at
+its initial pose. Shapes of the world itself are surroundings and not part of the robot.
+
+Source: MuJoCo documentation, *XML reference* and *Modeling* (versions 3.x).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import PurePath
+
+from armblocks.errors import FormatError, RobotError
+from armblocks.formats.file_findings import FileContext
+from armblocks.formats.mjcf.includes import with_includes
+from armblocks.formats.mjcf.inertials import mass_properties
+from armblocks.formats.mjcf.joints import joint_of, torque_limits
+from armblocks.formats.mjcf.meshes import MeshAssets
+from armblocks.formats.mjcf.poses import pose_of
+from armblocks.formats.mjcf.rules import EQUALITY, FREE, STIFFNESS, TENDON, UNREAD
+from armblocks.formats.mjcf.settings import MAIN, Defaults, Settings, sections, settings_of
+from armblocks.formats.mjcf.shapes import Geom, drawn, geom_of, is_collision_only
+from armblocks.formats.xml_elements import Element, note, read_elements, shortened
+from armblocks.robot import Fixed, Link, Robot, deepest_tip, with_tip
+from armblocks.robot.checks import MAX_LINKS
+from armblocks.robot.robot import STANDARD_GRAVITY
+from armblocks.robot.shapes import Material, Shape
+from armblocks.spatial import Transform, transl
+
+_NOT_READ = ("replicate", "attach", "composite", "flexcomp", "plugin")
+_MAX_NAME = 200
+
+
+def read_mjcf(data: bytes, file: str, context: FileContext) -> Robot:
+    """The robot of an MJCF file. ``file`` is its name in messages; findings are added to ``context``.
+
+    Raises ``FormatError`` with file and line for XML that cannot be read, for numbers that are not finite,
+    for included files that cannot be read, and for ball joints.
+    """
+    root = read_elements(data, file)
+    if root.tag not in ("mujoco", "mujocoinclude"):
+        raise root.error(
+            f"the root element is <{shortened(root.tag)}>",
+            allowed="<mujoco>: an MJCF file",
+            fix="give a URDF file the suffix .urdf, and an SDF file .sdf",
+        )
+    root = with_includes(root, context)
+    model = _Model(root, context)
+    links = model.links()
+    if not links:
+        raise root.error(
+            "the model has no bodies",
+            allowed="<worldbody> with <body> elements",
+            fix="load the file that includes this one",
+        )
+    name = root.attributes.get("model", "").strip() or PurePath(file).stem
+    try:
+        robot = Robot(name=name, links=tuple(links), gravity=_gravity(root))
+        return with_tip(robot, deepest_tip(links))
+    except RobotError as error:
+        raise FormatError(
+            f"{error.where}: {error.what}", where=file, allowed=error.allowed, fix=error.fix
+        ) from error
+
+
+def _gravity(root: Element) -> tuple[float, float, float]:
+    gravity = STANDARD_GRAVITY
+    is_on = True
+    for option in root.all("option"):
+        gravity = option.vector("gravity", gravity)
+        for flag in option.all("flag"):
+            is_on = flag.attributes.get("gravity", "enable").strip() != "disable"
+    return gravity if is_on else (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Place:
+    """Where an element is: the parent link, the pose of the frame around it, and its default class."""
+
+    parent: str | None
+    pose: Transform = field(default_factory=Transform)
+    default_class: str = MAIN
+
+
+@dataclass(kw_only=True)
+class _Contents:
+    """The elements of one body, those in its frames included, each with the pose of its frame in the body."""
+
+    joints: list[tuple[Element, Transform]] = field(default_factory=list[tuple[Element, Transform]])
+    geoms: list[Geom] = field(default_factory=list[Geom])
+    bodies: list[tuple[Element, _Place]] = field(default_factory=list[tuple[Element, _Place]])
+
+
+class _Model:
+    """The parts of the file that concern all bodies."""
+
+    def __init__(self, root: Element, context: FileContext) -> None:
+        self.root = root
+        self.context = context
+        self.settings: Settings = settings_of(root)
+        self.defaults = Defaults(root)
+        self.meshes = MeshAssets(root, self.defaults, self.settings, context)
+        self.torques = torque_limits(root, self.defaults, context)
+        self.body_names = {body.attributes.get("name", "").strip() for body in _bodies(root)}
+        self.names: set[str] = set()
+        self._note_left_out()
+
+    def links(self) -> list[Link]:
+        """The links of all bodies, depth first."""
+        links: list[Link] = []
+        waiting: list[tuple[Element, _Place]] = []
+        for world in reversed([*self.root.all("worldbody")]):
+            default_class = world.attributes.get("childclass", MAIN)
+            found = self._contents(world, _Place(parent=None, default_class=default_class), shapes=False)
+            waiting += reversed(found.bodies)
+        while waiting:
+            body, place = waiting.pop()
+            series, bodies = self._body(body, place)
+            links += series
+            if len(links) > MAX_LINKS:
+                raise body.error(
+                    "the model has too many bodies", allowed=f"at most {MAX_LINKS}", fix="split the model"
+                )
+            waiting += reversed(bodies)
+        total = sum(link.mass for link in links)
+        if self.settings.total_mass is not None and total > 0:
+            factor = self.settings.total_mass / total
+            links = [_scaled(link, factor) for link in links]
+        return links
+
+    def _body(self, body: Element, place: _Place) -> tuple[list[Link], list[tuple[Element, _Place]]]:
+        """The links of a body, and the bodies inside it."""
+        default_class = body.attributes.get("childclass", place.default_class)
+        pose = place.pose @ pose_of(body, self.settings)
+        inside = self._contents(body, replace(place, pose=Transform(), default_class=default_class))
+        name = self._free_name(body.attributes.get("name", ""), "body")
+        self.context.lines[name] = body.line
+        series: list[Link] = []
+        parent, before, offset = place.parent, pose, transl(0.0, 0.0, 0.0)
+        joints = [*self._joints(inside, body)]
+        for index, (element, around) in enumerate(joints):
+            placed = joint_of(element, self.settings, self.torques, self.context)
+            at = transl(*around.apply(placed.position))
+            axis = Transform(rotation=around.rotation).apply(placed.joint.axis)
+            is_last = index == len(joints) - 1
+            link = name if is_last else self._free_name(element.attributes.get("name", ""), f"{name} joint")
+            series.append(
+                Link(
+                    name=link,
+                    parent=parent,
+                    joint=replace(placed.joint, axis=axis),
+                    before=before @ at,
+                    after=at.inverse(),
+                    motor=placed.motor,
+                    geometry=None if is_last else (),
+                )
+            )
+            parent, before = link, offset
+        if not series:
+            series.append(Link(name=name, parent=parent, joint=Fixed(), before=before))
+        properties = mass_properties(body, inside.geoms, self.settings, self.meshes, self.context)
+        series[-1] = replace(
+            series[-1],
+            mass=properties.mass,
+            centre_of_mass=properties.centre,
+            inertia=properties.inertia,
+            geometry=self._drawing(body, inside.geoms),
+        )
+        return series, [(child, replace(at, parent=name)) for child, at in inside.bodies]
+
+    def _contents(self, element: Element, place: _Place, *, shapes: bool = True) -> _Contents:
+        """The joints, shapes and bodies of a body or of the world; frames are replaced by their contents."""
+        contents = _Contents()
+        waiting = [(child, place) for child in reversed(element.children)]
+        while waiting:
+            child, at = waiting.pop()
+            if child.tag == "frame":
+                pose = at.pose @ pose_of(child, self.settings)
+                default_class = child.attributes.get("childclass", at.default_class)
+                inner = replace(at, pose=pose, default_class=default_class)
+                waiting += [(grandchild, inner) for grandchild in reversed(child.children)]
+            elif child.tag == "body":
+                contents.bodies.append((child, at))
+            elif child.tag in ("joint", "freejoint"):
+                contents.joints.append((self.defaults.applied(child, at.default_class), at.pose))
+            elif child.tag == "geom" and shapes:
+                geom = self.defaults.applied(child, at.default_class)
+                contents.geoms.append(geom_of(geom, at.pose, self.settings))
+            elif child.tag in _NOT_READ:
+                note(self.context, UNREAD, child, f"the element <{child.tag}> is not read", element.label)
+        return contents
+
+    def _joints(self, inside: _Contents, body: Element) -> Iterator[tuple[Element, Transform]]:
+        """The joints that move the body; a free joint is left out with a finding."""
+        for element, around in inside.joints:
+            if element.tag == "freejoint" or element.attributes.get("type", "").strip() == "free":
+                what = "the body moves freely; here it is fixed at its initial pose"
+                note(self.context, FREE, element, what, body.label)
+            else:
+                yield element, around
+
+    def _drawing(self, body: Element, geoms: list[Geom]) -> tuple[Shape, ...]:
+        """The shapes of a body for drawings: collision shapes only where there are no others."""
+        visible = [geom for geom in geoms if not is_collision_only(geom.element)] or geoms
+        label, context = body.label, self.context
+        return tuple(
+            shape for geom in visible for shape in drawn(geom, self.meshes, label, context, Material.PAINT)
+        )
+
+    def _free_name(self, wanted: str, substitute: str) -> str:
+        """The name of an element, or a new one if it has none or if it is taken; bodies keep their names."""
+        base = wanted.strip()[:_MAX_NAME] or substitute
+        name, number = base, 2
+        is_body = substitute == "body" and wanted.strip() != ""
+        while name in self.names or (name in self.body_names and not (is_body and name == base)):
+            name, number = f"{base} {number}", number + 1
+        self.names.add(name)
+        return name
+
+    def _note_left_out(self) -> None:
+        """Findings for the parts of a model that a robot does not have."""
+        for constraint in sections(self.root, "equality"):
+            if constraint.attributes.get("active", "true").strip() != "false":
+                what = f"the constraint <{shortened(constraint.tag)}> is left out: its joints are independent"
+                note(self.context, EQUALITY, constraint, what)
+        for tendon in sections(self.root, "tendon"):
+            given = self.defaults.applied(tendon)
+            if any(given.number(name, 0.0) for name in ("stiffness", "damping", "frictionloss")):
+                note(self.context, TENDON, tendon, "the forces of the tendon are left out")
+        for option in self.root.all("option"):
+            if option.number("density", 0.0) or option.number("viscosity", 0.0):
+                note(self.context, STIFFNESS, option, "the forces of the surrounding medium are left out")
+
+
+def _bodies(element: Element) -> Iterator[Element]:
+    """All bodies inside an element."""
+    for child in element.children:
+        if child.tag == "body":
+            yield child
+        yield from _bodies(child)
+
+
+def _scaled(link: Link, factor: float) -> Link:
+    """The link with its mass and inertia multiplied by a factor."""
+    rows = tuple(tuple(factor * value for value in row) for row in link.inertia)
+    return replace(link, mass=factor * link.mass, inertia=rows)

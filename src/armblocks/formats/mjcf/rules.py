@@ -1,0 +1,59 @@
+"""The rules that findings about MJCF files refer to."""
+
+from __future__ import annotations
+
+from armblocks.formats.file_findings import Rule
+
+FREE = Rule(
+    code="mjcf-free",
+    allowed="bodies that are connected to the base by hinges and slides",
+    remedy="fix the body to the base, or model the motion of the base by hinges and slides",
+)
+STIFFNESS = Rule(
+    code="mjcf-stiffness",
+    allowed="joints without springs, and no surrounding medium",
+    remedy="add the forces to the joint torques",
+)
+EQUALITY = Rule(
+    code="mjcf-equality",
+    allowed="joints that move independently, in a tree",
+    remedy="satisfy the constraint by the joint coordinates and torques that are given",
+)
+TENDON = Rule(
+    code="mjcf-tendon",
+    allowed="actuators at joints",
+    remedy="compute the joint torques of the tendons separately",
+)
+LIMIT = Rule(
+    code="mjcf-limit",
+    allowed="range limits in increasing order",
+    remedy="correct the range, or leave it out where it is unknown",
+)
+FRICTION = Rule(
+    code="mjcf-friction",
+    allowed="damping, frictionloss and armature of zero or more",
+    remedy="correct the number",
+)
+INERTIA = Rule(
+    code="mjcf-inertia",
+    allowed="bodies whose masses follow from <inertial> or from solid shapes and mesh files that can be read",
+    remedy="add <inertial pos mass diaginertia>",
+)
+MESH = Rule(
+    code="mjcf-mesh",
+    allowed="mesh files that can be found and read",
+    remedy="put the file at the place that <compiler meshdir> and <mesh file> name",
+)
+SHAPE = Rule(
+    code="mjcf-shape",
+    allowed="sphere, capsule, ellipsoid, cylinder, box and mesh, with sizes above zero",
+    remedy="correct the shape",
+)
+UNREAD = Rule(
+    code="mjcf-not-read",
+    allowed="a tree of bodies with hinges and slides",
+    remedy="write the part out as bodies",
+)
+
+MJCF_RULES = (*(FREE, STIFFNESS, EQUALITY, TENDON, LIMIT, FRICTION, INERTIA, MESH, SHAPE, UNREAD),)
+"""All rules of this format."""

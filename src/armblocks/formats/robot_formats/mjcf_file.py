@@ -1,0 +1,22 @@
+"""MJCF, the model format of MuJoCo."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from armblocks.formats.robot_format import RobotFormat
+
+if TYPE_CHECKING:
+    from armblocks.formats.file_findings import FileContext
+    from armblocks.robot import Robot
+
+
+def _read(data: bytes, name: str, context: FileContext) -> Mapping[str, Robot]:
+    from armblocks.formats.mjcf.reader import read_mjcf
+
+    robot = read_mjcf(data, name, context)
+    return {robot.name: robot}
+
+
+MJCF = RobotFormat(name="MJCF", suffixes=(".xml", ".mjcf"), max_bytes=16 * 2**20, read_in_context=_read)
