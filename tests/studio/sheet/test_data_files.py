@@ -12,8 +12,10 @@ from typing import Any
 import pytest
 from client_requests import Events, run_scenario
 
+from armblocks.blocks import PythonFunction
 from armblocks.errors import ArmblocksError
 from armblocks.studio.server.hub import Hub
+from armblocks.studio.sheet.parameter_values import parameter_json
 
 TIMEOUT_SECONDS = 180
 Ask = Callable[..., Awaitable[Any]]
@@ -184,6 +186,10 @@ def test_a_dropped_table_is_stored_and_replaced_only_on_request(tmp_path: Path) 
 
 MARK = "from pathlib import Path\nPath(__file__).with_name('ran').write_text('')\n"
 LAW = f"{MARK}\n\ndef law(u, t, gain=2.0):\n    return gain * u\n"
+
+
+def test_the_default_function_is_in_no_file_of_the_project() -> None:
+    assert parameter_json(PythonFunction().function) == {"function": "unchanged", "source": ""}
 
 
 def test_code_runs_only_after_its_content_was_trusted(tmp_path: Path) -> None:

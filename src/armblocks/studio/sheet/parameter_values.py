@@ -12,6 +12,7 @@ from typing import Any, cast
 
 from armblocks.diagram import Parameter, ParameterFormula, ParameterKind, TimeTable, UserFunction
 from armblocks.diagram.mask import Scope, formula_number, formula_value, parameters_read
+from armblocks.diagram.user_function import UnloadedFunction
 from armblocks.errors import InputError, UnknownNameError
 from armblocks.formats.data_files import DataFiles, TableReference
 from armblocks.robot import Robot
@@ -100,7 +101,9 @@ def parameter_json(value: Any) -> Any:
     if isinstance(value, TimeTable):
         return _table_json(value)
     if isinstance(value, UserFunction):
-        return {"function": value.name, "source": value.shown}
+        # The studio loads no functions of files: a loaded function is the default of a new block.
+        source = value.shown if isinstance(value.function, UnloadedFunction) else ""
+        return {"function": value.name, "source": source}
     if isinstance(value, complex):
         return f"{value.real!r}{value.imag:+}i" if value.imag else parameter_json(value.real)
     if isinstance(value, tuple):
