@@ -408,12 +408,15 @@ function ToolPosition({
       lastState = key
       const now = poses()
       text.current.textContent = now
-        ? [3, 7, 11].map((k, axis) => `${'xyz'[axis]} ${now(rows - 1, k).toFixed(3)}`).join('   ') + ' m'
+        ? [3, 7, 11].map((k, axis) => `${'xyz'[axis]} ${metres(now(rows - 1, k))}`).join('   ') + ' m'
         : ''
     })
   }, [poses, rows, state])
   return <output ref={text} className="instant numbers" aria-label="Position of the tool" />
 }
+
+/** A coordinate with three decimals, and no sign before zero. */
+const metres = (value: number) => (Math.round(1000 * value) / 1000 + 0).toFixed(3).replace('-', '−')
 
 function hasWebGl(): boolean {
   try {

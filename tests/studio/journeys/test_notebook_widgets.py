@@ -87,7 +87,8 @@ def colours(picture: bytes) -> int:
 
 
 def shown(point: np.ndarray) -> str:
-    return "   ".join(f"{axis} {value:.3f}" for axis, value in zip("xyz", point, strict=True)) + " m"
+    texts = (f"{axis} {value:z.3f}" for axis, value in zip("xyz", point, strict=True))
+    return "   ".join(texts).replace("-", "−") + " m"
 
 
 def test_the_widgets_of_a_result_share_their_time_cursor(notebook: Page) -> None:
