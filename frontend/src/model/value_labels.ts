@@ -14,6 +14,25 @@ const MIN_WIDTH_ABOVE = 80
 /** Width of a label in a free part of the sheet, px. */
 const MAX_WIDTH = 400
 
+/** Width of a letter of a value, and of the space at its sides, px. */
+const LETTER_WIDTH = 6
+const SIDES = 8
+/** Number of digits of a value with enough room. */
+const MAX_DIGITS = 4
+
+/**
+ * The text of a value with the most digits that fit into a width, px, else an ellipsis. A number that is cut
+ * off would be misread: 2.4 instead of 2.4e−15. Vectors are cut off between or after their elements.
+ */
+export function fittedValue(text: (digits: number) => string, width: number): string {
+  const letters = Math.floor((width - SIDES) / LETTER_WIDTH)
+  for (let digits = MAX_DIGITS; digits > 0; digits--) {
+    const shown = text(digits)
+    if (shown.length <= letters || shown.startsWith('[')) return shown
+  }
+  return '…'
+}
+
 /** Choose the place of a label that begins at a point, extends in a direction and has a height. */
 export function labelPosition(
   { x, y }: { x: number; y: number },

@@ -10,7 +10,7 @@ import { nameSignal } from '../canvas/signal_names'
 import { nameArea } from '../canvas/sheet_layout'
 import { scheduleFrame, onFrame } from '../frames'
 import type { Rectangle } from '../model/free_place'
-import { labelPosition, WIRE_DISTANCE } from '../model/value_labels'
+import { fittedValue, labelPosition, WIRE_DISTANCE } from '../model/value_labels'
 import type { SheetPort, SheetBlock } from '../protocol'
 import { samples } from '../samples'
 import { formatNumber, displayUnit, useUnits } from '../scopes/quantity'
@@ -30,7 +30,7 @@ export const useShownValues = create<ShownValues>(() => ({ all: false, pinned: n
 const MAX_ELEMENTS = 4
 
 /** The display text of a signal's value at a time. */
-export function valueAtTime(path: string, time: number): string {
+function valueAtTime(path: string, time: number, digits: number): string {
   const signal = samples.signal(path)
   const index = samples.indexAt(time)
   if (!signal || index < 0) return ''
@@ -38,7 +38,7 @@ export function valueAtTime(path: string, time: number): string {
   if (channel.shape.length > 1) return channel.shape.join(' × ')
   const values = columns.slice(0, MAX_ELEMENTS).map((column) => column[index] ?? NaN)
   const { factor, unit } = displayUnit(channel.unit, Math.max(...values.map(Math.abs)))
-  const shown = values.map((value) => formatNumber(value * factor)).join(', ')
+  const shown = values.map((value) => formatNumber(value * factor, digits)).join(', ')
   const ellipsis = columns.length > MAX_ELEMENTS ? ', …' : ''
   return `${columns.length > 1 ? `[${shown}${ellipsis}]` : shown}${unit && ` ${unit}`}`
 }
@@ -171,10 +171,12 @@ function useValueTexts(layer: React.RefObject<HTMLDivElement | null>): void {
       onFrame(() => {
         const time = shownTime()
         layer.current?.querySelectorAll<HTMLElement>('[data-path]').forEach((element) => {
-          const text = `${samples.version} ${time} ${element.dataset['path']} ${useUnits.getState().radians}`
-          if (element.dataset['written'] === text) return
-          element.dataset['written'] = text
-          element.textContent = valueAtTime(element.dataset['path'] ?? '', time)
+          const { path = '', written } = element.dataset
+          const width = Number.parseFloat(element.style.maxWidth || element.style.width)
+          const state = `${samples.version} ${time} ${path} ${useUnits.getState().radians} ${width}`
+          if (written === state) return
+          element.dataset['written'] = state
+          element.textContent = fittedValue((digits) => valueAtTime(path, time, digits), width)
         })
       }),
     [layer],

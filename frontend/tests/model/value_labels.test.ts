@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest'
 import type { Rectangle } from '../../src/model/free_place'
-import { labelPosition, WIRE_DISTANCE } from '../../src/model/value_labels'
+import { fittedValue, labelPosition, WIRE_DISTANCE } from '../../src/model/value_labels'
 
 let seed = 7
 const random = (limit: number) => ((seed = (seed * 48271) % 2147483647) / 2147483647) * limit
@@ -37,4 +37,10 @@ test('a label is above its wire unless there is more room below', () => {
   expect(labelPosition({ x: 0, y: 0 }, 1, { height: 14 }, [above])).toMatchObject({ below: true })
   const both = [above, { ...above, x: 20, y: 2 }]
   expect(labelPosition({ x: 0, y: 0 }, 1, { height: 14 }, both)).toEqual({ below: false, width: 30 })
+})
+
+test('a value has fewer digits where there is little room, and is never cut off', () => {
+  const text = (digits: number) => `${(-2.449e-15).toExponential(digits - 1)} m`
+  expect([120, 70, 40].map((width) => fittedValue(text, width))).toEqual(['-2.449e-15 m', '-2.4e-15 m', '…'])
+  expect(fittedValue((digits) => `[${(0.5).toFixed(digits)}, …]`, 30)).toBe('[0.5000, …]')
 })
