@@ -1,4 +1,4 @@
-import { formatNumber } from './quantity'
+import { fittedLabel, tickText } from '../model/axis_texts'
 
 export interface Axis {
   min: number
@@ -51,21 +51,23 @@ interface Box {
 /** Font size, px. */
 const FONT_SIZE = 11
 
-/** Round values in a range, at most `maxCount`. */
+/** Round values in a range: about `maxCount`, and at least two. */
 export function ticks(min: number, max: number, maxCount: number): number[] {
   const minStep = (max - min) / Math.max(maxCount, 1)
   const magnitude = 10 ** Math.floor(Math.log10(minStep))
-  const step = [1, 2, 2.5, 5, 10].map((k) => k * magnitude).find((k) => k >= minStep * (1 - 1e-9)) ?? minStep
-  const first = Math.ceil(min / step - 1e-9)
-  const values: number[] = []
-  for (let k = first; k * step <= max + 1e-9 * step; k++) values.push(k * step)
-  return values
-}
-
-function tickText(value: number, step: number): string {
-  if (Math.abs(value) >= 1e6 || step < 1e-5) return formatNumber(value, 3)
-  const places = (String(Number(step.toPrecision(3))).split('.')[1] ?? '').length
-  return value.toFixed(places).replace('-', '−')
+  const steps = [0.5, 1, 2, 2.5, 5, 10].map((k) => k * magnitude)
+  const preferred = steps.findIndex((step, k) => k > 0 && step >= minStep * (1 - 1e-9))
+  const multiples = (step: number) => {
+    const values: number[] = []
+    for (let k = Math.ceil(min / step - 1e-9); k * step <= max + 1e-9 * step; k++) values.push(k * step + 0) // not −0
+    return values
+  }
+  // One value gives no scale.
+  for (let k = preferred; k > 0; k--) {
+    const values = multiples(steps[k]!)
+    if (values.length > 1) return values
+  }
+  return multiples(steps[0]!)
 }
 
 /** A range with a margin. */
@@ -123,8 +125,9 @@ function draw(figure: Figure, painter: Painter): void {
     )
     painter.text(box.left - 6, atY(value) + 4, tickText(value, yTicks[1]! - yTicks[0]! || 1), 'muted', 'end')
   }
-  painter.text(box.left + box.width / 2, bottom + 32, x.label, 'muted', 'middle')
-  if (y.label) painter.text(13, box.top + box.height / 2, y.label, 'muted', 'middle', false, true)
+  painter.text(box.left + box.width / 2, bottom + 32, fittedLabel(x.label, box.width), 'muted', 'middle')
+  const yLabel = fittedLabel(y.label, box.height)
+  if (yLabel) painter.text(13, box.top + box.height / 2, yLabel, 'muted', 'middle', false, true)
   painter.inside(box, () => {
     for (const line of figure.lines) {
       const points: [number, number][] = []

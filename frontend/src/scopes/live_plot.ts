@@ -1,5 +1,6 @@
 import uPlot from 'uplot'
 import { scheduleFrame, onFrame } from '../frames'
+import { fittedLabel } from '../model/axis_texts'
 import { IncrementalDrawing } from '../model/incremental_drawing'
 import { sharedDashes } from '../model/shared_lines'
 import {
@@ -18,7 +19,7 @@ import { useStudio } from '../store'
 import { withMargin, type Figure } from './figure'
 import { listenOnPlot, listenOnValueAxis, type Values } from './plot_gestures'
 import { colour } from './plot_marks'
-import { MIN_PX, plotOptions } from './plot_options'
+import { MIN_PX, plotOptions, TIME_AXIS_HEIGHT } from './plot_options'
 import { displayUnit, useUnits, type DisplayUnit } from './quantity'
 import { useTrigger } from './trigger'
 import { visibleTimes, useWindow } from './window'
@@ -67,7 +68,7 @@ export class LivePlot {
       plotOptions(
         element,
         traces,
-        () => this.unit,
+        () => fittedLabel(this.unit, this.plot.height - TIME_AXIS_HEIGHT),
         () => this.unitFactor,
         band,
       ),

@@ -1,22 +1,26 @@
 import type uPlot from 'uplot'
+import { tickText } from '../model/axis_texts'
 import type { Trace } from '../model/trace'
 import { CLICK_PX, cursorUnder } from './plot_gestures'
 import { colour, drawBand, drawLines } from './plot_marks'
-import { formatNumber } from './quantity'
 import { useWindow, zoomTo } from './window'
 
 const FONT = '11px "Inter Variable", system-ui, sans-serif'
 /** Width and height of a plot before its panel has a size, px. */
 export const MIN_PX = 60
+const TIME_TEXTS_HEIGHT = 32
+const LABEL_HEIGHT = 16
+/** Height of the texts and the label below a plot, px. */
+export const TIME_AXIS_HEIGHT = TIME_TEXTS_HEIGHT + LABEL_HEIGHT
 
 /**
- * The uPlot options of the traces; `unit` and `unitFactor` are those of the vertical axis, `band` a band
+ * The uPlot options of the traces; `label` and `unitFactor` are those of the vertical axis, `band` a band
  * about zero.
  */
 export function plotOptions(
   element: HTMLElement,
   traces: Trace[],
-  unit: () => string,
+  label: () => string,
   unitFactor: () => number,
   band: number | undefined,
 ): uPlot.Options {
@@ -26,7 +30,7 @@ export function plotOptions(
     ticks: { stroke: colour('grid'), width: 1 },
     font: FONT,
     labelFont: FONT,
-    labelSize: 16,
+    labelSize: LABEL_HEIGHT,
     labelGap: 0,
   }
   return {
@@ -46,15 +50,15 @@ export function plotOptions(
     axes: [
       {
         ...axis,
-        size: 32,
+        size: TIME_TEXTS_HEIGHT,
         label: 'Time, s',
-        values: (_, splits) => splits.map((value) => tickText(value, splits)),
+        values: (_, splits) => splits.map((value) => tickText(value, stepOf(splits))),
       },
       {
         ...axis,
-        size: 54,
-        label: unit,
-        values: (_, splits) => splits.map((value) => tickText(value, splits)),
+        size: (_, texts) => valueAxisWidth(texts ?? []),
+        label,
+        values: (_, splits) => splits.map((value) => tickText(value, stepOf(splits))),
       },
     ],
     series: [
@@ -84,8 +88,10 @@ export function plotOptions(
   }
 }
 
-function tickText(value: number, splits: number[]): string {
-  const step = Math.abs((splits[1] ?? 1) - (splits[0] ?? 0))
-  if (Math.abs(value) >= 1e6 || step < 1e-6) return formatNumber(value, 3)
-  return value.toFixed((String(Number(step.toPrecision(3))).split('.')[1] ?? '').length).replace('-', '−')
+const stepOf = (splits: number[]) => Math.abs((splits[1] ?? 1) - (splits[0] ?? 0))
+
+/** Width of the texts and ticks of the value axis, px: the same in all plots, except for long numbers. */
+function valueAxisWidth(texts: string[]): number {
+  const longest = Math.max(0, ...texts.map((text) => text.length))
+  return Math.max(54, 18 + 6.6 * longest)
 }
