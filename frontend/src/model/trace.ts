@@ -62,6 +62,19 @@ export function tracesOf(samples: RunSamples, paths: { path: string; label: stri
     .slice(0, MAX_TRACES)
 }
 
+/**
+ * The label of a trace with another entry. Where a label is too long, the name of the signal is cut off and
+ * the entry is shown completely, because the entry distinguishes the traces of one signal.
+ */
+export function withEntry({ stem }: Trace, parts: string[]): Pick<Trace, 'entry' | 'label'> {
+  const entry = parts.filter(Boolean).join(', ')
+  return { entry, label: `${stem} ${entry}` }
+}
+
+/** Whether the label of a trace consists of the signal and an entry. */
+export const hasEntry = ({ entry, label, stem }: Trace): boolean =>
+  entry !== '' && label === `${stem} ${entry}`
+
 /** The traces of two charts; those of the second have the colours and dashes that they have in the first. */
 export function sameTones(first: Trace[], second: Trace[]): [Trace[], Trace[]] {
   const known = new Map(first.map((trace) => [trace.key, trace]))

@@ -10,7 +10,7 @@ import { MeasureTable } from './measure_table'
 import { Plot, type PlotHandle } from './plot'
 import type { Values } from './plot_gestures'
 import { useUnits } from './quantity'
-import type { Trace } from '../model/trace'
+import { hasEntry, type Trace } from '../model/trace'
 import { toggleTrigger, useTrigger } from './trigger'
 import { toggleCursors, useWindow, visibleTimes } from './window'
 import { equalAxes, XyPlot } from './xy_plot'
@@ -85,7 +85,7 @@ export function Chart({
   return (
     <figure className={hasMeasures ? 'chart measured' : 'chart'} data-view={view} {...menus}>
       <figcaption>
-        <b>{title}</b>
+        <b title={title}>{title}</b>
         <span className="legend">{!isXy && <Legend traces={traces} hidden={hidden} toggle={toggle} />}</span>
         {values && <ShowAllValues title={title} show={() => setValues(null)} />}
         {isXy && axesMayBeEqual && <EqualAxes equal={equal} title={title} set={setEqual} />}
@@ -144,15 +144,19 @@ interface LegendProps {
 
 /** The names of the traces, after that of their common signal. */
 function Legend({ traces, hidden, toggle }: LegendProps) {
-  const { stem, names } = legendNames(traces)
+  const stem = commonStem(traces)
   return (
     <>
-      {stem && <span className="stem">{stem}</span>}
-      {traces.map((trace, k) => (
+      {stem && (
+        <span className="stem" title={stem}>
+          {stem}
+        </span>
+      )}
+      {traces.map((trace) => (
         <LegendEntry
           key={trace.key}
           trace={trace}
-          name={names[k]!}
+          name={stem ? trace.entry : trace.label}
           hidden={hidden.has(trace.key)}
           toggle={() => toggle(trace.key)}
         />
@@ -169,7 +173,8 @@ interface LegendEntryProps {
 }
 
 /** A trace in the legend. */
-function LegendEntry({ trace: { label, tone, dash }, name, hidden, toggle }: LegendEntryProps) {
+function LegendEntry({ trace, name, hidden, toggle }: LegendEntryProps) {
+  const { label, tone, dash, stem, entry } = trace
   return (
     <button
       type="button"
@@ -190,7 +195,8 @@ function LegendEntry({ trace: { label, tone, dash }, name, hidden, toggle }: Leg
           strokeDasharray={dash.join(' ')}
         />
       </svg>
-      <span>{name}</span>
+      <span>{name === label && hasEntry(trace) ? stem : name}</span>
+      {name === label && hasEntry(trace) && <span className="entry">{entry}</span>}
     </button>
   )
 }
@@ -314,10 +320,8 @@ function blockEntry(path: string): Entries {
   ]
 }
 
-/** The names of entries without the name of their common signal. */
-function legendNames(traces: Trace[]): { stem: string; names: string[] } {
-  const stem = traces[0]?.stem
-  if (!stem || traces.length < 2 || !traces.every((one) => one.entry && one.label === `${stem} ${one.entry}`))
-    return { stem: '', names: traces.map(({ label }) => label) }
-  return { stem, names: traces.map(({ entry }) => entry) }
+/** The signal to which all traces belong; the legend then shows only their entries. */
+function commonStem(traces: Trace[]): string {
+  const stem = traces[0]?.stem ?? ''
+  return traces.length > 1 && traces.every((one) => one.stem === stem && hasEntry(one)) ? stem : ''
 }

@@ -10,7 +10,7 @@ import { Chart, useChartState } from './chart'
 import { difference, largestDifference } from '../model/difference'
 import { withUnit } from './quantity'
 import { Grid, PlotTools } from './scopes'
-import { DASHES, MAX_TRACES, sameTones, tracesOf, type Trace } from '../model/trace'
+import { DASHES, MAX_TRACES, sameTones, tracesOf, withEntry, type Trace } from '../model/trace'
 
 /** Runs in one plot, the difference of two of them, or two plots with equal axes. */
 type View = 'overlay' | 'difference' | 'side by side'
@@ -116,7 +116,7 @@ function RunList({ runs }: { runs: StoredRun[] }) {
               {run.began.toLocaleTimeString()}, {run.state}
             </small>
             {changesOf(run).map((text) => (
-              <small key={text} className="numbers changes">
+              <small key={text} className="numbers changes" title={text}>
                 {text}
               </small>
             ))}
@@ -234,7 +234,9 @@ function SignalList({ runs }: { runs: StoredRun[] }) {
                 checked={signals.has(name)}
                 onChange={() => useInspectorState.setState((s) => ({ signals: toggled(s.signals, name) }))}
               />
-              <span className="listed-signal">{runs.at(-1)!.samples.title(name)}</span>
+              <span className="listed-signal" title={runs.at(-1)!.samples.title(name)}>
+                {runs.at(-1)!.samples.title(name)}
+              </span>
               {difference && (
                 <span
                   className={
@@ -289,7 +291,7 @@ function InspectorPlot({ runs }: { runs: StoredRun[] }) {
         tracesOf(run.samples, paths).map((trace) => ({
           ...trace,
           key: `${run.key} ${trace.key}`,
-          label: visibleRuns.length > 1 ? `${trace.label}, ${run.name}` : trace.label,
+          ...(visibleRuns.length > 1 ? withEntry(trace, [trace.entry, run.name]) : {}),
           tone: hasOneTraceEach ? `trace-${k % 8}` : trace.tone,
           dash:
             visibleRuns.length > 1 && !hasOneTraceEach

@@ -3,7 +3,7 @@ import { shownTime, useCursor } from '../run/cursor'
 import { samples } from '../samples'
 import { measures, type Measures } from '../model/measures'
 import { formatNumber, displayUnit, withUnit } from './quantity'
-import { valueAt, type Trace } from '../model/trace'
+import { hasEntry, valueAt, type Trace } from '../model/trace'
 import { visibleTimes, useWindow } from './window'
 
 const REFRESH_MS = 200
@@ -116,19 +116,19 @@ function Row({
   )
   const { factor, unit } = displayUnit(trace.unit, largest)
   // A long name is cut off before the entry, which distinguishes the rows of a vector.
-  const hasEntry = trace.entry !== '' && trace.label === `${trace.stem} ${trace.entry}`
+  const twoParts = hasEntry(trace)
   return (
     <tr>
       <th scope="row" title={trace.label}>
         <span className="measured-trace">
           <i style={{ background: `var(--${trace.tone})` }} />
-          <span className="name">{hasEntry ? trace.stem : trace.label}</span>
-          {hasEntry && <span>&nbsp;{trace.entry}</span>}
+          <span className="name">{twoParts ? trace.stem : trace.label}</span>
+          {twoParts && <span>&nbsp;{trace.entry}</span>}
           {unit && <span className="unit">&nbsp;{unit}</span>}
         </span>
       </th>
       {(cursors ? [a, b, b - a] : [a]).map((value, k) => (
-        <td key={k} data-label={cursors ? 'ABΔ'[k] : ''}>
+        <td key={k} data-label={cursors ? 'ABΔ'[k] : `at ${formatNumber(now, 4)} s`}>
           {formatNumber(value * factor)}
         </td>
       ))}
