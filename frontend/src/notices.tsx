@@ -1,5 +1,6 @@
 import { Alert, Stack } from '@mantine/core'
 import { IconAlertTriangle } from '@tabler/icons-react'
+import { useEffect, useRef } from 'react'
 import { DiskNotice } from './documents/disk_notice'
 import { useStudio } from './store'
 
@@ -9,8 +10,9 @@ export function Notices() {
   const connectionState = useStudio((s) => s.connectionState)
   const started = useStudio((s) => s.welcome !== null)
   const dismiss = useStudio((s) => s.dismiss)
+  const element = useHeightOfNotices()
   return (
-    <Stack className="notices" gap="xs" role="status" aria-live="polite">
+    <Stack ref={element} className="notices" gap="xs" role="status" aria-live="polite">
       {started && connectionState === 'down' && (
         <Alert color="orange" icon={<IconAlertTriangle />} title="The studio does not answer">
           Your edits are stored here and sent after reconnection. If the studio was ended, start it again in
@@ -42,4 +44,20 @@ export function Notices() {
       ))}
     </Stack>
   )
+}
+
+/** The height of the notices as a custom property: dialogs end above the notices. */
+function useHeightOfNotices(): React.RefObject<HTMLDivElement | null> {
+  const element = useRef<HTMLDivElement>(null)
+  useEffect(() => {
+    const observer = new ResizeObserver(([entry]) =>
+      document.documentElement.style.setProperty(
+        '--notices-height',
+        `${entry?.borderBoxSize[0]?.blockSize ?? 0}px`,
+      ),
+    )
+    if (element.current) observer.observe(element.current)
+    return () => observer.disconnect()
+  }, [])
+  return element
 }

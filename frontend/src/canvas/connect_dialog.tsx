@@ -55,7 +55,7 @@ export function ConnectDialog() {
     void change({ kind: 'connect', wire: { source, target } })
   }
   return (
-    <Modal opened={opened} onClose={close} title="Draw a wire" size="sm">
+    <Modal opened={opened} onClose={close} title={<b>Draw a wire</b>} size="sm">
       <form
         onSubmit={(event) => {
           event.preventDefault()

@@ -13,7 +13,7 @@ export function DroppedTableDialog() {
     void act()
   }
   return (
-    <Modal opened={opened} onClose={close} title={`Replace ${waiting.name}?`} size="md">
+    <Modal opened={opened} onClose={close} title={<b>Replace {waiting.name}?</b>} size="md">
       <Stack gap="sm">
         <Text size="sm">
           The project folder contains another file with this name. Blocks that use it would get the new

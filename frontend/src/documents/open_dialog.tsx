@@ -9,7 +9,7 @@ export function OpenDialog() {
   const opened = useDialogs((s) => s.open === 'open')
   const openCount = useDialogs((s) => s.openCount)
   return (
-    <Modal opened={opened} onClose={() => showDialog(null)} title="Open" size="lg">
+    <Modal opened={opened} onClose={() => showDialog(null)} title={<b>Open</b>} size="lg">
       <OpenList key={openCount} />
     </Modal>
   )

@@ -22,7 +22,7 @@ export function RecoveryDialog() {
     if (!recoveries.length && useDialogs.getState().open === 'recovery') showDialog(null)
   }, [recoveries, offered])
   return (
-    <Modal opened={opened} onClose={() => showDialog(null)} title="Unsaved work" size="lg">
+    <Modal opened={opened} onClose={() => showDialog(null)} title={<b>Unsaved work</b>} size="lg">
       <Stack gap="sm">
         <Text size="sm" c="dimmed">
           The studio ended before these documents were saved. They can be recovered from its journal; no file

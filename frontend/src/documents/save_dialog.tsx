@@ -12,7 +12,7 @@ export function SaveDialog() {
   const opened = useDialogs((s) => s.open === 'save_as')
   const openCount = useDialogs((s) => s.openCount)
   return (
-    <Modal opened={opened} onClose={() => showDialog(null)} title="Save as" size="md">
+    <Modal opened={opened} onClose={() => showDialog(null)} title={<b>Save as</b>} size="md">
       <SaveAs key={openCount} />
     </Modal>
   )

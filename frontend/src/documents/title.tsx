@@ -20,7 +20,7 @@ export function DocumentTitle() {
       multiline
       maw={340}
       openDelay={400}
-      label={description ? `${description} – ${saveState}` : saveState}
+      label={[title, description, saveState].filter(Boolean).join(' – ')}
     >
       <Text fw={600} className="title" tabIndex={-1}>
         {title}

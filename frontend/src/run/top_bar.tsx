@@ -45,7 +45,7 @@ export function TopBar() {
     <header className="top-bar">
       <FileMenu />
       <DocumentTitle />
-      <Group gap={2} role="group" aria-label="Edit">
+      <Group gap={2} wrap="nowrap" role="group" aria-label="Edit" className="edit-tools">
         <Undo />
         <Redo />
         <Tool

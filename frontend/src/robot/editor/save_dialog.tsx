@@ -46,7 +46,7 @@ export function SaveDialog() {
   const files = useStudio((s) => s.welcome?.files) ?? []
   const close = () => useSaving.setState({ robot: null })
   return (
-    <Modal opened={robot !== null} onClose={close} title="Save the robot" size="sm">
+    <Modal opened={robot !== null} onClose={close} title={<b>Save the robot</b>} size="sm">
       <form
         onSubmit={(event) => {
           event.preventDefault()
