@@ -59,7 +59,8 @@ export function ticks(min: number, max: number, maxCount: number): number[] {
   const preferred = steps.findIndex((step, k) => k > 0 && step >= minStep * (1 - 1e-9))
   const multiples = (step: number) => {
     const values: number[] = []
-    for (let k = Math.ceil(min / step - 1e-9); k * step <= max + 1e-9 * step; k++) values.push(k * step + 0) // not −0
+    // The sum with 0 is never −0.
+    for (let k = Math.ceil(min / step - 1e-9); k * step <= max + 1e-9 * step; k++) values.push(k * step + 0)
     return values
   }
   // One value gives no scale.
