@@ -26,12 +26,16 @@ export function ContextMenu() {
       <Menu.Target>
         <div className="menu-anchor" style={{ left: at.x, top: at.y }} aria-hidden />
       </Menu.Target>
-      <Menu.Dropdown aria-label={label} className="context-menu">
+      <Menu.Dropdown aria-label={label} className={classOf(entries)}>
         <Items entries={entries} />
       </Menu.Dropdown>
     </Menu>
   )
 }
+
+/** If some entries have room for a mark, all have, so that the titles begin below each other. */
+const classOf = (entries: Entries) =>
+  entries.some((entry) => entry?.checked !== undefined) ? 'context-menu marked' : 'context-menu'
 
 function Items({ entries }: { entries: Entries }) {
   return entries.map((entry, k) =>
@@ -72,7 +76,9 @@ function Submenu({ title, entries }: { title: string; entries: Entries }) {
       <Menu.Sub.Target>
         <Menu.Sub.Item>{title}</Menu.Sub.Item>
       </Menu.Sub.Target>
-      <Menu.Sub.Dropdown className="context-menu">{opened && <Items entries={entries} />}</Menu.Sub.Dropdown>
+      <Menu.Sub.Dropdown className={classOf(entries)}>
+        {opened && <Items entries={entries} />}
+      </Menu.Sub.Dropdown>
     </Menu.Sub>
   )
 }

@@ -196,7 +196,7 @@ function LegendEntry({ trace, name, hidden, toggle }: LegendEntryProps) {
         />
       </svg>
       <span>{name === label && hasEntry(trace) ? stem : name}</span>
-      {name === label && hasEntry(trace) && <span className="entry">{entry}</span>}
+      {name === label && hasEntry(trace) && <span className="entry">&nbsp;{entry}</span>}
     </button>
   )
 }
