@@ -13,6 +13,7 @@ from armblocks.blocks import (
     PWM,
     Abs,
     Backlash,
+    Bias,
     Constant,
     Derivative,
     EnabledSubsystem,
@@ -364,6 +365,23 @@ def test_events_at_the_start_that_depend_on_the_parameter_are_refused() -> None:
     # The absolute value has a kink at the start but no jump: dx/dphase = |sin(t)|.
     result = ab.sensitivity(integrated(Abs()), "wave.phase", "x", **TIGHT)
     assert np.allclose(result["x", "wave.phase"], np.sin(result.time), atol=1e-9)
+
+
+def test_events_at_the_start_of_a_table_that_is_read_by_index(capfd: pytest.CaptureFixture[str]) -> None:
+    """The sign of table + c changes at the start if the first value is 0.5 and c = -0.5."""
+
+    def diagram(first: float) -> ab.Diagram:
+        builder = ab.DiagramBuilder("table", settings=ab.SimulationOptions(stop_time=1.0, sample_time=0.25))
+        table = builder.add("table", FromFile(data=((0.0, first), (1.0, first + 1.0))))
+        builder.add("x", Integrator(), builder.add("y", Sign(), builder.add("c", Bias(bias=-0.5), table)))
+        return builder.build()
+
+    with pytest.raises(InputError, match=r"event of 'y' at the start moves with .* 'c.bias'"):
+        ab.sensitivity(diagram(0.5), "c.bias", "x")
+    # The sign changes at 0.5 s, earlier by dc: dx/dc = 2 afterwards.
+    result = ab.sensitivity(diagram(0.0), "c.bias", "x")
+    assert result["x", "c.bias"][[0, 1, 3, 4]] == pytest.approx([0.0, 0.0, 2.0, 2.0], abs=1e-6)
+    assert capfd.readouterr().out == ""
 
 
 def test_the_sensitivity_to_the_speed_of_a_stuck_mass_is_refused() -> None:

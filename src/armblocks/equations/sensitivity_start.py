@@ -14,6 +14,7 @@ from casadi import SX, Function, densify, jtimes, vertcat
 from numpy.typing import NDArray
 
 from armblocks.equations.hybrid_system import HybridSystem
+from armblocks.equations.table_reading import evaluate_with_reads, reads_tables
 from armblocks.equations.traced_function import TracedFunction
 from armblocks.errors import InputError
 
@@ -134,7 +135,10 @@ class _Start:
         """The values of expressions in ``symbols`` at the start; ``further_arguments`` follow ``t, x, z, w,
         p``."""
         arguments = [np.zeros(1), *point, np.empty(0), self.p, *further_arguments]
-        values = Function("f", symbols, [densify(result) for result in results]).call(arguments)
+        function = Function("f", symbols, [densify(result) for result in results])
+        values = (
+            evaluate_with_reads(function, arguments) if reads_tables(function) else function.call(arguments)
+        )
         return [np.array(value, dtype=np.float64).ravel() for value in values]
 
     def _sides_differ(self, guard: int, rate: float) -> bool:
