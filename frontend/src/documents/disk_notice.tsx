@@ -17,7 +17,7 @@ function FileNotice({ state, saveAs }: { state: DocumentState; saveAs: () => voi
         <Alert color="yellow" icon={<IconFileAlert />} title={`${path} has changed on the disk`}>
           {dirty ? 'Your edits are here and in the journal.' : 'You have no unsaved edits.'} Reloading can be
           undone.
-          <Group gap="xs" mt="xs">
+          <Group gap="xs">
             <Button size="compact-sm" onClick={() => alterDocument('reload', state)}>
               Reload
             </Button>
@@ -71,7 +71,7 @@ export function DiskNotice() {
           }
         >
           The studio ended before the edits were saved; its journal contains them.
-          <Group gap="xs" mt="xs">
+          <Group gap="xs">
             <Button size="compact-sm" variant="default" onClick={() => showDialog('recovery')}>
               Show {otherRecoveries === 1 ? 'it' : 'them'}
             </Button>

@@ -16,9 +16,7 @@ export function TabStrip() {
   const overflows = useOverflow(list, tabs.length)
   const inFront = useDocumentInFront()
   useEffect(() => {
-    list.current
-      ?.querySelector('[aria-selected="true"]')
-      ?.scrollIntoView({ block: 'nearest', inline: 'nearest' })
+    if (list.current) showSelected(list.current)
   }, [inFront, tabs.length])
   return (
     <>
@@ -48,13 +46,21 @@ function useDocumentInFront(): string | undefined {
   return useRobotEditor((s) => s.current) ?? diagram
 }
 
-/** Whether the tabs are wider than their list. */
+/** Scroll the tab of the visible document into the list. */
+function showSelected(list: HTMLElement): void {
+  list.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: 'nearest', inline: 'nearest' })
+}
+
+/** Whether the tabs are wider than their list. A list of another width shows the selected tab. */
 function useOverflow(list: RefObject<HTMLDivElement | null>, count: number): boolean {
   const [overflows, setOverflows] = useState(false)
   useEffect(() => {
     const element = list.current
     if (!element) return
-    const observer = new ResizeObserver(() => setOverflows(element.scrollWidth > element.clientWidth + 1))
+    const observer = new ResizeObserver(() => {
+      setOverflows(element.scrollWidth > element.clientWidth + 1)
+      showSelected(element)
+    })
     observer.observe(element)
     if (element.lastElementChild) observer.observe(element.lastElementChild)
     return () => observer.disconnect()

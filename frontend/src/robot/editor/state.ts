@@ -231,7 +231,7 @@ function numberText(value: number): string {
 /** A read-out rounded to a readable number of digits. */
 export function shortNumber(value: number, digits = 4): string {
   const magnitude = Math.abs(value)
-  if (magnitude < 0.5 * 10 ** -digits) return (0).toFixed(Math.min(digits, 3))
+  if (magnitude < 0.5 * 10 ** -digits) return (0).toFixed(digits)
   if (magnitude >= 1e5) return value.toExponential(2)
   return value.toFixed(Math.max(0, Math.min(digits, digits - Math.floor(Math.log10(Math.max(magnitude, 1))))))
 }
