@@ -46,7 +46,7 @@ export function Notices() {
   )
 }
 
-/** The height of the notices as a custom property: dialogs end above the notices. */
+/** The height of the notices as a custom property: dialogs and the robot editor end above the notices. */
 function useHeightOfNotices(): React.RefObject<HTMLDivElement | null> {
   const element = useRef<HTMLDivElement>(null)
   useEffect(() => {
