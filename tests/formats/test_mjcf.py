@@ -14,6 +14,7 @@ from mjcf_models import RandomModel
 import armblocks as ab
 from armblocks.errors import ArmblocksWarning, FormatError
 from armblocks.formats.file_findings import FileContext
+from armblocks.formats.meshes.mesh_file import mesh_corners
 from armblocks.formats.mjcf.reader import read_mjcf
 from armblocks.formats.mjcf.solids import solid_of_mesh
 from armblocks.robot import Robot
@@ -106,6 +107,23 @@ def test_the_inertia_of_a_mesh_is_that_of_mujoco(tmp_path: Path) -> None:
         np.testing.assert_allclose(
             robot.links[0].I, axes @ np.diag(model.body_inertia[1]) @ axes.T, rtol=1e-5
         )
+
+
+def test_a_mesh_file_of_mujoco_is_read(tmp_path: Path) -> None:
+    """A tetrahedron with a normal and a texture coordinate, which are not used."""
+    points = np.vstack([np.zeros(3), np.eye(3)]).astype("<f4")
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], dtype="<i4")
+    header = np.array([4, 1, 1, 4], dtype="<i4")
+    unused = np.zeros(5, dtype="<f4")
+    data = b"".join(part.tobytes() for part in (header, points, unused, faces))
+    np.testing.assert_array_equal(mesh_corners(data, "m.msh"), points[faces])
+    for damaged in (data[:-4], data[:3], b"", data[:-4] + b"\x09\0\0\0"):
+        with pytest.raises(FormatError, match=r"m\.msh"):
+            mesh_corners(damaged, "m.msh")
+    (tmp_path / "m.msh").write_bytes(data)
+    file = tmp_path / "model.xml"
+    file.write_text(body("<joint/><geom type='mesh' mesh='m'/>", "<asset><mesh file='m.msh'/></asset>"))
+    assert ab.load_robot(file).robot.links[0].mass == pytest.approx(1000 / 6)
 
 
 def test_the_mass_properties_of_a_mesh_are_exact_for_a_tetrahedron() -> None:

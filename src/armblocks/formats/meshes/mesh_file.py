@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from armblocks.errors import FormatError
 from armblocks.formats.meshes.dae import dae_corners
 from armblocks.formats.meshes.glb import glb_corners
+from armblocks.formats.meshes.msh import msh_corners
 from armblocks.formats.meshes.obj import obj_corners
 from armblocks.formats.meshes.stl import stl_corners
 from armblocks.robot.shapes import Material, Mesh, Pose
@@ -30,6 +31,7 @@ READERS: Mapping[str, Callable[[bytes, str], Corners]] = {
     ".obj": obj_corners,
     ".dae": dae_corners,
     ".glb": glb_corners,
+    ".msh": msh_corners,
 }
 """The readers of mesh files by suffix: functions of a file's bytes and its name in messages."""
 
