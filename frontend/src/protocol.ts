@@ -246,7 +246,7 @@ export interface BreakLink {
   block: string;
 }
 /**
- * Type into one cell of a link, or of the robot if ``link`` is empty.
+ * Set the text of one cell of a link, or of the robot if ``link`` is empty.
  */
 export interface SetCell {
   kind: "cell";
@@ -272,7 +272,7 @@ export interface Connect {
   replace?: boolean;
 }
 /**
- * Interpret the D-H rows by the other convention, or convert them for the same arm (``keep_arm``).
+ * Interpret the D-H rows in another convention, or with ``keep_arm`` convert them for the same arm.
  */
 export interface SetConvention {
   kind: "convention";
@@ -379,7 +379,7 @@ export interface SheetNote {
   text: string;
 }
 /**
- * Exchange a link of a chain with its neighbour.
+ * Exchange a link of a chain with the previous link (``by`` is -1) or with the next one (1).
  */
 export interface MoveJoint {
   kind: "move_joint";
