@@ -13,6 +13,7 @@ from armblocks.formats import lint_robot
 from armblocks.formats.file_findings import Rule
 from armblocks.formats.mjcf.rules import MJCF_RULES
 from armblocks.formats.robot_lint import LINT_RULES
+from armblocks.formats.sdf.rules import SDF_RULES
 from armblocks.formats.urdf.rules import URDF_RULES
 
 Invoke = Callable[..., Result]
@@ -102,6 +103,8 @@ def test_show_and_convert_take_tip_packages_and_arguments(invoke: Invoke, tmp_pa
     assert "'prefix' is not of the form NAME=VALUE" in result.stderr
 
 
-@pytest.mark.parametrize("rule", [*LINT_RULES, *URDF_RULES, *MJCF_RULES], ids=lambda rule: rule.code)
+@pytest.mark.parametrize(
+    "rule", [*LINT_RULES, *URDF_RULES, *MJCF_RULES, *SDF_RULES], ids=lambda rule: rule.code
+)
 def test_every_code_is_documented(rule: Rule) -> None:
     assert f"`{rule.code}`" in (DOCS / "files.md").read_text(encoding="utf-8")

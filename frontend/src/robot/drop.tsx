@@ -44,7 +44,7 @@ export function DropZone() {
     <div className="drop-zone">
       <IconFileImport size={34} />
       <Text fw={600}>Drop the file to open it</Text>
-      <Text size="sm">a robot (.urdf, .xml), a robot script (.m), a robot or a diagram (.json)</Text>
+      <Text size="sm">a robot (.urdf, .sdf, .xml), a robot script (.m), a robot or a diagram (.json)</Text>
       <Text size="sm">measurements (.csv, .parquet, .mat, .npz) become a block of the sheet</Text>
     </div>
   )

@@ -96,12 +96,18 @@ class Element:
 
     def numbers(self, attribute: str, counts: Collection[int]) -> list[float]:
         """The numbers of an attribute that is present; ``counts``: how many there may be."""
-        text = self.attributes[attribute]
+        return self._numbers(f"the attribute '{attribute}'", self.attributes[attribute], counts)
+
+    def text_numbers(self, count: int) -> list[float]:
+        """``count`` numbers of the text inside the element, separated by spaces."""
+        return self._numbers(f"the element <{self.tag}>", self.text, (count,))
+
+    def _numbers(self, subject: str, text: str, counts: Collection[int]) -> list[float]:
         words = re.split(r"\s*,\s+|\s+", text.strip())  # a comma before a space separates, as a space does
         if len(words) not in counts:
             allowed = f"{min(counts)} to {max(counts)}" if len(counts) > 1 else str(max(counts))
             raise self.error(
-                f"the attribute '{attribute}' has {len(words)} values: '{shortened(text)}'",
+                f"{subject} has {len(words)} values: '{shortened(text)}'",
                 allowed=f"{allowed} number{'s' * (max(counts) > 1)}, separated by spaces",
             )
         values: list[float] = []
@@ -109,7 +115,7 @@ class Element:
             value = float(word) if _NUMBER.fullmatch(word) and len(word) <= 400 else math.nan
             if not math.isfinite(value):
                 raise self.error(
-                    f"the attribute '{attribute}' contains '{shortened(word)}', which is not a number",
+                    f"{subject} contains '{shortened(word)}', which is not a number",
                     allowed="finite decimal numbers such as 0.25 or -1.5e-3",
                     fix=_hint(word),
                 )

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import PurePath
 
 from armblocks.errors import FormatError
-from armblocks.files import read_bounded
 from armblocks.formats.file_findings import FileContext
-from armblocks.formats.meshes.mesh_file import MAX_BYTES, READERS, drawn_mesh, mesh_corners
-from armblocks.formats.referenced_files import resolved
+from armblocks.formats.link_shapes import PRIMITIVES, mesh_shape, primitive
 from armblocks.formats.urdf.origins import origin_of
 from armblocks.formats.urdf.rules import MESH, SHAPE
 from armblocks.formats.xml_elements import Element, note, shortened
-from armblocks.robot.shapes import Box, Cylinder, Material, Pose, Shape, Sphere
-from armblocks.spatial import Transform, transl
+from armblocks.robot.shapes import Material, Shape
+from armblocks.spatial import Transform
 
 
 def shapes_of(link: Element, context: FileContext, material: Material) -> tuple[Shape, ...] | None:
@@ -53,7 +50,7 @@ def _shapes(element: Element, link: Element, context: FileContext, material: Mat
     pose = origin_of(element, context)
     if kind.tag == "mesh":
         return _mesh(kind, link, context, pose, material)
-    if kind.tag not in ("box", "cylinder", "sphere", "capsule"):
+    if kind.tag not in PRIMITIVES:
         note(context, SHAPE, kind, f"the shape '{shortened(kind.tag)}' is not known", link.label)
         return []
     sizes = kind.vector("size", (1.0, 1.0, 1.0)) if kind.tag == "box" else _round_sizes(kind)
@@ -62,19 +59,7 @@ def _shapes(element: Element, link: Element, context: FileContext, material: Mat
             context, SHAPE, kind, f"the {kind.tag} has the size {min(sizes):g} m; it is left out", link.label
         )
         return []
-    if kind.tag == "box":
-        return [Box(size=(sizes[0], sizes[1], sizes[2]), material=material, pose=pose_rows(pose))]
-    radius, length, _ = sizes
-    ball = Sphere(radius=radius, material=material, pose=pose_rows(pose))
-    if kind.tag == "sphere":
-        return [ball]
-    body = Cylinder(radius=radius, length=length, material=material, pose=pose_rows(pose))
-    if kind.tag == "cylinder":
-        return [body]
-    ends = (transl(0.0, 0.0, side * length / 2) for side in (-1.0, 1.0))
-    shapes: list[Shape] = [body]
-    shapes += (replace(ball, pose=pose_rows(pose @ end)) for end in ends)
-    return shapes
+    return primitive(kind.tag, (sizes[0], sizes[1], sizes[2]), material, pose)
 
 
 def _mesh(
@@ -83,26 +68,12 @@ def _mesh(
     """The mesh of a file; a finding says why it is not shown."""
     file = kind.attributes.get("filename", "").strip()
     scale = kind.vector("scale", (1.0, 1.0, 1.0))
-    suffix = PurePath(file).suffix.lower()
-    if suffix not in READERS:
-        reason = f"'{shortened(suffix)}' meshes are not supported"
-    elif isinstance(path := resolved(file, context), str):
-        reason = path
-    else:
-        try:
-            corners = mesh_corners(read_bounded(path, MAX_BYTES), file, scale)
-            return [drawn_mesh(corners, material, pose_rows(pose))]
-        except FormatError as error:
-            reason = error.what
-    note(context, MESH, kind, f"the mesh '{shortened(file)}' is not shown: {reason}", link.label)
+    shape = mesh_shape(file, scale, material, pose, context)
+    if not isinstance(shape, str):
+        return [shape]
+    note(context, MESH, kind, f"the mesh '{shortened(file)}' is not shown: {shape}", link.label)
     return []
 
 
 def _round_sizes(kind: Element) -> tuple[float, float, float]:
     return kind.number("radius"), kind.number("length") if kind.tag != "sphere" else 1.0, 1.0
-
-
-def pose_rows(pose: Transform) -> Pose:
-    """The pose of a shape as rows of numbers."""
-    a, b, c, d = (tuple(row) for row in pose.matrix.tolist())
-    return (a, b, c, d)

@@ -1,0 +1,21 @@
+"""SDF, the description format of Gazebo."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from armblocks.formats.robot_format import RobotFormat
+
+if TYPE_CHECKING:
+    from armblocks.formats.file_findings import FileContext
+    from armblocks.robot import Robot
+
+
+def _read(data: bytes, name: str, context: FileContext) -> Mapping[str, Robot]:
+    from armblocks.formats.sdf.reader import read_sdf
+
+    return read_sdf(data, name, context)
+
+
+SDF = RobotFormat(name="SDF", suffixes=(".sdf",), max_bytes=16 * 2**20, read_in_context=_read)

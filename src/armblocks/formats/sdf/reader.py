@@ -1,0 +1,296 @@
+"""Robots from SDF: every model of a file or world is a robot.
+
+The frame of an SDF link can be anywhere on the link. With the joint's frame J, parent P and child C, the
+pose of the child is ``T_PC(q) = T_PJ motion(q) T_JC``; ``before`` of the link is ``T_PJ``, ``after`` is
+``T_JC``, both in the initial configuration of the file, in which all coordinates are zero. Where the child of
+a joint carries its parent, the joint is read in the opposite direction: ``T_CP(q) = T_CJ motion(-q) T_JP``.
+
+Links that are joined to the world are children of the base. The base is the frame of the model; its pose is
+that of the model in the world. A model without a joint to the world has a root link, which is fixed to the
+base: the first link that is not the child of a joint. Links are in depth-first order, the children of a link
+in the order of the joints in the file.
+
+Source: sdformat.org/spec, versions 1.4 to 1.12.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+from armblocks.errors import ArmblocksError, FormatError, RobotError
+from armblocks.formats.file_findings import FileContext
+from armblocks.formats.sdf.frames import WORLD, Frame, Frames, Scope
+from armblocks.formats.sdf.inertials import inertial_of
+from armblocks.formats.sdf.joints import GEARBOX, axes_of, joint_type_of
+from armblocks.formats.sdf.models import Models, source_of
+from armblocks.formats.sdf.rules import COUPLING, FREE_LINK, GRAVITY, UNKNOWN
+from armblocks.formats.sdf.shapes import shapes_of
+from armblocks.formats.sdf.values import is_true, text_in
+from armblocks.formats.xml_elements import Element, note, read_elements, shortened
+from armblocks.robot import Fixed, Link, Robot, deepest_tip, with_tip
+from armblocks.robot.checks import MAX_LINKS
+from armblocks.robot.shapes import Material
+from armblocks.spatial import Transform, Vector3
+
+_KNOWN = {
+    "model": {
+        *(
+            "link",
+            "joint",
+            "frame",
+            "model",
+            "include",
+            "pose",
+            "static",
+            "self_collide",
+            "gripper",
+            "plugin",
+        ),
+        *("allow_auto_disable", "enable_wind", "origin"),
+    },
+    "link": {
+        *("inertial", "visual", "collision", "pose", "gravity", "enable_wind", "self_collide", "kinematic"),
+        *(
+            "must_be_base_link",
+            "velocity_decay",
+            "sensor",
+            "projector",
+            "audio_sink",
+            "audio_source",
+            "battery",
+        ),
+        *("light", "particle_emitter", "origin", "damping", "turnGravityOff", "plugin", "contact"),
+    },
+    "joint": {
+        *("parent", "child", "pose", "axis", "axis2", "physics", "sensor", "gearbox_ratio", "thread_pitch"),
+        *("gearbox_reference_body", "screw_thread_pitch", "origin", "plugin"),
+    },
+}
+"""The elements that are read, or that describe neither kinematics nor dynamics."""
+
+
+class Edge(NamedTuple):
+    """A link, the joint and link that carry it; ``reverse``: it is read from child to parent."""
+
+    link: Frame
+    joint: Frame | None
+    carrier: Frame | None
+    reverse: bool
+
+
+def read_sdf(data: bytes, file: str, context: FileContext) -> Mapping[str, Robot]:
+    """The robots of an SDF file by the names of the models. ``file`` is its name in messages.
+
+    Findings are added to ``context``, also for models of a world that cannot be read. Raises ``FormatError``
+    with file and line for XML that cannot be read, and if no model can be read.
+    """
+    root = read_elements(data, file)
+    source = source_of(root, context.folder)
+    worlds = [*root.all("world")]
+    robots: dict[str, Robot] = {}
+    errors: list[ArmblocksError] = []
+    for element in [root, *worlds]:
+        models = Models(context)
+        world = models.world(element, source)
+        errors += models.errors
+        for model in [frame for frame in world.names.values() if frame.kind == "model"]:
+            try:
+                if model.name in robots:
+                    raise model.element.error("there is another model of this name", allowed="unique names")
+                robots[model.name] = robot_of(model, world, context)
+            except ArmblocksError as error:
+                errors.append(error)
+                if element.tag == "world":
+                    models.refused(model.element, error)
+    if errors and (not robots or not worlds):
+        raise errors[0]
+    if not robots:
+        raise root.error("the file has no models", allowed="<model name=…>", fix="choose another file")
+    return robots
+
+
+def robot_of(model: Frame, world: Scope, context: FileContext) -> Robot:
+    """The robot of a model."""
+    scope = model.inner
+    assert scope is not None
+    frames = Frames(context)
+    links = [*scope.frames("link")]
+    if not links:
+        raise model.element.error("the model has no links", allowed="<link name=…>", fix="add links")
+    if len(links) > MAX_LINKS:
+        raise model.element.error(
+            f"the model has {len(links)} links", allowed=f"at most {MAX_LINKS}", fix="split the model"
+        )
+    joints = [*scope.frames("joint")]
+    for element in (model.element, *(frame.element for frame in (*links, *joints))):
+        _note_unknown(element, context)
+    context.lines.update({link.name: link.element.line for link in links})
+    used = {link.name for link in links}
+    described: list[Link] = []
+    for edge in _depth_first(links, _edges(links, joints, frames), frames):
+        described += _links(edge, model, frames, used)
+    if not any(link.element.first("visual") or link.element.first("collision") for link in links):
+        described = [replace(link, geometry=None) for link in described]
+    base = frames.between(world.frame, model)
+    gravity = _gravity(world.frame.element)
+    try:
+        robot = Robot(name=model.name, links=tuple(described), base=base)
+        robot = robot if gravity is None else replace(robot, gravity=gravity)
+        return with_tip(robot, deepest_tip(described))
+    except RobotError as error:
+        raise FormatError(
+            f"{error.where}: {error.what}", where=model.element.where, allowed=error.allowed, fix=error.fix
+        ) from error
+
+
+def _note_unknown(element: Element, context: FileContext) -> None:
+    """Findings for misspelt elements. Elements with a prefix belong to other programs."""
+    for child in element.children:
+        if child.tag not in _KNOWN[element.tag] and ":" not in child.tag:
+            note(context, UNKNOWN, child, f"the element <{shortened(child.tag)}> is not read", element.label)
+
+
+def _gravity(world: Element) -> Vector3 | None:
+    """The gravity of a world, m/s2, if the file gives it; before SDF 1.5 it is in ``<physics>``."""
+    physics = world.first("physics")
+    gravity = world.first("gravity") or (physics.first("gravity") if physics is not None else None)
+    if gravity is None or not gravity.text:
+        return None
+    x, y, z = gravity.text_numbers(3)
+    return x, y, z
+
+
+def _edges(
+    links: list[Frame], joints: list[Frame], frames: Frames
+) -> list[tuple[Frame, Frame | None, Frame | None]]:
+    """Each joint with the links of its parent and child; ``None`` is the base.
+
+    Raises ``FormatError`` for a joint that closes a loop.
+    """
+    group: dict[Frame | None, Frame | None] = {link: link for link in (*links, None)}
+
+    def leader(link: Frame | None) -> Frame | None:
+        while group[link] is not link:
+            group[link] = group[group[link]]
+            link = group[link]
+        return link
+
+    edges: list[tuple[Frame, Frame | None, Frame | None]] = []
+    for joint in joints:
+        kind = joint_type_of(joint)
+        parent, child = (_end(joint, tag, frames) for tag in ("parent", "child"))
+        if joint.scope.fixed:
+            continue
+        if kind == GEARBOX:
+            what = "the gearbox is not read; the coordinates that it couples are independent"
+            note(frames.context, COUPLING, joint.element, what)
+            continue
+        a, b = leader(parent), leader(child)
+        if a is b:
+            ends = " and ".join(
+                "the world" if end is None else f"link '{shortened(end.name)}'" for end in (parent, child)
+            )
+            raise joint.element.error(
+                f"{ends} are already connected by other joints",
+                allowed="a tree of links: closed loops are not supported",
+                fix="remove one of the joints of the loop",
+            )
+        group[b] = a
+        edges.append((joint, parent, child))
+    return edges
+
+
+def _end(joint: Frame, tag: str, frames: Frames) -> Frame | None:
+    """The link at the parent or child of a joint; ``None`` for the world and for static models."""
+    element = joint.element.first(tag)
+    if element is None:
+        raise joint.element.error(
+            f"the joint has no <{tag}>", allowed=f"<{tag}>name of a link</{tag}>", fix=f"add the {tag} link"
+        )
+    name = element.text or element.required("link", "the name of a link")
+    link = frames.body(frames.named(joint, name, element))
+    return None if link.kind == WORLD or link.scope.fixed else link
+
+
+def _depth_first(
+    links: list[Frame], edges: list[tuple[Frame, Frame | None, Frame | None]], frames: Frames
+) -> Iterator[Edge]:
+    """Each link with the joint that carries it, carriers before their children."""
+    at: dict[Frame | None, list[Edge]] = {}
+    children: set[Frame | None] = set()
+    for joint, parent, child in edges:
+        children.add(child)
+        if child is not None:
+            at.setdefault(parent, []).append(Edge(child, joint, parent, False))
+        if parent is not None:
+            at.setdefault(child, []).append(Edge(parent, joint, child, True))
+    reached: set[Frame] = set()
+    roots = [Edge(link, None, None, False) for link in links if link.scope.fixed]
+    grounded = bool(roots) or None in at
+    waiting = [*reversed(at.get(None, [])), *reversed(roots)]
+    free = iter([link for link in links if link not in children] + links)
+    while True:
+        while waiting:
+            edge = waiting.pop()
+            if edge.link in reached:
+                continue
+            reached.add(edge.link)
+            yield edge
+            waiting += [
+                onward for onward in reversed(at.get(edge.link, [])) if onward.joint is not edge.joint
+            ]
+        root = next((link for link in free if link not in reached), None)
+        if root is None:
+            return
+        if grounded:
+            what = "no joint connects the link with the others; it is fixed to the base"
+            note(frames.context, FREE_LINK, root.element, what)
+        grounded = True
+        waiting = [Edge(root, None, None, False)]
+
+
+def _links(edge: Edge, model: Frame, frames: Frames, used: set[str]) -> Iterator[Link]:
+    """The link of an edge; before it, for a joint with two axes, a massless link with the joint's name."""
+    link, joint = edge.link, edge.joint
+    carrier = edge.carrier or model
+    parent = None if edge.carrier is None else edge.carrier.name
+    axes = axes_of(joint, frames, edge.reverse) if joint is not None else []
+    if joint is None or not axes:
+        before, after, moving, motor = frames.between(carrier, link), Transform(), Fixed(), None
+    else:
+        before, after = frames.between(carrier, joint), frames.between(joint, link)
+        for moving, motor in axes[:-1]:
+            name = joint.name
+            while name in used:
+                name += "_"
+            used.add(name)
+            yield Link(name=name, parent=parent, joint=moving, before=before, motor=motor, geometry=())
+            before, parent = Transform(), name
+        moving, motor = axes[-1]
+    moves = joint is not None and not link.scope.fixed
+    inertial = inertial_of(link, frames, moves)
+    if (
+        moves
+        and link.element.first("gravity") is not None
+        and not is_true(link.element, text_in(link.element, "gravity"))
+    ):
+        note(
+            frames.context,
+            GRAVITY,
+            link.element,
+            "gravity is disabled for the link; in armblocks it acts on all links",
+        )
+    yield Link(
+        name=link.name,
+        parent=parent,
+        joint=moving,
+        before=before,
+        after=after,
+        mass=inertial.mass,
+        centre_of_mass=inertial.centre,
+        inertia=inertial.inertia,
+        motor=motor,
+        geometry=shapes_of(link, frames, Material.PAINT if moves else Material.BASE),
+    )

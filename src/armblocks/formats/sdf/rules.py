@@ -1,0 +1,100 @@
+"""The rules that findings about SDF files refer to."""
+
+from __future__ import annotations
+
+from armblocks.formats.file_findings import Rule
+
+AXIS = Rule(
+    code="sdf-axis",
+    allowed="an <axis> with an <xyz> of length 1",
+    remedy="add the axis, or divide it by its length",
+)
+LIMIT = Rule(
+    code="sdf-limit",
+    allowed="lower < upper, effort and velocity above zero, or negative where there is no limit",
+    remedy="correct the limit, or remove the element where it is unknown",
+)
+DAMPING = Rule(
+    code="sdf-dynamics",
+    allowed="damping and friction of zero or more",
+    remedy="correct the sign",
+)
+SPRING = Rule(
+    code="sdf-spring",
+    allowed="joints without springs",
+    remedy="add the torque of the spring in a diagram",
+)
+COUPLING = Rule(
+    code="sdf-coupling",
+    allowed="joints that move independently: neither <mimic> nor gearboxes",
+    remedy="give the coordinates the values of the coupling",
+)
+NO_INERTIA = Rule(
+    code="sdf-inertia-default",
+    allowed="<inertial> with <mass> and <inertia> in every link that moves",
+    remedy="add the mass and the inertia; without them SDF has 1 kg and 1 kg m2",
+)
+AUTO_INERTIA = Rule(
+    code="sdf-inertia-auto",
+    allowed="inertias with numbers",
+    remedy="write the mass and the inertia that the shapes have",
+)
+GRAVITY = Rule(
+    code="sdf-gravity",
+    allowed="links with gravity",
+    remedy="balance the weight of the link in the model",
+)
+FREE_LINK = Rule(
+    code="sdf-free-link",
+    allowed="links that joints connect with each other or with the world",
+    remedy="add the missing joint, or make separate models of them",
+)
+MODEL = Rule(
+    code="sdf-model",
+    allowed="models that can be read",
+    remedy="correct the model, or load its own file",
+)
+FRAME = Rule(
+    code="sdf-frame",
+    allowed="the attribute relative_to with the name of a frame (before SDF 1.7: no attribute frame)",
+    remedy="remove the attribute, or correct the name",
+)
+ANGLE = Rule(
+    code="sdf-angle",
+    allowed='angles in rad, or degrees="true"',
+    remedy='add degrees="true" to the <pose>',
+)
+UNKNOWN = Rule(
+    code="sdf-unknown-element",
+    allowed="the elements of SDF",
+    remedy="correct the spelling, or remove the element",
+)
+MESH = Rule(
+    code="sdf-mesh",
+    allowed="STL, OBJ, COLLADA and GLB meshes that can be found",
+    remedy="give the folder of the model or package with packages={…}, or convert the mesh to STL or OBJ",
+)
+SHAPE = Rule(
+    code="sdf-shape",
+    allowed="box, cylinder, sphere, capsule and mesh, with sizes above zero",
+    remedy="correct the shape",
+)
+
+SDF_RULES = (
+    AXIS,
+    LIMIT,
+    DAMPING,
+    SPRING,
+    COUPLING,
+    NO_INERTIA,
+    AUTO_INERTIA,
+    GRAVITY,
+    FREE_LINK,
+    MODEL,
+    FRAME,
+    ANGLE,
+    UNKNOWN,
+    MESH,
+    SHAPE,
+)
+"""All rules of this format."""
