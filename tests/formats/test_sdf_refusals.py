@@ -106,17 +106,17 @@ INVALID = [
 
 @pytest.mark.parametrize(("text", "words"), INVALID, ids=range(len(INVALID)))
 def test_invalid_files_are_refused_with_file_line_and_reason(text: str, words: str) -> None:
-    began = time.perf_counter()
+    began = time.process_time()
     with pytest.raises(ArmblocksError) as refused:
         read_sdf(text.encode(), "r.sdf", FileContext())
     assert words in str(refused.value)
     assert str(refused.value).startswith("r.sdf")
     assert len(str(refused.value)) < 700
-    assert time.perf_counter() - began < 20
+    assert time.process_time() - began < 20
 
 
 def test_long_chains_of_links_and_frames_are_read_in_bounded_time() -> None:
-    began = time.perf_counter()
+    began = time.process_time()
     (robot,) = read_sdf(chain(1000).encode(), "r.sdf", FileContext()).values()
     assert robot.n == 999
     links = f'<link name="l0">{INERTIAL}</link>' + "".join(
@@ -127,7 +127,7 @@ def test_long_chains_of_links_and_frames_are_read_in_bounded_time() -> None:
     text = f'<sdf version="1.9"><model name="r">{links}{joints}'
     (robot,) = read_sdf(text.encode(), "r.sdf", FileContext()).values()
     assert robot.links[-1].before.translation == (1.0, 0.0, 0.0)
-    assert time.perf_counter() - began < 30
+    assert time.process_time() - began < 30
 
 
 BASE = Conversion(random_urdf(0, links=4), 0).sdf
