@@ -12,7 +12,7 @@ from typer.testing import Result
 from armblocks.formats import lint_robot
 from armblocks.formats.file_findings import Rule
 from armblocks.formats.mjcf.rules import MJCF_RULES
-from armblocks.formats.robot_lint import LINT_RULES
+from armblocks.formats.robot_rules import LINT_RULES
 from armblocks.formats.sdf.rules import SDF_RULES
 from armblocks.formats.urdf.rules import URDF_RULES
 
@@ -89,6 +89,52 @@ def test_a_file_that_cannot_be_read_has_exit_code_2(invoke: Invoke, tmp_path: Pa
     result = invoke("lint", "arm.urdf")
     assert result.exit_code == 2
     assert "this is not well-formed XML" in result.stderr
+
+
+DAMAGED = CLEAN.replace("<limit", '<axis xyz="0 0 2"/><limit').replace('lower="-1"', 'lower="3"')
+
+
+def test_fix_writes_a_corrected_copy_and_says_what_remains(invoke: Invoke, tmp_path: Path) -> None:
+    file, copy = tmp_path / "arm.urdf", tmp_path / "arm.fixed.urdf"
+    file.write_text(DAMAGED, encoding="utf-8")
+    result = invoke("lint", "arm.urdf", "--fix")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.splitlines() == [
+        "arm.urdf:4, joint 'j': axis divided by its length 2 [urdf-axis]",
+        "arm.urdf:4, joint 'j': limits exchanged: from 1 to 3 [urdf-limit]",
+        "arm.fixed.urdf: 2 corrections, written",
+        "arm.fixed.urdf: no remaining findings",
+    ]
+    assert file.read_text(encoding="utf-8") == DAMAGED
+    assert lint_robot(copy) == ()
+    result = invoke("lint", "arm.fixed.urdf", "--fix")
+    assert result.exit_code == 0
+    assert "arm.fixed.urdf: nothing to correct, no file written" in result.stdout
+    file.write_text(DAMAGED.replace('izz="1"', 'izz="5"'), encoding="utf-8")
+    result = invoke("lint", "arm.urdf", "--fix", "--force")
+    assert result.exit_code == 1
+    assert "arm.fixed.urdf:5, link 'arm': the greatest" in result.stdout
+    assert "arm.fixed.urdf: 1 remaining finding\n" in result.stdout
+
+
+def test_the_file_itself_is_replaced_only_in_place(invoke: Invoke, tmp_path: Path) -> None:
+    file = tmp_path / "arm.urdf"
+    file.write_text(DAMAGED, encoding="utf-8")
+    refusals = {
+        ("--fix", "--output", "arm.urdf"): "the copy would replace the file itself",
+        ("--fix", "--output", "arm.json"): "the copy has the suffix '.json'",
+        ("--fix", "--output", "b.urdf", "--in-place"): "both --output and --in-place are given",
+        ("--output", "b.urdf"): "nothing is written without --fix",
+    }
+    for options, message in refusals.items():
+        result = invoke("lint", "arm.urdf", *options)
+        assert result.exit_code == 2 and message in result.stderr
+    assert invoke("lint", "arm.urdf", "--fix", "--output", "b.urdf").exit_code == 0
+    result = invoke("lint", "arm.urdf", "--fix", "--output", "b.urdf")
+    assert result.exit_code == 2 and "the file exists already" in result.stderr
+    assert file.read_text(encoding="utf-8") == DAMAGED
+    assert invoke("lint", "arm.urdf", "--fix", "--in-place").exit_code == 0
+    assert lint_robot(file) == ()
 
 
 def test_show_and_convert_take_tip_packages_and_arguments(invoke: Invoke, tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from armblocks.formats.diagram_python import diagram_to_python
     from armblocks.formats.document_kinds import DocumentKind, kind_of_data, kind_of_document
     from armblocks.formats.matlab_script import Script, read_script
+    from armblocks.formats.robot_correction import CorrectedFile, correct_robot
     from armblocks.formats.robot_files import load_robot, read_robots, robot_bytes
     from armblocks.formats.robot_format import RobotFormat
     from armblocks.formats.robot_formats import ROBOT_FORMATS, ROBOT_SUFFIXES
@@ -30,12 +31,14 @@ else:
     __getattr__ = lazy_exports(
         __name__,
         {
+            "CorrectedFile": "armblocks.formats.robot_correction",
             "DocumentKind": "armblocks.formats.document_kinds",
             "ROBOT_FORMATS": "armblocks.formats.robot_formats",
             "ROBOT_SUFFIXES": "armblocks.formats.robot_formats",
             "ResolveRobot": "armblocks.formats.robot_references",
             "RobotFormat": "armblocks.formats.robot_format",
             "Script": "armblocks.formats.matlab_script",
+            "correct_robot": "armblocks.formats.robot_correction",
             "diagram_from_bytes": "armblocks.formats.diagram_json",
             "diagram_to_bytes": "armblocks.formats.diagram_json",
             "diagram_to_python": "armblocks.formats.diagram_python",
@@ -64,10 +67,12 @@ else:
 __all__ = [
     "ROBOT_FORMATS",
     "ROBOT_SUFFIXES",
+    "CorrectedFile",
     "DocumentKind",
     "ResolveRobot",
     "RobotFormat",
     "Script",
+    "correct_robot",
     "diagram_from_bytes",
     "diagram_to_bytes",
     "diagram_to_python",

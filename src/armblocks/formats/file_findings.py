@@ -27,7 +27,8 @@ class FileFinding:
     """One finding about a file.
 
     ``file`` and ``line`` (0 if unknown); ``element``: the named part of the robot, such as ``link 'a'``;
-    ``what``: the value that was found and how it is read.
+    ``what``: the value that was found and how it is read. ``index``: the place of the XML element among the
+    start tags of the file, if the finding is about one; ``link``: the link that it is about.
     """
 
     rule: Rule
@@ -35,6 +36,8 @@ class FileFinding:
     line: int = 0
     element: str = ""
     what: str
+    index: int | None = field(default=None, compare=False, repr=False)
+    link: str = field(default="", compare=False, repr=False)
 
     @property
     def where(self) -> str:

@@ -44,7 +44,7 @@ def load_robot(
     """
     context = file_context(packages, arguments)
     robot = load_robot_in(name_or_path, context, name=name)
-    if _is_file(name_or_path):
+    if is_file(name_or_path):
         warn_of_findings(context.findings)
         warn_of_inertias(robot)
         warn_of_implausible_values(robot)
@@ -73,9 +73,8 @@ def load_robot_in(
         where="load_robot",
     )
     text = fspath(name_or_path)
-    if _is_file(name_or_path):
-        robot = _selected_robot(_read_file(Path(text), context), text, name)
-        return replace(robot, source=text)
+    if is_file(name_or_path):
+        return robot_in_bytes(robot_file_bytes(Path(text)), Path(text), context, name=name)
     robot = shipped_robot(text)
     return robot if name is None else _selected_robot({text: robot}, text, name)
 
@@ -87,11 +86,19 @@ def shipped_robot(name: str) -> Robot:
     if name not in known:
         raise UnknownNameError("shipped robot", name, known)
     path = shipped_folder("robots") / name / ROBOT_FILE
-    (robot,) = _read_file(path, FileContext()).values()
+    robot = robot_in_bytes(robot_file_bytes(path), path, FileContext())
     return replace(robot, source=name)
 
 
-def _is_file(name_or_path: str | PathLike[str]) -> bool:
+def robot_in_bytes(data: bytes, path: Path, context: FileContext, *, name: str | None = None) -> Robot:
+    """The robot of the bytes of a file, as :func:`load_robot_in` reads it from the file."""
+    inside = replace(context, folder=path.absolute().parent)
+    robots = format_of(str(path)).robots(data, str(path), inside)
+    return replace(_selected_robot(robots, str(path), name), source=str(path))
+
+
+def is_file(name_or_path: str | PathLike[str]) -> bool:
+    """Whether this is the path of a file, and not the name of a shipped robot."""
     return not isinstance(name_or_path, str) or is_path(name_or_path)
 
 
@@ -100,7 +107,8 @@ def is_path(name_or_path: str) -> bool:
     return "/" in name_or_path or "\\" in name_or_path or name_or_path.lower().endswith(ROBOT_SUFFIXES)
 
 
-def _read_file(path: Path, context: FileContext) -> Mapping[str, Robot]:
+def robot_file_bytes(path: Path) -> bytes:
+    """The content of a robot file. Raises ``FormatError`` for folders, other suffixes and too large files."""
     if path.is_dir():
         raise FormatError(
             "this is a folder",
@@ -108,9 +116,7 @@ def _read_file(path: Path, context: FileContext) -> Mapping[str, Robot]:
             allowed="a robot file: " + ", ".join(ROBOT_SUFFIXES),
             fix=f"give the path of a file in it, such as {path.name}/{ROBOT_FILE}",
         )
-    format = _format(str(path))
-    data = read_bounded(path, format.max_bytes)
-    return format.robots(data, str(path), replace(context, folder=path.absolute().parent))
+    return read_bounded(path, format_of(str(path)).max_bytes)
 
 
 def read_robots(data: bytes, name: str, context: FileContext | None = None) -> Mapping[str, Robot]:
@@ -119,7 +125,7 @@ def read_robots(data: bytes, name: str, context: FileContext | None = None) -> M
     ``name`` is the name of the file in messages; its suffix determines the format. ``context``: the files
     that it may refer to; by default none. Raises ``FormatError``, and issues warnings for what is not read.
     """
-    format = _format(name)
+    format = format_of(name)
     if len(data) > format.max_bytes:
         raise FormatError(
             f"the file has {len(data)} bytes",
@@ -145,7 +151,8 @@ def robot_bytes(robot: Robot, name: str) -> bytes:
     return write_robot(robot)
 
 
-def _format(name: str) -> RobotFormat:
+def format_of(name: str) -> RobotFormat:
+    """The format of a file name. Raises ``FormatError`` for other suffixes."""
     suffix = Path(name).suffix.lower()
     for format in ROBOT_FORMATS:
         if suffix in format.suffixes:

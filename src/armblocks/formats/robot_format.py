@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from armblocks.formats.file_findings import FileContext
+    from armblocks.formats.file_corrections import Correction
+    from armblocks.formats.file_findings import FileContext, FileFinding
     from armblocks.robot import Robot
 
 Read = Callable[[bytes, str], "Mapping[str, Robot]"]
 Write = Callable[["Robot"], bytes]
 ReadInContext = Callable[[bytes, str, "FileContext"], "Mapping[str, Robot]"]
+Correct = Callable[[bytes, str, "Sequence[FileFinding]"], "Correction"]
 
 
 def _no_reader(data: bytes, name: str) -> Mapping[str, Robot]:
@@ -26,7 +28,8 @@ class RobotFormat:
     ``suffixes``: in lower case with the dot. ``max_bytes``: the maximum size of a file. ``read``: a function
     of a file's bytes and its name for messages, which returns the robots by their names in the file and
     raises ``FormatError``. A format whose files refer to other files, or that reports findings, has
-    ``read_in_context`` instead, with a :class:`FileContext` as third argument.
+    ``read_in_context`` instead, with a :class:`FileContext` as third argument. ``correct``: a function of a
+    file's bytes, its name and its findings, which corrects those whose remedy is certain.
     """
 
     name: str
@@ -35,6 +38,7 @@ class RobotFormat:
     read: Read = _no_reader
     read_in_context: ReadInContext | None = None
     write: Write | None = None
+    correct: Correct | None = None
 
     def robots(self, data: bytes, name: str, context: FileContext) -> Mapping[str, Robot]:
         """The robots of a file's bytes, by their names in the file; findings are added to the context."""

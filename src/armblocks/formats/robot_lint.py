@@ -3,34 +3,15 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from os import PathLike, fspath
 
 from armblocks.errors import ArmblocksWarning
 from armblocks.formats.file_findings import FileContext, FileFinding, Rule
 from armblocks.formats.robot_files import file_context, load_robot_in
+from armblocks.formats.robot_rules import IMPLAUSIBLE, INERTIA, NO_MASS, WARNED
 from armblocks.robot import Robot, inertia_findings, plausibility_findings
 from armblocks.robot.tree import BASE, KinematicTree
-
-INERTIA = Rule(
-    code="robot-inertia",
-    allowed="moments of inertia that are not negative, none above the sum of the other two",
-    remedy="check the unit and the axes of the inertia, and whether it is about the centre of mass",
-)
-IMPLAUSIBLE = Rule(
-    code="robot-units",
-    allowed="angles in rad, lengths in m, inertias in kg m2, gravity of a falling body",
-    remedy="convert the value, or ignore this finding if it is right",
-)
-NO_MASS = Rule(
-    code="robot-mass-missing",
-    allowed="mass or inertia that each joint moves, or motor inertia",
-    remedy="add the mass and the inertia of the links; kinematics do not depend on them",
-)
-WARNED = Rule(code="robot-warning", allowed="files that are read without warnings", remedy="see the message")
-
-LINT_RULES = (INERTIA, IMPLAUSIBLE, NO_MASS, WARNED)
-"""The rules of all formats."""
 
 
 def lint_robot(
@@ -46,10 +27,14 @@ def lint_robot(
     Raises the errors of ``load_robot`` for files that cannot be read.
     """
     context = file_context(packages, arguments)
+    return findings_of(lambda: load_robot_in(name_or_path, context, name=name), fspath(name_or_path), context)
+
+
+def findings_of(load: Callable[[], Robot], file: str, context: FileContext) -> tuple[FileFinding, ...]:
+    """The findings about the robot that ``load`` reads in a context; ``file`` is its name in messages."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ArmblocksWarning)
-        robot = load_robot_in(name_or_path, context, name=name)
-    file = fspath(name_or_path)
+        robot = load()
     found = [*context.findings, *_robot_findings(robot, file, context)]
     texts = [str(warning.message) for warning in caught if issubclass(warning.category, ArmblocksWarning)]
     found += [FileFinding(rule=WARNED, file=file, what=text) for text in dict.fromkeys(texts)]
@@ -59,7 +44,8 @@ def lint_robot(
 def _robot_findings(robot: Robot, file: str, context: FileContext) -> Iterator[FileFinding]:
     def finding(rule: Rule, link: str, what: str) -> FileFinding:
         element = f"link '{link}'" if link else f"robot '{robot.name}'"
-        return FileFinding(rule=rule, file=file, line=context.lines.get(link, 0), element=element, what=what)
+        line = context.lines.get(link, 0)
+        return FileFinding(rule=rule, file=file, line=line, element=element, what=what, link=link)
 
     for inertia in inertia_findings(robot):
         moments = ", ".join(f"{moment:.6g}" for moment in inertia.moments)

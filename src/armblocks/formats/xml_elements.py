@@ -31,7 +31,10 @@ _BEFORE_DECLARATION = re.compile(rb"\A((?:\s+|<!--(?:(?!-->).)*-->)+)(<\?xml[^>]
 
 @dataclass(eq=False)
 class Element:
-    """An element of an XML file. Its readers raise ``FormatError`` with file and line."""
+    """An element of an XML file. Its readers raise ``FormatError`` with file and line.
+
+    ``index``: its place among the start tags of the file, from 0.
+    """
 
     file: str
     line: int
@@ -39,6 +42,7 @@ class Element:
     attributes: dict[str, str]
     children: list[Element] = field(default_factory=list["Element"])
     texts: list[str] = field(default_factory=list[str])
+    index: int = 0
 
     @property
     def text(self) -> str:
@@ -127,7 +131,12 @@ def note(context: FileContext, rule: Rule, element: Element, what: str, label: s
     """Add a finding about an element."""
     context.findings.append(
         FileFinding(
-            rule=rule, file=element.file, line=element.line, element=label or element.label, what=what
+            rule=rule,
+            file=element.file,
+            line=element.line,
+            element=label or element.label,
+            what=what,
+            index=element.index,
         )
     )
 
@@ -163,7 +172,8 @@ class _Elements(ContentHandler):
         return self._parser.getLineNumber() or 1
 
     def startElement(self, name: str, attrs: AttributesImpl) -> None:
-        element = Element(self._file, self.line, name, {key: attrs[key] for key in attrs.getNames()})
+        attributes = {key: attrs[key] for key in attrs.getNames()}
+        element = Element(self._file, self.line, name, attributes, index=self._count)
         self._count += 1
         if len(self._open) >= MAX_DEPTH or self._count > MAX_ELEMENTS:
             raise element.error(

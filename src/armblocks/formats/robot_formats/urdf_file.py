@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from armblocks.formats.robot_format import RobotFormat
 
 if TYPE_CHECKING:
-    from armblocks.formats.file_findings import FileContext
+    from armblocks.formats.file_corrections import Correction
+    from armblocks.formats.file_findings import FileContext, FileFinding
     from armblocks.robot import Robot
 
 
@@ -25,6 +26,18 @@ def _write(robot: Robot) -> bytes:
     return write_urdf(robot)
 
 
+def _correct(data: bytes, name: str, findings: Sequence[FileFinding]) -> Correction:
+    from armblocks.formats.urdf.corrections import edits_of
+    from armblocks.formats.xml_corrections import corrected_xml
+
+    return corrected_xml(data, name, findings, edits_of)
+
+
 URDF = RobotFormat(
-    name="URDF", suffixes=(".urdf",), max_bytes=16 * 2**20, read_in_context=_read, write=_write
+    name="URDF",
+    suffixes=(".urdf",),
+    max_bytes=16 * 2**20,
+    read_in_context=_read,
+    correct=_correct,
+    write=_write,
 )

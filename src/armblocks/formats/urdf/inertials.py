@@ -8,7 +8,8 @@ import numpy as np
 
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.urdf.origins import origin_of
-from armblocks.formats.xml_elements import Element
+from armblocks.formats.urdf.rules import INERTIAL
+from armblocks.formats.xml_elements import Element, note
 from armblocks.spatial import IDENTITY3, Matrix3, Vector3, matrix3
 
 ZERO3: Matrix3 = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -31,6 +32,10 @@ def inertial_of(link: Element, context: FileContext) -> Inertial:
     if inertial is None:
         return Inertial()
     pose = origin_of(inertial, context)
+    missing = [tag for tag in ("mass", "inertia") if inertial.first(tag) is None]
+    if missing:
+        what = f"it has no <{'> and no <'.join(missing)}>, which is read as zero"
+        note(context, INERTIAL, inertial, what, link.label)
     mass = inertial.first("mass")
     kilograms = 0.0 if mass is None else mass.number("value")
     if mass is not None and kilograms < 0:

@@ -18,7 +18,8 @@ from armblocks.errors import FormatError, RobotError, UnknownNameError
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.urdf.inertials import inertial_of
 from armblocks.formats.urdf.joints import Transmission, joint_of, motor_of, transmissions_of
-from armblocks.formats.urdf.rules import UNKNOWN
+from armblocks.formats.urdf.names import free_joint_name
+from armblocks.formats.urdf.rules import NAME, UNKNOWN
 from armblocks.formats.urdf.shapes import shapes_of
 from armblocks.formats.urdf.xacro_expansion import expanded, uses_xacro
 from armblocks.formats.xml_elements import Element, note, read_elements, shortened
@@ -65,8 +66,8 @@ def robot_of(root: Element, context: FileContext) -> Robot:
             fix="check the format of the file; SDF and MJCF are not URDF",
         )
     _note_unknown(root, context)
-    links = _named(root, "link")
-    joints = _named(root, "joint")
+    links = _named(root, "link", context)
+    joints = _named(root, "joint", context)
     if not links:
         raise root.error("the robot has no links", allowed="<link name=…>", fix="add the links of the robot")
     if len(links) > MAX_LINKS:
@@ -100,19 +101,37 @@ def _note_unknown(root: Element, context: FileContext) -> None:
                 note(context, UNKNOWN, child, what, element.label)
 
 
-def _named(root: Element, tag: str) -> dict[str, Element]:
-    """The links or joints by name."""
+def _named(root: Element, tag: str, context: FileContext) -> dict[str, Element]:
+    """The links or joints by name.
+
+    A second joint of the same name gets another one, because nothing but its own elements refers to it. A
+    second link is left out if it is equal to the first, and refused if it is not.
+    """
     found: dict[str, Element] = {}
+    names = {element.attributes.get("name", "").strip() for element in root.all(tag)}
     for element in root.all(tag):
         name = element.required("name", "a name that is not empty")
         if name in found:
-            raise element.error(
-                f"there is another {tag} of this name in line {found[name].line}",
-                allowed="unique names",
-                fix="rename one of them",
-            )
+            place = f"there is another {tag} of this name in line {found[name].line}"
+            if tag == "joint":
+                new = free_joint_name(name, names)
+                note(context, NAME, element, f"{place}; this one is read as '{shortened(new)}'")
+                names.add(new)
+                name = element.attributes["name"] = new
+            elif _equal(element, found[name]):
+                note(context, NAME, element, f"{place} with the same content; this one is left out")
+                continue
+            else:
+                raise element.error(place, allowed="unique names", fix="rename one of them")
         found[name] = element
     return found
+
+
+def _equal(a: Element, b: Element) -> bool:
+    """Whether two elements have the same attributes, texts and children."""
+    return (
+        (a.tag, a.attributes, a.text, len(a.children)) == (b.tag, b.attributes, b.text, len(b.children))
+    ) and all(_equal(child, other) for child, other in zip(a.children, b.children))
 
 
 def _ends(joint: Element, links: Mapping[str, Element]) -> tuple[str, str]:

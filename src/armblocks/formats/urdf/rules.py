@@ -55,6 +55,17 @@ SHAPE = Rule(
     remedy="correct the shape",
 )
 
+INERTIAL = Rule(
+    code="urdf-inertial",
+    allowed="<mass> and <inertia> in every <inertial>",
+    remedy="add the missing element; it is read as zero",
+)
+NAME = Rule(
+    code="urdf-name",
+    allowed="unique names of links and joints",
+    remedy="rename or remove one of the elements",
+)
+
 URDF_RULES = (
     MIMIC,
     NO_LIMIT,
@@ -66,5 +77,7 @@ URDF_RULES = (
     UNKNOWN,
     MESH,
     SHAPE,
+    INERTIAL,
+    NAME,
 )
 """All rules of this format."""

@@ -1,0 +1,48 @@
+"""Corrections of MJCF files: the findings whose remedy is certain."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from armblocks.formats.file_corrections import are_degrees, numbers_text
+from armblocks.formats.file_findings import FileFinding
+from armblocks.formats.mjcf.rules import LIMIT
+from armblocks.formats.mjcf.settings import settings_of
+from armblocks.formats.robot_rules import IMPLAUSIBLE
+from armblocks.formats.xml_corrections import Edit, XmlFile
+from armblocks.formats.xml_elements import Element
+
+
+def edits_of(finding: FileFinding, element: Element, file: XmlFile) -> Sequence[Edit]:
+    """The changes that remove a finding; none if its remedy is not certain."""
+    if finding.rule is IMPLAUSIBLE:
+        return [*_range_in_degrees(finding.link, file)]
+    return [*_ordered_range(element)] if finding.rule.code == LIMIT.code else []
+
+
+def _ordered_range(joint: Element) -> Iterator[Edit]:
+    if "range" not in joint.attributes:
+        return  # in a default class, which other joints may use
+    low, high = joint.numbers("range", (2,))
+    if low > high:
+        what = f"range exchanged: from {high:g} to {low:g}"
+        yield Edit(element=joint, what=what, attributes={"range": numbers_text((high, low))})
+
+
+def _range_in_degrees(link: str, file: XmlFile) -> Iterator[Edit]:
+    """The range of the hinge of a link in a file whose angles are in rad."""
+    if settings_of(file.root).angle_unit != 1.0:
+        return
+    for joint in file.all("joint"):
+        body = file.parents.get(joint)
+        if body is None or body.tag != "body" or "range" not in joint.attributes:
+            continue
+        names = {joint.attributes.get("name", "").strip()}
+        if [*body.all("joint")][-1] is joint:
+            names.add(body.attributes.get("name", "").strip())
+        low, high = joint.numbers("range", (2,))
+        if link in names and joint.attributes.get("type", "hinge") == "hinge" and are_degrees((low, high)):
+            what = f"range {low:g} {high:g} converted from degrees to rad"
+            text = numbers_text((math.radians(low), math.radians(high)))
+            yield Edit(element=joint, what=what, attributes={"range": text})
