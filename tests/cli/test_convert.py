@@ -4,6 +4,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
 from numpy.testing import assert_allclose
 from typer.testing import Result
 
@@ -55,13 +56,14 @@ def test_conversions_that_do_not_exist_are_refused(invoke: Invoke, tmp_path: Pat
     assert not list(tmp_path.iterdir())
 
 
-def test_save_robot_and_convert_write_urdf(invoke: Invoke, tmp_path: Path) -> None:
+@pytest.mark.parametrize("suffix", [".urdf", ".sdf", ".xml", ".mjcf", ".json"])
+def test_save_robot_and_convert_write_every_format(invoke: Invoke, tmp_path: Path, suffix: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ArmblocksWarning)
-        result = invoke("convert", "twolink", "two.urdf")
+        result = invoke("convert", "twolink", f"two{suffix}")
         assert result.exit_code == 0, result.output
-        path = ab.save_robot(ab.load_robot("twolink"), tmp_path / "again.urdf")
-        assert path.read_bytes() == (tmp_path / "two.urdf").read_bytes()
+        path = ab.save_robot(ab.load_robot("twolink"), tmp_path / f"again{suffix}")
+        assert path.read_bytes() == (tmp_path / f"two{suffix}").read_bytes()
         arm = ab.load_robot(path)
     expected = ab.load_robot("twolink").fkine([0.3, 0.4])
     assert_allclose(arm.fkine([0.3, 0.4]), expected, atol=1e-12)

@@ -179,3 +179,16 @@ def test_the_child_of_a_joint_may_be_the_world() -> None:
     robot = read(two("<axis><xyz>0 0 1</xyz></axis>", more=more))
     assert robot.joint_names == ("base", "arm")
     assert_allclose(evaluate(robot, "fkine", [np.pi / 2, 0.0])[:3, 3], [0, -1, 0], atol=1e-15)
+
+
+def test_impossible_rotors_and_gears_are_left_out() -> None:
+    for inside in ("<drake:rotor_inertia>-1</drake:rotor_inertia>", "<drake:gear_ratio>0</drake:gear_ratio>"):
+        context = FileContext()
+        text = (
+            '<sdf version="1.9"><model name="m"><link name="a"/><joint name="j" type="revolute">'
+            f"<parent>world</parent><child>a</child><axis><xyz>0 0 1</xyz></axis>{inside}</joint>"
+            "</model></sdf>"
+        )
+        (robot,) = read_sdf(text.encode(), "m.sdf", context).values()
+        assert robot.motors == (None,)
+        assert "sdf-dynamics" in [finding.rule.code for finding in context.findings]

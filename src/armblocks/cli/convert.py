@@ -12,8 +12,8 @@ from armblocks.cli.robot_options import PackageFolders, TipName, XacroArguments,
 from armblocks.cli.terminal import results_console
 from armblocks.errors import FormatError
 
-_SUFFIXES = {"diagram": (".json", ".py"), "robot": (".json", ".urdf"), "library": (".json",)}
-"""The suffixes of the formats in which each kind of document is written."""
+_SUFFIXES = {"diagram": (".json", ".py"), "library": (".json",)}
+"""The suffixes of the formats in which diagrams and libraries are written."""
 
 
 def convert(
@@ -26,7 +26,9 @@ def convert(
     ],
     target: Annotated[
         Path,
-        typer.Argument(help="The file to write: .json, .urdf for a robot, .py for a diagram as a program."),
+        typer.Argument(
+            help="The file to write: .json, for a robot also .urdf, .sdf, .xml (MJCF), for a diagram .py."
+        ),
     ],
     name: Annotated[
         str | None, typer.Option("--name", help="Robot to select from a script with several robots.")
@@ -39,10 +41,10 @@ def convert(
         bool, typer.Option("--trust", help="Run the Python files that the diagram names.")
     ] = False,
 ) -> None:
-    """Write a robot (.json, .urdf), a diagram (.json, .py) or a library (.json) in another format."""
+    """Write a robot (.json, .urdf, .sdf, .xml), a diagram (.json, .py) or a library (.json)."""
     import armblocks as ab
     from armblocks.files import write_atomically
-    from armblocks.formats import DocumentKind, kind_of_document
+    from armblocks.formats import ROBOT_FORMATS, DocumentKind, kind_of_document
 
     if Path(source).suffix.lower() == ".py":
         raise FormatError(
@@ -52,7 +54,8 @@ def convert(
             fix='run it with an additional call ab.save_diagram(diagram, "model.json")',
         )
     kind = kind_of_document(source)
-    suffixes = _SUFFIXES[kind.value]
+    written = [suffix for format in ROBOT_FORMATS if format.write is not None for suffix in format.suffixes]
+    suffixes = _SUFFIXES.get(kind.value, tuple(written))
     if target.suffix.lower() not in suffixes:
         raise FormatError(
             f"a {kind.value} cannot be written as '{target.suffix or target.name}'",

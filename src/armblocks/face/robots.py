@@ -41,10 +41,11 @@ def load_robot(
 
 
 def save_robot(robot: Robot | Arm, path: str | PathLike[str]) -> Path:
-    """Write a robot as canonical JSON, or as URDF for the suffix ``.urdf``, atomically; returns the path.
+    """Write a robot atomically; returns the path.
 
-    URDF has no gravity, and friction at the joint only: other data are left out with a warning. Raises
-    FormatError for joint types that URDF does not have.
+    The suffix selects the format: ``.urdf``, ``.sdf``, ``.xml`` or ``.mjcf`` (MJCF), else canonical JSON.
+    JSON contains everything; data that another format does not have are left out with a warning. Raises
+    FormatError for joint types that the format does not have.
     """
     check_type(robot, (Robot, Arm), "a Robot or an Arm", where="save_robot")
     target = Path(path)

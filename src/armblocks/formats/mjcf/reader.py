@@ -106,6 +106,7 @@ class _Model:
         self.torques = torque_limits(root, self.defaults, context)
         self.body_names = {body.attributes.get("name", "").strip() for body in _bodies(root)}
         self.names: set[str] = set()
+        self.has_shapes = False
         self._note_left_out()
 
     def links(self) -> list[Link]:
@@ -125,6 +126,8 @@ class _Model:
                     "the model has too many bodies", allowed=f"at most {MAX_LINKS}", fix="split the model"
                 )
             waiting += reversed(bodies)
+        if not any(link.geometry for link in links) and not self.has_shapes:
+            links = [replace(link, geometry=None) for link in links]
         total = sum(link.mass for link in links)
         if self.settings.total_mass is not None and total > 0:
             factor = self.settings.total_mass / total
@@ -187,6 +190,7 @@ class _Model:
             elif child.tag in ("joint", "freejoint"):
                 contents.joints.append((self.defaults.applied(child, at.default_class), at.pose))
             elif child.tag == "geom" and shapes:
+                self.has_shapes = True
                 geom = self.defaults.applied(child, at.default_class)
                 contents.geoms.append(geom_of(geom, at.pose, self.settings))
             elif child.tag in _NOT_READ:

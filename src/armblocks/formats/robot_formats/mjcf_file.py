@@ -20,6 +20,12 @@ def _read(data: bytes, name: str, context: FileContext) -> Mapping[str, Robot]:
     return {robot.name: robot}
 
 
+def _write(robot: Robot) -> bytes:
+    from armblocks.formats.mjcf.writer import write_mjcf
+
+    return write_mjcf(robot)
+
+
 def _correct(data: bytes, name: str, findings: Sequence[FileFinding]) -> Correction:
     from armblocks.formats.mjcf.corrections import edits_of
     from armblocks.formats.xml_corrections import corrected_xml
@@ -28,5 +34,10 @@ def _correct(data: bytes, name: str, findings: Sequence[FileFinding]) -> Correct
 
 
 MJCF = RobotFormat(
-    name="MJCF", suffixes=(".xml", ".mjcf"), max_bytes=16 * 2**20, read_in_context=_read, correct=_correct
+    name="MJCF",
+    suffixes=(".xml", ".mjcf"),
+    max_bytes=16 * 2**20,
+    read_in_context=_read,
+    write=_write,
+    correct=_correct,
 )

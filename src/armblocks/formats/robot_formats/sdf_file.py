@@ -19,6 +19,12 @@ def _read(data: bytes, name: str, context: FileContext) -> Mapping[str, Robot]:
     return read_sdf(data, name, context)
 
 
+def _write(robot: Robot) -> bytes:
+    from armblocks.formats.sdf.writer import write_sdf
+
+    return write_sdf(robot)
+
+
 def _correct(data: bytes, name: str, findings: Sequence[FileFinding]) -> Correction:
     from armblocks.formats.sdf.corrections import edits_of
     from armblocks.formats.xml_corrections import corrected_xml
@@ -27,5 +33,10 @@ def _correct(data: bytes, name: str, findings: Sequence[FileFinding]) -> Correct
 
 
 SDF = RobotFormat(
-    name="SDF", suffixes=(".sdf",), max_bytes=16 * 2**20, read_in_context=_read, correct=_correct
+    name="SDF",
+    suffixes=(".sdf",),
+    max_bytes=16 * 2**20,
+    read_in_context=_read,
+    write=_write,
+    correct=_correct,
 )

@@ -127,7 +127,8 @@ def _magnitude(limit: Element, tag: str, joint: Frame, context: FileContext) -> 
 def motor_of(joint: Frame, axis: Element | None, context: FileContext) -> Motor | None:
     """The motor that gives a joint the friction of ``<dynamics>``: ``tau = damping qd + friction sign(qd)``.
 
-    Findings name springs and couplings, which are not read.
+    Rotor and gear are those of Drake's elements ``drake:rotor_inertia`` and ``drake:gear_ratio``. Findings
+    name springs and couplings, which are not read.
     """
     if axis is None:
         return None
@@ -136,9 +137,25 @@ def motor_of(joint: Frame, axis: Element | None, context: FileContext) -> Motor 
         leader = shortened(mimic.attributes.get("joint", ""))
         what = f"it mimics joint '{leader}'; its coordinate is independent in armblocks"
         note(context, COUPLING, mimic, what, joint.element.label)
-    dynamics = axis.first("dynamics")
-    if dynamics is None:
+    rotor = number_in(joint.element, "drake:rotor_inertia", 0.0)
+    gear = number_in(joint.element, "drake:gear_ratio", 1.0)
+    if rotor < 0 or gear == 0:
+        what = f"rotor inertia {rotor:g} and gear ratio {gear:g} are left out"
+        note(context, DAMPING, joint.element, what)
+        rotor, gear = 0.0, 1.0
+    damping, friction = _friction(joint, axis.first("dynamics"), context)
+    if damping == friction == rotor == 0 and gear == 1:
         return None
+    # Motor friction is multiplied by G² (viscous) and |G| (Coulomb).
+    Tc = friction / abs(gear)
+    B = damping / (gear * gear)
+    return Motor(inertia=rotor, gear_ratio=gear, viscous_friction=B, coulomb_friction=(Tc, -Tc))
+
+
+def _friction(joint: Frame, dynamics: Element | None, context: FileContext) -> tuple[float, float]:
+    """Damping and friction at the joint."""
+    if dynamics is None:
+        return 0.0, 0.0
     stiffness = number_in(dynamics, "spring_stiffness", 0.0)
     if stiffness:
         what = f"the spring with the stiffness {stiffness:g} is not read"
@@ -147,7 +164,5 @@ def motor_of(joint: Frame, axis: Element | None, context: FileContext) -> Motor 
     if damping < 0 or friction < 0:
         what = f"damping {damping:g} and friction {friction:g} would accelerate the joint; they are left out"
         note(context, DAMPING, dynamics, what, joint.element.label)
-        return None
-    if damping == friction == 0:
-        return None
-    return Motor(viscous_friction=damping, coulomb_friction=(friction, -friction))
+        return 0.0, 0.0
+    return damping, friction

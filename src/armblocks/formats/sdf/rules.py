@@ -16,7 +16,7 @@ LIMIT = Rule(
 )
 DAMPING = Rule(
     code="sdf-dynamics",
-    allowed="damping and friction of zero or more",
+    allowed="damping, friction and rotor inertia of zero or more",
     remedy="correct the sign",
 )
 SPRING = Rule(

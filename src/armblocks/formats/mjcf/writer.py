@@ -1,0 +1,263 @@
+"""MJCF text of a robot.
+
+A body has the frame of the link at the coordinate 0: its pose in the parent is ``before motion(offset)
+after``, and its joint is at the pose ``after`` inverse in the body. A link without mass, inertia and shapes
+that only carries the joint of the next link becomes an additional joint of that link's body, because MuJoCo
+does not accept moving bodies without mass. The pose of the base is included in the poses of the first bodies.
+The pose of the tool becomes a last body, so that ``fkine`` stays the same.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from armblocks.errors import FormatError
+from armblocks.formats.file_findings import FileContext
+from armblocks.formats.mjcf.reader import read_mjcf
+from armblocks.formats.robot_writing import (
+    check_joint,
+    file_names,
+    free_name,
+    inertial_in,
+    joint_friction,
+    numbers,
+    quoted,
+    warn,
+    warn_of_order,
+    warn_of_shapes,
+)
+from armblocks.formats.xml_elements import MAX_DEPTH
+from armblocks.robot import Link, Revolute, Robot
+from armblocks.robot.shapes import Box, Cylinder, Mesh, Shape, Sphere
+from armblocks.spatial import IDENTITY3, Matrix3, Transform
+
+_MOST_JOINTS = 6
+"""Maximum number of joints of a body in MuJoCo."""
+
+
+@dataclass(kw_only=True)
+class _Body:
+    """A body of the file: the link, the series of joints that move it, and its pose in the parent body.
+
+    ``joints``: the links whose joints these are, each with the pose of the body in the frame of the joint.
+    """
+
+    link: Link
+    pose: Transform
+    joints: list[tuple[Link, Transform]] = field(default_factory=list[tuple[Link, Transform]])
+    children: list[str] = field(default_factory=list[str])
+
+
+def write_mjcf(robot: Robot) -> bytes:
+    """The MJCF of a robot. Reading it gives the same kinematics and dynamics up to rounding.
+
+    Raises ``FormatError`` for joints that are neither revolute, prismatic nor fixed, and for chains of more
+    bodies than XML files may be deep. Warns of data that MJCF does not have: gear ratios (rotor inertia and
+    friction are written at the joint), speed limits, the tip and the order of the coordinates of some trees,
+    Coulomb friction that depends on the direction, friction that accelerates, housings. MuJoCo does not
+    accept moving bodies without mass or with physically impossible inertias; they are written as they are.
+    """
+    for link in robot.links:
+        check_joint(robot, link, "MJCF")
+    _warn_of_losses(robot)
+    names = file_names(robot, lambda name: name == "world", "MJCF")
+    meshes: list[str] = []
+    bodies, roots = _bodies(robot)
+    lines = _nested(robot, bodies, roots, names, meshes)
+    head = [
+        f"<mujoco model={quoted(robot.name or 'robot', robot)}>",
+        '  <compiler angle="radian" inertiafromgeom="false" autolimits="true"/>',
+        f'  <option gravity="{numbers(robot.gravity)}"/>',
+    ]
+    if meshes:
+        head += ["  <asset>", *(f"    {mesh}" for mesh in meshes), "  </asset>"]
+    text = "\n".join([*head, "  <worldbody>", *lines, "  </worldbody>", "</mujoco>"])
+    data = f'<?xml version="1.0"?>\n{text}\n'.encode()
+    tip = names[robot.links[-1].name] if robot.tool.is_identity else _tool_name(robot, names)
+    warn_of_order(robot, tip, read_mjcf(data, "robot.xml", FileContext()), "MJCF")
+    return data
+
+
+def _warn_of_losses(robot: Robot) -> None:
+    where = f"robot '{robot.name}'"
+    warn_of_shapes(robot, (Box, Cylinder, Sphere, Mesh), "MJCF")
+    moving = [link for link in robot.links if link.joint.moves]
+    if any(link.motor is not None and link.motor.gear_ratio != 1.0 for link in moving):
+        warn(where, "gear ratios are not part of an MJCF file; inertia and friction are those at the joint")
+    if any(link.joint.limits.speed is not None for link in moving):
+        warn(where, "speed limits are not part of an MJCF file")
+    for link in moving:
+        low, high = link.joint.limits.position or (0.0, 1.0)
+        if low == high:
+            warn(
+                f"{where}, link '{link.name}'", f"a range of zero width, {low:g}, is not part of an MJCF file"
+            )
+
+
+def _tool_name(robot: Robot, names: Mapping[str | None, str]) -> str:
+    return free_name("tool", {*names.values(), *(link.name for link in robot.links)})
+
+
+def _bodies(robot: Robot) -> tuple[dict[str, _Body], list[str]]:
+    """The bodies by the name of the link, and those at the base."""
+    children: dict[str | None, list[Link]] = {}
+    for link in robot.links:
+        children.setdefault(link.parent, []).append(link)
+    bodies: dict[str, _Body] = {}
+    roots: list[str] = []
+    series: dict[str, tuple[_Body, str | None]] = {}  # links that become joints of the next body
+    waiting = list(reversed(children.get(None, [])))
+    while waiting:
+        link = waiting.pop()
+        inside = children.get(link.name, [])
+        pose = link.before @ link.joint.motion(link.joint.offset) if link.joint.moves else link.before
+        if link.parent in series:
+            body, parent = series[link.parent]
+        else:
+            at_base = robot.base if link.parent is None else Transform()
+            body, parent = _Body(link=link, pose=at_base), link.parent
+        # The joints so far are followed by this link.
+        step = pose @ link.after
+        body.joints = [(carried, after @ step) for carried, after in body.joints]
+        body.pose, body.link = body.pose @ step, link
+        if link.joint.moves:
+            body.joints.append((link, link.after))
+        if _only_carries_a_joint(robot, link, inside) and len(body.joints) < _MOST_JOINTS:
+            series[link.name] = body, parent
+        else:
+            bodies[link.name] = body
+            (roots if parent is None else bodies[parent].children).append(link.name)
+        waiting += reversed(inside)
+    return bodies, roots
+
+
+def _only_carries_a_joint(robot: Robot, link: Link, children: Sequence[Link]) -> bool:
+    """Whether a link has no other purpose than to connect two joints."""
+    return (
+        len(children) == 1
+        and children[0].joint.moves
+        and link.joint.moves
+        and inertial_in(link, Transform()) is None
+        and not link.geometry
+        and link is not robot.links[-1]
+    )
+
+
+def _nested(
+    robot: Robot,
+    bodies: Mapping[str, _Body],
+    roots: Sequence[str],
+    names: Mapping[str | None, str],
+    meshes: list[str],
+) -> list[str]:
+    """The lines of the nested bodies; the tool is the last body in that of the tip."""
+    tip = robot.links[-1].name
+    lines: list[str] = []
+    waiting: list[tuple[str, int]] = [(name, 2) for name in reversed(roots)]
+    while waiting:
+        name, depth = waiting.pop()
+        if depth > MAX_DEPTH - 2:
+            raise FormatError(
+                f"the chain of links up to '{name}' has more than {MAX_DEPTH - 3} bodies inside each other",
+                where=f"robot '{robot.name}'",
+                allowed=f"at most {MAX_DEPTH - 3}",
+                fix="save the robot as .urdf, .sdf or .json",
+            )
+        indent = "  " * depth
+        if not name:
+            lines.append(f"{indent}</body>")
+            continue
+        body = bodies[name]
+        lines += [f"{indent}{line}" for line in _body_lines(robot, body, names, meshes)]
+        if name == tip and not robot.tool.is_identity:
+            tool = _tool_name(robot, names)
+            lines.append(f"{indent}  <body name={quoted(tool, robot)} {_placed(robot.tool)}/>")
+        waiting.append(("", depth))
+        waiting += [(child, depth + 1) for child in reversed(body.children)]
+    return lines
+
+
+def _body_lines(robot: Robot, body: _Body, names: Mapping[str | None, str], meshes: list[str]) -> list[str]:
+    """The start tag of a body, its joints, inertia and shapes."""
+    link = body.link
+    lines = [f"<body name={quoted(names[link.name], robot)} {_placed(body.pose)}>"]
+    lines += [f"  {_joint(robot, carried, after, names)}" for carried, after in body.joints]
+    inertial = inertial_in(link, Transform())
+    if inertial is not None:
+        centre, (xx, yy, zz, xy, yz, xz) = inertial
+        lines.append(
+            f'  <inertial pos="{numbers(centre)}" mass="{link.mass!r}" '
+            f'fullinertia="{numbers((xx, yy, zz, xy, xz, yz))}"/>'
+        )
+    for shape in link.geometry or ():
+        geometry = _geometry(shape, meshes)
+        if geometry:
+            pose = _placed(Transform.from_matrix(np.array(shape.pose)))
+            lines.append(f'  <geom {geometry} {pose} contype="0" conaffinity="0" group="1"/>')
+    return lines
+
+
+def _joint(robot: Robot, link: Link, after: Transform, names: Mapping[str | None, str]) -> str:
+    """The joint of a link in a body; ``after``: the pose of the body in the frame of the joint."""
+    joint, frame = link.joint, after.inverse()
+    axis = Transform(rotation=frame.rotation).apply(joint.axis)
+    kind = "hinge" if isinstance(joint, Revolute) else "slide"
+    words = [f'<joint name={quoted(names[link.name], robot)} type="{kind}"']
+    words += [f'pos="{numbers(frame.translation)}"', f'axis="{numbers(axis)}"']
+    limits = joint.limits
+    if limits.position is not None and limits.position[0] < limits.position[1]:
+        words.append(f'range="{numbers(limits.position)}"')
+    if limits.torque is not None:
+        words.append(f'actuatorfrcrange="{numbers((-limits.torque, limits.torque))}"')
+    damping, friction = joint_friction(robot, link, "MJCF")
+    armature = link.motor.reflected_inertia if link.motor is not None else 0.0
+    values = {"armature": armature, "damping": damping, "frictionloss": friction}
+    words += [f'{key}="{value!r}"' for key, value in values.items() if value]
+    return " ".join(words) + "/>"
+
+
+def _geometry(shape: Shape, meshes: list[str]) -> str:
+    """Type and size of a shape; a mesh is added to the assets. Empty for shapes that MJCF does not have."""
+    match shape:
+        case Box():
+            return f'type="box" size="{numbers([length / 2 for length in shape.size])}"'
+        case Cylinder():
+            return f'type="cylinder" size="{numbers((shape.radius, shape.length / 2))}"'
+        case Sphere():
+            return f'type="sphere" size="{numbers((shape.radius,))}"'
+        case Mesh():
+            name = f"mesh_{len(meshes)}"
+            vertices = numbers([value for vertex in shape.vertices for value in vertex])
+            faces = " ".join(str(index) for face in shape.faces for index in face)
+            meshes.append(f'<mesh name="{name}" inertia="shell" vertex="{vertices}" face="{faces}"/>')
+            return f'type="mesh" mesh="{name}"'
+        case _:
+            return ""
+
+
+def _placed(pose: Transform) -> str:
+    """The attributes of a pose."""
+    position = f'pos="{numbers(pose.translation)}"'
+    if pose.rotation == IDENTITY3:
+        return position
+    return f'{position} quat="{numbers(quaternion_of(pose.rotation))}"'
+
+
+def quaternion_of(R: Matrix3) -> tuple[float, float, float, float]:
+    """The quaternion w x y z of a rotation, by Shepperd's method, which divides by the largest component."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R
+    fours = (1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz)
+    products = (
+        (fours[0], zy - yz, xz - zx, yx - xy),
+        (zy - yz, fours[1], yx + xy, xz + zx),
+        (xz - zx, yx + xy, fours[2], zy + yz),
+        (yx - xy, xz + zx, zy + yz, fours[3]),
+    )
+    row = products[max(range(4), key=lambda k: fours[k])]
+    length = math.hypot(*row)
+    w, x, y, z = (value / length for value in row)
+    return w, x, y, z

@@ -1,0 +1,129 @@
+"""What the writers of URDF, SDF and MJCF share: names, joint friction, warnings of data that are left out."""
+
+from __future__ import annotations
+
+import math
+import re
+import warnings
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+from xml.sax.saxutils import quoteattr
+
+from armblocks.errors import ArmblocksWarning, FormatError
+from armblocks.robot import Fixed, Link, Prismatic, Revolute, Robot, with_tip
+from armblocks.robot.shapes import Shape
+from armblocks.spatial import Transform
+
+_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+class JointFriction(NamedTuple):
+    """Friction at the joint, ``tau = damping qd + friction sign(qd)``."""
+
+    damping: float = 0.0
+    friction: float = 0.0
+
+
+def check_joint(robot: Robot, link: Link, format: str) -> None:
+    """Raise ``FormatError`` for joints other than revolute, prismatic and fixed."""
+    if type(link.joint) not in (Revolute, Prismatic, Fixed):
+        raise FormatError(
+            f"the joint of link '{link.name}' is a {type(link.joint).__name__}, which {format} does not have",
+            where=f"robot '{robot.name}'",
+            allowed="revolute, prismatic and fixed joints",
+            fix="save the robot as .json",
+        )
+
+
+def joint_friction(robot: Robot, link: Link, format: str) -> JointFriction:
+    """The friction of the link's motor at the joint, with warnings of what the format cannot describe."""
+    if link.motor is None:
+        return JointFriction()
+    viscous, coulomb = robot.friction_model.factors(link.motor.gear_ratio)
+    plus, minus = (coulomb * torque for torque in link.motor.coulomb_friction)
+    damping, friction = viscous * link.motor.viscous_friction, (plus - minus) / 2
+    place = f"robot '{robot.name}', link '{link.name}'"
+    if not math.isclose(plus, -minus, rel_tol=1e-12, abs_tol=0.0):
+        warn(place, f"Coulomb friction {plus:g}, {minus:g} depends on the direction; the mean is written")
+    if damping < 0 or friction < 0:
+        warn(place, f"friction that accelerates the joint is not part of {format} files")
+        damping, friction = max(damping, 0.0), max(friction, 0.0)
+    return JointFriction(damping, friction)
+
+
+def inertial_in(link: Link, frame: Transform) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
+    """The centre of mass and the inertia xx yy zz xy yz xz of a link in a frame, ``frame`` its pose there.
+
+    ``None`` for a link without mass and inertia.
+    """
+    if not link.mass and not any(map(any, link.inertia)):
+        return None
+    R = frame.R
+    moment = link.I if frame.rotation == Transform().rotation else R @ link.I @ R.T
+    places = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
+    return frame.apply(link.centre_of_mass), tuple(float(moment[place]) for place in places)
+
+
+def warn_of_shapes(robot: Robot, kinds: Sequence[type[Shape]], format: str) -> None:
+    """Warn of shapes that the file does not contain: those of other kinds, and bevelled edges."""
+    others = [shape for link in robot.links for shape in link.geometry or () if type(shape) not in kinds]
+    if others:
+        names = ", ".join(sorted({type(shape).__name__ for shape in others}))
+        warn(f"robot '{robot.name}'", f"{len(others)} shapes ({names}) are not part of the {format} file")
+
+
+def warn_of_order(robot: Robot, tip: str, copy: Robot, format: str) -> None:
+    """Warn if the robot that the file gives has another tip, or its coordinates in another order.
+
+    The formats have no element for either; the readers choose the end of the chain with the most joints.
+    """
+    where = f"robot '{robot.name}'"
+    if copy.links[-1].name != tip:
+        warn(where, f"the tip is not part of the {format} file; load this one with tip={tip!r}")
+        copy = with_tip(copy, tip)
+    if copy.joint_names != robot.joint_names and sorted(copy.joint_names) == sorted(robot.joint_names):
+        order = ", ".join(copy.joint_names)
+        warn(where, f"the coordinates of the file are in another order: {order}")
+
+
+def file_names(robot: Robot, is_reserved: Callable[[str], bool], format: str) -> dict[str | None, str]:
+    """The names of the links in the file; a warning names links whose names the format reserves."""
+    used = {link.name for link in robot.links}
+    names: dict[str | None, str] = {}
+    for link in robot.links:
+        names[link.name] = link.name
+        if is_reserved(link.name):
+            new = free_name(link.name.replace("::", "_").strip("_") + "_", used)
+            names[link.name] = new
+            warn(f"robot '{robot.name}'", f"{format} reserves the name of link '{link.name}'; it is '{new}'")
+    return names
+
+
+def free_name(name: str, used: set[str]) -> str:
+    """A name that is not used, from now on used."""
+    while name in used:
+        name += "_"
+    used.add(name)
+    return name
+
+
+def numbers(values: Sequence[float]) -> str:
+    """Numbers with all digits, separated by spaces."""
+    return " ".join(repr(float(value) + 0.0) for value in values)
+
+
+def quoted(name: str, robot: Robot) -> str:
+    """A name as an XML attribute, with its quotes. Raises ``FormatError`` for control characters."""
+    if _NOT_XML.search(name):
+        raise FormatError(
+            f"the name {name!r} has characters that XML cannot contain",
+            where=f"robot '{robot.name}'",
+            allowed="printable characters",
+            fix="rename the link",
+        )
+    return quoteattr(name)
+
+
+def warn(where: str, what: str) -> None:
+    """Warn of data that the file does not contain."""
+    warnings.warn(f"{where}: {what}.", ArmblocksWarning, stacklevel=4)

@@ -1,0 +1,168 @@
+"""SDF text of a robot.
+
+The link of an SDF file has the same frame as the link of armblocks: the pose of the joint in the parent is
+``before motion(offset)``, and the pose of the link in the joint is ``after``. The base of the robot is the
+pose of the model. The pose of the tool becomes a last link, so that ``fkine`` stays the same.
+
+Motors have the elements ``drake:rotor_inertia`` and ``drake:gear_ratio`` of Drake; SDF itself has none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from xml.sax.saxutils import escape
+
+import numpy as np
+
+from armblocks.formats.file_findings import FileContext
+from armblocks.formats.robot_writing import (
+    check_joint,
+    file_names,
+    free_name,
+    inertial_in,
+    joint_friction,
+    numbers,
+    quoted,
+    warn_of_order,
+    warn_of_shapes,
+)
+from armblocks.formats.sdf.reader import read_sdf
+from armblocks.robot import Link, Revolute, Robot
+from armblocks.robot.robot import STANDARD_GRAVITY
+from armblocks.robot.shapes import Box, Cylinder, Shape, Sphere
+from armblocks.spatial import Transform
+
+_VERSION = "1.9"
+_DRAKE = "http://drake.mit.edu"
+
+
+def write_sdf(robot: Robot) -> bytes:
+    """The SDF of a robot. Reading it gives the same kinematics and dynamics up to rounding.
+
+    A robot with another gravity than -9.81 m/s2 along z is written as the model of a world with this gravity.
+
+    Raises ``FormatError`` for joints that are neither revolute, prismatic nor fixed. Warns of data that SDF
+    does not have: the tip and the order of the coordinates of some trees, Coulomb friction that depends on
+    the direction, friction that accelerates, meshes and housings, names that SDF reserves.
+    """
+    warn_of_shapes(robot, (Box, Cylinder, Sphere), "SDF")
+    names = file_names(robot, _is_reserved, "SDF")
+    used = set(names.values()) | {link.name for link in robot.links}
+    lines = [f"<model name={quoted(robot.name or 'robot', robot)}>"]
+    if not robot.base.is_identity:
+        lines.append(f"  {_pose(robot.base)}")
+    for link in robot.links:
+        joint = free_name(f"{names[link.name]}_joint", used)
+        lines += _link_lines(robot, link, names, joint)
+        lines += _joint_lines(robot, link, names, joint)
+    tip = names[robot.links[-1].name]
+    if not robot.tool.is_identity:
+        tip, last = free_name("tool", used), tip
+        lines += _tool_lines(robot, last, tip, free_name(f"{tip}_joint", used))
+    lines.append("</model>")
+    if not np.allclose(robot.gravity, STANDARD_GRAVITY, rtol=1e-15, atol=0.0):
+        gravity = f"  <gravity>{numbers(robot.gravity)}</gravity>"
+        lines = ['<world name="world">', gravity, *(f"  {line}" for line in lines), "</world>"]
+    head = f'<?xml version="1.0"?>\n<sdf version="{_VERSION}" xmlns:drake="{_DRAKE}">\n'
+    data = (head + "\n".join(f"  {line}" for line in lines) + "\n</sdf>\n").encode()
+    (copy,) = read_sdf(data, "robot.sdf", FileContext()).values()
+    warn_of_order(robot, tip, copy, "SDF")
+    return data
+
+
+def _is_reserved(name: str) -> bool:
+    return name == "world" or "::" in name or (name.startswith("__") and name.endswith("__"))
+
+
+def _link_lines(robot: Robot, link: Link, names: Mapping[str | None, str], joint: str) -> list[str]:
+    """The link. Without mass it has the mass 0, because the default of SDF is 1 kg."""
+    lines = [f"  <link name={quoted(names[link.name], robot)}>", f"    {_pose(link.after, joint, robot)}"]
+    centre, values = inertial_in(link, Transform()) or ((0.0,) * 3, (0.0,) * 6)
+    keys = ("ixx", "iyy", "izz", "ixy", "iyz", "ixz")
+    moments = "".join(f"<{key}>{value!r}</{key}>" for key, value in zip(keys, values))
+    lines += [
+        "    <inertial>",
+        f"      <pose>{numbers([*centre, 0.0, 0.0, 0.0])}</pose>",
+        f"      <mass>{link.mass!r}</mass>",
+        f"      <inertia>{moments}</inertia>",
+        "    </inertial>",
+    ]
+    for number, shape in enumerate(link.geometry or ()):
+        geometry = _geometry(shape)
+        if geometry:
+            pose = _pose(Transform.from_matrix(np.array(shape.pose)))
+            lines.append(f'    <visual name="visual_{number}">{pose}<geometry>{geometry}</geometry></visual>')
+    return [*lines, "  </link>"]
+
+
+def _geometry(shape: Shape) -> str:
+    """The element of a shape; empty for shapes that SDF does not have."""
+    match shape:
+        case Box():
+            return f"<box><size>{numbers(shape.size)}</size></box>"
+        case Cylinder():
+            return f"<cylinder><radius>{shape.radius!r}</radius><length>{shape.length!r}</length></cylinder>"
+        case Sphere():
+            return f"<sphere><radius>{shape.radius!r}</radius></sphere>"
+        case _:
+            return ""
+
+
+def _joint_lines(robot: Robot, link: Link, names: Mapping[str | None, str], name: str) -> list[str]:
+    check_joint(robot, link, "SDF")
+    joint = link.joint
+    kind = type(joint).__name__.lower()
+    if isinstance(joint, Revolute) and joint.limits.position is None:
+        kind = "continuous"
+    before = link.before @ joint.motion(joint.offset) if joint.moves else link.before
+    parent = "world" if link.parent is None else names[link.parent]
+    lines = [
+        f'  <joint name={quoted(name, robot)} type="{kind}">',
+        f"    {_pose(before, '__model__' if link.parent is None else parent, robot)}",
+        f"    <parent>{escape(parent)}</parent>",
+        f"    <child>{escape(names[link.name])}</child>",
+    ]
+    if joint.moves:
+        lines += ["    <axis>", f"      <xyz>{numbers(joint.axis)}</xyz>"]
+        lines += [f"      {line}" for line in (_limit(link), _dynamics(robot, link)) if line]
+        lines.append("    </axis>")
+        motor = link.motor
+        if motor is not None and (motor.gear_ratio, motor.inertia) != (1.0, 0.0):
+            lines.append(f"    <drake:rotor_inertia>{motor.inertia!r}</drake:rotor_inertia>")
+            lines.append(f"    <drake:gear_ratio>{motor.gear_ratio!r}</drake:gear_ratio>")
+    return [*lines, "  </joint>"]
+
+
+def _tool_lines(robot: Robot, last: str, tool: str, joint: str) -> list[str]:
+    """A link without mass at the pose of the tool."""
+    zero = "".join(f"<{key}>0</{key}>" for key in ("ixx", "iyy", "izz"))
+    return [
+        f'  <link name="{tool}">',
+        f"    {_pose(robot.tool, last, robot)}",
+        f"    <inertial><mass>0</mass><inertia>{zero}</inertia></inertial>",
+        "  </link>",
+        f'  <joint name="{joint}" type="fixed">',
+        f"    <parent>{escape(last)}</parent>",
+        f"    <child>{tool}</child>",
+        "  </joint>",
+    ]
+
+
+def _limit(link: Link) -> str:
+    limits = link.joint.limits
+    low, high = limits.position or (None, None)
+    values = {"lower": low, "upper": high, "effort": limits.torque, "velocity": limits.speed}
+    inner = "".join(f"<{key}>{value!r}</{key}>" for key, value in values.items() if value is not None)
+    return f"<limit>{inner}</limit>" if inner else ""
+
+
+def _dynamics(robot: Robot, link: Link) -> str:
+    damping, friction = joint_friction(robot, link, "SDF")
+    if not damping and not friction:
+        return ""
+    return f"<dynamics><damping>{damping!r}</damping><friction>{friction!r}</friction></dynamics>"
+
+
+def _pose(pose: Transform, frame: str = "", robot: Robot | None = None) -> str:
+    relative = f" relative_to={quoted(frame, robot)}" if robot is not None else ""
+    return f"<pose{relative}>{numbers([*pose.translation, *pose.rpy])}</pose>"
