@@ -55,7 +55,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(params=LAW_ROBOTS.values(), ids=list(LAW_ROBOTS))
 def robot(request: pytest.FixtureRequest) -> Robot:
-    """Every shipped robot, and random trees."""
+    """Shipped robots of different kinds, and random trees."""
     return request.param
 
 

@@ -37,16 +37,14 @@ def list_names(kind: Annotated[Kind, typer.Argument(help="The kind of items to l
 
 
 def _robots() -> Table:
-    import armblocks as ab
+    from armblocks.formats import list_robots
+    from armblocks.formats.robot_facts import shipped_summary
 
     rows = table(("robot", "left"), ("joints", "left"), ("description", "left"))
-    # Only names and descriptions are printed, so warnings about inertias are suppressed.
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", InertiaWarning)
-        for name in ab.list_robots():
-            robot = ab.load_robot(name).robot
-            description = "; ".join(text for text in (robot.manufacturer, robot.comment) if text)
-            rows.add_row(name, robot.joint_letters, description)
+    for name in list_robots():
+        robot = shipped_summary(name)
+        words = (robot.manufacturer, robot.title, robot.comment)
+        rows.add_row(name, robot.joint_letters, "; ".join(word for word in words if word))
     return rows
 
 

@@ -65,10 +65,15 @@ def show(
         packages=named_values(package, "--package"),
         arguments=named_values(argument, "--argument"),
     ).robot
-    # Loading a shipped robot gives no warnings about known deviations; this command prints them.
+    # Loading a shipped robot gives no warnings about impossible inertias; this command prints them. Its other
+    # values are compared with their sources by tests: ranges beyond a full turn are no mistakes there.
     warn_of_inertias(described)
-    warn_of_implausible_values(described)
-    print_robot(described, console)
+    if described.source in ab.list_robots():
+        print_robot(described, console)
+        print_facts(described.source, console)
+    else:
+        warn_of_implausible_values(described)
+        print_robot(described, console)
 
 
 def print_robot(robot: Robot, console: Console) -> None:
@@ -81,6 +86,27 @@ def print_robot(robot: Robot, console: Console) -> None:
         _print_links(robot, console, note, _MOTORS)
     _print_limits(robot, console)
     _print_frames(robot, console)
+
+
+def print_facts(name: str, console: Console) -> None:
+    """Print payload, reach, the origin of the masses, sources, licence and notes of a shipped robot."""
+    from armblocks.formats.robot_facts import shipped_facts
+
+    facts = shipped_facts(name)
+    console.print()
+    console.print("Facts", style=STRONG)
+    lines = [
+        ("payload", f"{facts.payload:g} kg" if facts.payload is not None else ""),
+        ("reach", f"{facts.reach:g} m" if facts.reach is not None else ""),
+        ("masses", facts.masses.value if facts.masses is not None else ""),
+        *(("source", source) for source in facts.sources),
+        ("licence", facts.licence),
+        ("compared with", facts.checked),
+    ]
+    for label, text in lines:
+        if text:
+            console.print(f"{label}: {text}", highlight=False, markup=False)
+    console.print(facts.notes, highlight=False, markup=False)
 
 
 def _print_heading(robot: Robot, console: Console) -> None:

@@ -3,7 +3,8 @@
 Angles may be texts such as ``"90 deg"``, and angular speeds such as ``"105 deg/s"``. The writer uses degrees
 where they have few digits and read back exactly. A link with a ``dh`` row takes its joint and transforms from
 it. Unknown keys are errors that suggest the nearest known key, because ignoring a misspelt key would give a
-wrong robot. ``notes`` is a comment and not preserved.
+wrong robot. ``notes`` is a comment, and ``facts`` are those of :mod:`armblocks.formats.robot_facts`. Neither
+is preserved.
 
 The JSON Schema is ``formats/schema/robot.schema.json``.
 """
@@ -17,6 +18,7 @@ from typing import cast
 from armblocks.errors import ArmblocksError, FormatError, RobotError
 from armblocks.formats.canonical_json import canonical_bytes
 from armblocks.formats.json_document import Node, closed_members, read_document
+from armblocks.formats.robot_facts import facts_from_json
 from armblocks.formats.shapes_json import shape_from_json, shape_to_json
 from armblocks.robot import (
     JOINT_TYPES,
@@ -43,6 +45,7 @@ _ROBOT_KEYS = (
     "manufacturer",
     "comment",
     "notes",
+    "facts",
     "base",
     "tool",
     "gravity",
@@ -74,6 +77,8 @@ def robot_from_json(node: Node) -> Robot:
         key: members[key].text() if key in members else ""
         for key in ("name", "manufacturer", "comment", "notes")
     }
+    if "facts" in members:
+        facts_from_json(members["facts"])
     model = FrictionModel.SQUARED_GEAR
     if "friction_model" in members:
         model = FrictionModel(members["friction_model"].choice([model.value for model in FrictionModel]))

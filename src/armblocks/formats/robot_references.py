@@ -33,6 +33,7 @@ from armblocks.diagram import TimeTable, UserFunction
 from armblocks.errors import ArmblocksError, FormatError, UnknownNameError
 from armblocks.formats.data_files import DataFiles, TableReference, UnrestrictedFiles
 from armblocks.formats.json_document import Node, closed_members
+from armblocks.formats.robot_facts import shipped_summary
 from armblocks.formats.robot_files import is_path, shipped_robot
 from armblocks.formats.robot_json import robot_from_json, robot_to_json
 from armblocks.formats.shipped import list_robots
@@ -236,9 +237,8 @@ def _candidates(
 ) -> Iterator[tuple[str, Robot]]:
     """Possible references to this robot, with the robots that they give."""
     for name in list_robots():
-        base = shipped_robot(name)
-        if base.name == robot.name:
-            yield name, base
+        if shipped_summary(name).title == robot.name:
+            yield name, shipped_robot(name)
     if robot.source and is_path(robot.source) and Path(robot.source).is_file():
         try:
             base = resolve_robot(robot.source)
