@@ -14,6 +14,7 @@ from armblocks.formats.file_findings import Rule
 from armblocks.formats.mjcf.rules import MJCF_RULES
 from armblocks.formats.robot_rules import LINT_RULES
 from armblocks.formats.sdf.rules import SDF_RULES
+from armblocks.formats.simscape.rules import SIMSCAPE_RULES
 from armblocks.formats.urdf.rules import URDF_RULES
 
 Invoke = Callable[..., Result]
@@ -150,7 +151,7 @@ def test_show_and_convert_take_tip_packages_and_arguments(invoke: Invoke, tmp_pa
 
 
 @pytest.mark.parametrize(
-    "rule", [*LINT_RULES, *URDF_RULES, *MJCF_RULES, *SDF_RULES], ids=lambda rule: rule.code
+    "rule", [*LINT_RULES, *URDF_RULES, *MJCF_RULES, *SDF_RULES, *SIMSCAPE_RULES], ids=lambda rule: rule.code
 )
 def test_every_code_is_documented(rule: Rule) -> None:
     assert f"`{rule.code}`" in (DOCS / "files.md").read_text(encoding="utf-8")

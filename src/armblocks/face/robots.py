@@ -24,7 +24,8 @@ def load_robot(
 ) -> Arm:
     """A shipped robot by name (``"kr180"``), or a robot from a file.
 
-    Files: ``.json``, ``.urdf``, ``.xacro``, ``.sdf``, MJCF ``.xml``, and toolbox scripts ``.m``.
+    Files: ``.json``, ``.urdf``, ``.xacro``, ``.sdf``, MJCF ``.xml``, toolbox scripts ``.m``, and the CAD
+    exports of Simscape Multibody (``.xml``, ``_DataFile.m``).
 
     ``name`` selects one of several robots in a script or a world. ``friction_model``: the formula of another
     toolbox release, see :class:`FrictionModel`; by default that of the file. ``tip``: the link that carries

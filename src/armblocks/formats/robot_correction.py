@@ -56,8 +56,8 @@ def correct_robot(
             fix="save it with armblocks convert, and correct the copy",
         )
     file = Path(path)
-    format = format_of(str(file))
     data = robot_file_bytes(file)
+    format = format_of(str(file), data)
     changes: list[Change] = []
 
     def findings() -> tuple[FileFinding, ...]:

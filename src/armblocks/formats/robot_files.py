@@ -93,7 +93,7 @@ def shipped_robot(name: str) -> Robot:
 def robot_in_bytes(data: bytes, path: Path, context: FileContext, *, name: str | None = None) -> Robot:
     """The robot of the bytes of a file, as :func:`load_robot_in` reads it from the file."""
     inside = replace(context, folder=path.absolute().parent)
-    robots = format_of(str(path)).robots(data, str(path), inside)
+    robots = format_of(str(path), data).robots(data, str(path), inside)
     return replace(_selected_robot(robots, str(path), name), source=str(path))
 
 
@@ -116,7 +116,9 @@ def robot_file_bytes(path: Path) -> bytes:
             allowed="a robot file: " + ", ".join(ROBOT_SUFFIXES),
             fix=f"give the path of a file in it, such as {path.name}/{ROBOT_FILE}",
         )
-    return read_bounded(path, format_of(str(path)).max_bytes)
+    data = read_bounded(path, max(format.max_bytes for format in _formats_with_suffix(str(path))))
+    _check_size(data, str(path))
+    return data
 
 
 def read_robots(data: bytes, name: str, context: FileContext | None = None) -> Mapping[str, Robot]:
@@ -125,7 +127,16 @@ def read_robots(data: bytes, name: str, context: FileContext | None = None) -> M
     ``name`` is the name of the file in messages; its suffix determines the format. ``context``: the files
     that it may refer to; by default none. Raises ``FormatError``, and issues warnings for what is not read.
     """
-    format = format_of(name)
+    format = _check_size(data, name)
+    context = context or FileContext()
+    robots = format.robots(data, name, context)
+    warn_of_findings(context.findings)
+    return robots
+
+
+def _check_size(data: bytes, name: str) -> RobotFormat:
+    """The format of a file. Raises ``FormatError`` if the file is too large for it."""
+    format = format_of(name, data)
     if len(data) > format.max_bytes:
         raise FormatError(
             f"the file has {len(data)} bytes",
@@ -133,14 +144,11 @@ def read_robots(data: bytes, name: str, context: FileContext | None = None) -> M
             allowed=f"at most {format.max_bytes}",
             fix="split the file, or write the robot as JSON",
         )
-    context = context or FileContext()
-    robots = format.robots(data, name, context)
-    warn_of_findings(context.findings)
-    return robots
+    return format
 
 
 def robot_bytes(robot: Robot, name: str) -> bytes:
-    """The content of a file with this name: URDF for ``.urdf``, else the canonical JSON document.
+    """The content of a file with this name: in the format of the suffix, else the canonical JSON document.
 
     Raises ``FormatError`` for robots that the format cannot describe.
     """
@@ -151,12 +159,24 @@ def robot_bytes(robot: Robot, name: str) -> bytes:
     return write_robot(robot)
 
 
-def format_of(name: str) -> RobotFormat:
-    """The format of a file name. Raises ``FormatError`` for other suffixes."""
+def format_of(name: str, data: bytes | None = None) -> RobotFormat:
+    """The format of a file. Formats with the same suffix are distinguished by the content, if it is given.
+
+    Raises ``FormatError`` for other suffixes.
+    """
+    formats = _formats_with_suffix(name)
+    if data is not None:
+        for format in formats:
+            if format.recognises is not None and format.recognises(data):
+                return format
+    return next((format for format in formats if format.recognises is None), formats[0])
+
+
+def _formats_with_suffix(name: str) -> list[RobotFormat]:
     suffix = Path(name).suffix.lower()
-    for format in ROBOT_FORMATS:
-        if suffix in format.suffixes:
-            return format
+    formats = [format for format in ROBOT_FORMATS if suffix in format.suffixes]
+    if formats:
+        return formats
     raise FormatError(
         f"'{Path(name).suffix}' is not a suffix of a robot file",
         where=name,

@@ -11,5 +11,7 @@ ROBOT_FORMATS: tuple[RobotFormat, ...] = tuple(
 )
 """All formats of robot files, by name."""
 
-ROBOT_SUFFIXES: tuple[str, ...] = tuple(suffix for format in ROBOT_FORMATS for suffix in format.suffixes)
+ROBOT_SUFFIXES: tuple[str, ...] = tuple(
+    dict.fromkeys(suffix for format in ROBOT_FORMATS for suffix in format.suffixes)
+)
 """The suffixes of robot files, in lower case with the dot."""

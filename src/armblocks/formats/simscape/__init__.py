@@ -1,0 +1,1 @@
+"""Robots from the CAD exports of Simscape Multibody: import XML, and data files of imported models."""
