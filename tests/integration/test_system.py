@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from armblocks.compiler import cache, pieces
+from armblocks.compiler import cache, tape_parts
 from armblocks.equations import HybridSystem, TracedFunction, continuous_system, signature
 from armblocks.errors import CompileError
 from armblocks.integration.system import CompiledSystem, cached_system, compile_system
@@ -81,7 +81,7 @@ def test_code_of_a_long_tape_without_lanes_gives_the_same_bits(
     x[5] = 1e300
     in_lanes = compile_system(pendulum()).evaluate_signals(t, x, empty, empty, p)
     monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
-    monkeypatch.setattr(pieces, "MAX_WEIGHT", 0)
+    monkeypatch.setattr(tape_parts, "MAX_WEIGHT", 0)
     assert compile_system(pendulum()).evaluate_signals(t, x, empty, empty, p).tobytes() == in_lanes.tobytes()
 
 

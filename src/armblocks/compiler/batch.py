@@ -5,10 +5,10 @@ from __future__ import annotations
 from armblocks.compiler.ir_text import Body, Module
 from armblocks.compiler.lane_memory import Line, load_rows, store_rows
 from armblocks.compiler.layout import BatchLayout, Layout
-from armblocks.compiler.pieces import emit_pieces, is_long
 from armblocks.compiler.program_text import add_program
 from armblocks.compiler.tape import Tape
 from armblocks.compiler.tape_operations import Inputs, Registers, emit_operations
+from armblocks.compiler.tape_parts import emit_parts, is_long
 from armblocks.routines.arithmetic import select
 from armblocks.routines.memory import Integers, Reals
 from armblocks.routines.routine import Program, Routine, external
@@ -123,7 +123,7 @@ def _add_block(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
     declared += [(f"ptr noalias{' readonly' if p[0] == 'i' else ''}", f"%{p}") for p in _pointers(tape)]
     body = Body(module, lanes)
     if is_long(tape):
-        undecided = emit_pieces(body, tape, name, declared, stores, inputs_of, store)
+        undecided = emit_parts(body, tape, name, declared, stores, inputs_of, store)
     else:
         registers = emit_operations(body, tape, inputs_of(body))
         for k in stores:

@@ -22,9 +22,9 @@ from collections.abc import Sequence
 
 from armblocks.compiler.ir_text import Body, Module
 from armblocks.compiler.lane_memory import Line
-from armblocks.compiler.pieces import emit_pieces, is_long
 from armblocks.compiler.tape import Tape
 from armblocks.compiler.tape_operations import Inputs, Registers, emit_operations
+from armblocks.compiler.tape_parts import emit_parts, is_long
 from armblocks.routines.llvm import number_text
 
 MIN_TABLE_CONSTANTS = 32
@@ -73,7 +73,7 @@ def emit_function(module: Module, tape: Tape, name: str, *, linkage: str = "inte
 
         if is_long(tape):
             groups = {register: (register,) for register in outputs}
-            emit_pieces(body, tape, name, pointers, groups, inputs_of, store)
+            emit_parts(body, tape, name, pointers, groups, inputs_of, store)
         else:
             # Each result is stored as soon as it is computed. Thousands of results stored at the end would be
             # spilled and reloaded, and the compile time would grow with the square of their number.

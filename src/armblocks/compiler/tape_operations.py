@@ -1,4 +1,4 @@
-"""The operations of a tape, or of a piece of it, as LLVM IR for function bodies with one or more lanes."""
+"""The operations of a tape, or of a part of it, as LLVM IR for function bodies with one or more lanes."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def emit_operations(
     """Emit all operations of the tape into ``body``; return the registers, from which outputs are read.
 
     ``written(register, registers)`` is called after each operation. If only the operations
-    ``selection`` are emitted, ``inputs.load`` also returns registers that other pieces have written.
+    ``selection`` are emitted, ``inputs.load`` also returns registers that other parts have written.
     """
     from armblocks.compiler import elementary  # not needed if the code comes from the disk cache
 

@@ -17,8 +17,8 @@ from armblocks.compiler.cached_tapes import cached_tape, slots_from_json, slots_
 from armblocks.compiler.ir_text import Module
 from armblocks.compiler.llvm_ir import emit_function
 from armblocks.compiler.native import Effort, NativeCode, load_code
-from armblocks.compiler.pieces import is_long
 from armblocks.compiler.tape import Tape
+from armblocks.compiler.tape_parts import is_long
 from armblocks.compiler.target import host_target
 from armblocks.integration.cached_jacobian import CachedJacobian, cached_jacobian
 from armblocks.integration.native_integrator import NativeIntegrator

@@ -1,9 +1,9 @@
-"""Long tapes divided into pieces, each of which becomes a function.
+"""Long tapes divided into parts, each of which becomes a function.
 
 LLVM's compile time grows faster than linearly with the length of a function, mainly because it compares loads
-and stores pairwise. Ten thousand operations take minutes in one function and seconds in pieces. Values that a
-later piece reads are passed through memory. This is slow if many values are reused, as in the dynamics of an
-arm, and fast in a chain of blocks. In the length of a piece, reads and writes therefore have a higher weight
+and stores pairwise. Ten thousand operations take minutes in one function and seconds in parts. Values that a
+later part reads are passed through memory. This is slow if many values are reused, as in the dynamics of an
+arm, and fast in a chain of blocks. In the length of a part, reads and writes therefore have a higher weight
 than arithmetic. The operations and their order are unchanged, and so are the results.
 """
 
@@ -20,14 +20,14 @@ from armblocks.compiler.work_space import WorkSpace
 
 MAX_WEIGHT = 2600
 """Maximum weight of a function that is not divided."""
-PIECE_WEIGHT = 600
-"""Approximate weight of a piece."""
+PART_WEIGHT = 600
+"""Approximate weight of a part."""
 ACCESS_WEIGHT, FUNCTION_WEIGHT = 4, 8
 """Weights of a read or write, and of an elementary function, in operations."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Piece:
+class TapePart:
     """Operations ``first`` to ``last - 1``, and the numbers of the store groups that follow them."""
 
     first: int
@@ -37,15 +37,15 @@ class Piece:
 
 @dataclass(frozen=True, kw_only=True)
 class DividedTape:
-    """A tape divided into pieces; ``slots`` are the memory slots of the registers that later pieces read."""
+    """A tape divided into parts; ``slots`` are the memory slots of the registers that later parts read."""
 
-    pieces: tuple[Piece, ...]
+    parts: tuple[TapePart, ...]
     slots: dict[int, int]
     size: int
 
 
 def is_long(tape: Tape) -> bool:
-    """Whether a tape should be divided into pieces."""
+    """Whether a tape should be divided into parts."""
     # The operands of a vector operation are copied in blocks, not read one by one.
     read = {r for opcode, operands in tape.operations if opcode not in VECTORS for r in operands}
     accesses = sum(register < tape.first_constant for register in read) + sum(tape.output_sizes)
@@ -57,12 +57,12 @@ Stores = Mapping[int, Sequence[int]]
 
 
 def divide(tape: Tape, stores: Stores) -> DividedTape:
-    """Divide a tape into pieces."""
+    """Divide a tape into parts."""
     first = tape.first_operation
     groups_by_register: dict[int, list[int]] = {}
     for number, registers in stores.items():
         groups_by_register.setdefault(max(registers, default=0), []).append(number)
-    pieces: list[Piece] = []
+    parts: list[TapePart] = []
     begin, weight = 0, 0
     pending: list[int] = []
     read: set[int] = set()
@@ -75,31 +75,31 @@ def divide(tape: Tape, stores: Stores) -> DividedTape:
         weight += FUNCTION_WEIGHT if opcode in ELEMENTARY else 1
         weight += ACCESS_WEIGHT * (len(complete) + len(new))
         following = tape.operations[k + 1].opcode if k + 1 < len(tape.operations) else None
-        # The members of a vector are in the piece that computes it.
-        if weight >= PIECE_WEIGHT and following is not Opcode.MEMBER:
-            pieces.append(Piece(first=begin, last=k + 1, stores=tuple(pending)))
+        # The members of a vector are in the part that computes it.
+        if weight >= PART_WEIGHT and following is not Opcode.MEMBER:
+            parts.append(TapePart(first=begin, last=k + 1, stores=tuple(pending)))
             begin, weight, pending = k + 1, 0, []
             read.clear()
     pending += [
         number for numbers in groups_by_register.values() for number in numbers
     ]  # only inputs and constants
-    end, limit = len(tape.operations), PIECE_WEIGHT // ACCESS_WEIGHT
+    end, limit = len(tape.operations), PART_WEIGHT // ACCESS_WEIGHT
     for start in range(0, max(1, len(pending)), limit):
-        pieces.append(Piece(first=begin, last=end, stores=tuple(pending[start : start + limit])))
+        parts.append(TapePart(first=begin, last=end, stores=tuple(pending[start : start + limit])))
         begin = end
-    return _with_slots(tape, stores, pieces)
+    return _with_slots(tape, stores, parts)
 
 
-def _with_slots(tape: Tape, stores: Stores, pieces: Sequence[Piece]) -> DividedTape:
-    """Assign memory to each register that a later piece reads, reusable after the last of these pieces."""
+def _with_slots(tape: Tape, stores: Stores, parts: Sequence[TapePart]) -> DividedTape:
+    """Assign memory to each register that a later part reads, reusable after the last of these parts."""
     first = tape.first_operation
     computed_in: dict[int, int] = {}
     last_read: dict[int, int] = {}
-    for number, piece in enumerate(pieces):
-        for k in range(piece.first, piece.last):
+    for number, part in enumerate(parts):
+        for k in range(part.first, part.last):
             computed_in[first + k] = number
-        read = [r for k in range(piece.first, piece.last) for r in tape.operations[k].operands]
-        read += [r for store in piece.stores for r in stores[store]]
+        read = [r for k in range(part.first, part.last) for r in tape.operations[k].operands]
+        read += [r for store in part.stores for r in stores[store]]
         for register in read:
             if register >= first:
                 last_read[register] = number
@@ -107,11 +107,11 @@ def _with_slots(tape: Tape, stores: Stores, pieces: Sequence[Piece]) -> DividedT
     slots: dict[int, int] = {}
     free: list[int] = []
     size = 0
-    shared = sorted(register for register, piece in last_read.items() if piece > computed_in[register])
+    shared = sorted(register for register, part in last_read.items() if part > computed_in[register])
     starts: dict[int, list[int]] = {}
     for register in shared:
         starts.setdefault(computed_in[register], []).append(register)
-    for number in range(len(pieces)):
+    for number in range(len(parts)):
         for register in starts.get(number, []):
             if not free:
                 free.append(size)
@@ -119,10 +119,10 @@ def _with_slots(tape: Tape, stores: Stores, pieces: Sequence[Piece]) -> DividedT
             slots[register] = free.pop()
             ends.setdefault(last_read[register], []).append(slots[register])
         free += ends.pop(number, [])
-    return DividedTape(pieces=tuple(pieces), slots=slots, size=size)
+    return DividedTape(parts=tuple(parts), slots=slots, size=size)
 
 
-def emit_pieces(
+def emit_parts(
     caller: Body,
     tape: Tape,
     name: str,
@@ -131,7 +131,7 @@ def emit_pieces(
     inputs_of: Callable[[Body], Inputs],
     store_group: Callable[[Body, Registers, int], None],
 ) -> str | None:
-    """Add the functions of a tape's pieces, and to ``caller`` the calls of all of them.
+    """Add the functions of a tape's parts, and to ``caller`` the calls of all of them.
 
     ``arguments`` are the types and names of the arguments that ``caller`` passes on. ``inputs_of(body)``
     returns the functions with which a body reads the inputs, ``store_group(body, registers, k)`` stores group
@@ -145,9 +145,9 @@ def emit_pieces(
     passed = [f"{kind.split()[0]} {argument}" for kind, argument in arguments] + [f"ptr {memory.address}"]
     bits = f"i{lanes}"
     undecided: str | None = None
-    for number, piece in enumerate(divided.pieces):
+    for number, part in enumerate(divided.parts):
         body = Body(module, lanes)
-        _emit_piece(body, tape, divided, piece, inputs_of(body), store_group)
+        _emit_part(body, tape, divided, part, inputs_of(body), store_group)
         symbol, result = f"{name}.{number}", "void" if body.undecided is None else bits
         call = f"call {result} @{symbol}({', '.join(passed)})"
         if body.undecided is None:
@@ -163,11 +163,11 @@ def emit_pieces(
     return undecided
 
 
-def _emit_piece(
+def _emit_part(
     body: Body,
     tape: Tape,
     divided: DividedTape,
-    piece: Piece,
+    part: TapePart,
     inputs: Inputs,
     store_group: Callable[[Body, Registers, int], None],
 ) -> None:
@@ -180,12 +180,10 @@ def _emit_piece(
             return inputs.load(register)
         return body.let(f"load {body.real}, ptr {address(register)}, align {8 * body.lanes}")
 
-    registers = emit_operations(
-        body, tape, Inputs(load, inputs.line), selection=range(piece.first, piece.last)
-    )
-    for store in piece.stores:
+    registers = emit_operations(body, tape, Inputs(load, inputs.line), selection=range(part.first, part.last))
+    for store in part.stores:
         store_group(body, registers, store)
-    for register in range(tape.first_operation + piece.first, tape.first_operation + piece.last):
+    for register in range(tape.first_operation + part.first, tape.first_operation + part.last):
         if register in divided.slots:
             value = registers.number(register)
             body.do(f"store {body.real} {value}, ptr {address(register)}, align {8 * body.lanes}")

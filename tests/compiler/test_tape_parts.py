@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from armblocks.compiler import Kernel, compile_function, native, pieces
+from armblocks.compiler import Kernel, compile_function, native, tape_parts
 from armblocks.compiler.from_casadi import tape_from
 from armblocks.compiler.interpret import interpret
 from armblocks.compiler.ir_text import Module
 from armblocks.compiler.llvm_ir import emit_function
 from armblocks.compiler.native import Effort, compile_object, load_code
-from armblocks.compiler.pieces import ACCESS_WEIGHT, PIECE_WEIGHT, divide, is_long
+from armblocks.compiler.tape_parts import ACCESS_WEIGHT, PART_WEIGHT, divide, is_long
 from armblocks.compiler.target import Target
 from armblocks.equations import TracedFunction, signature
 from armblocks.errors import InputError
 
 LAG = 300
-"""Distance to the oldest value that the recursion uses: longer than several pieces."""
+"""Distance to the oldest value that the recursion uses: longer than several parts."""
 
 
 @cache
@@ -49,7 +49,7 @@ def long_function(count: int) -> TracedFunction:
 
 @cache
 def divided_function() -> Kernel:
-    """The long function, compiled in several pieces."""
+    """The long function, compiled in several parts."""
     return compile_function(long_function(600))
 
 
@@ -73,7 +73,7 @@ def test_a_long_function_in_pieces_equals_the_undivided_one_bit_for_bit(
     singles = [divided(x[row], u[row]) for row in range(21)]
     message = [interpret(tape, [x[row], u[row]]) for row in (0, 7, 19)]
     monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
-    monkeypatch.setattr(pieces, "MAX_WEIGHT", 10**9)
+    monkeypatch.setattr(tape_parts, "MAX_WEIGHT", 10**9)
     whole = compile_function(traced)(x, u)
     for slot in (0, 1):
         np.testing.assert_array_equal(actual[slot], whole[slot])
@@ -89,13 +89,13 @@ def test_every_operation_and_store_is_in_one_piece_of_limited_length() -> None:
         k: (register,) for k, register in enumerate(register for part in tape.outputs for register in part)
     }
     division = divide(tape, stores)
-    operations = [k for piece in division.pieces for k in range(piece.first, piece.last)]
+    operations = [k for part in division.parts for k in range(part.first, part.last)]
     assert operations == list(range(len(tape.operations)))
-    assert sorted(k for piece in division.pieces for k in piece.stores) == sorted(stores)
-    for piece in division.pieces:
-        assert piece.last - piece.first + ACCESS_WEIGHT * len(piece.stores) <= 2 * PIECE_WEIGHT
+    assert sorted(k for part in division.parts for k in part.stores) == sorted(stores)
+    for part in division.parts:
+        assert part.last - part.first + ACCESS_WEIGHT * len(part.stores) <= 2 * PART_WEIGHT
     # Storage is reused: the last 300 values are in use, not all 1500.
-    assert division.size < 2 * LAG + PIECE_WEIGHT
+    assert division.size < 2 * LAG + PART_WEIGHT
 
 
 @pytest.mark.parametrize("effort", ["LONG_MODULE", "VERY_LONG_MODULE"])
@@ -156,4 +156,4 @@ def test_an_environment_variable_limits_the_optimisation_effort(monkeypatch: pyt
 
 
 def test_the_longest_undivided_function_is_at_least_twice_as_long_as_a_piece() -> None:
-    assert pieces.MAX_WEIGHT >= 2 * PIECE_WEIGHT
+    assert tape_parts.MAX_WEIGHT >= 2 * PART_WEIGHT
