@@ -78,7 +78,7 @@ def test_equations_of_a_disabled_block_are_zero_unchanged_or_evaluated(block: Bl
 @each_block
 def test_equations_of_an_enabled_block_are_those_of_the_block_alone(block: Block) -> None:
     alone, inside = features_alone_and_gated(block, ON, RESTART)
-    at = arguments(block, inside, {ON: 1.0, "?works": 1.0})
+    at = arguments(block, inside, {ON: 1.0, "?running": 1.0})
     for kind, equation in inside.equations.items():
         values = {name: number(value) for name, value in equation(at).items() if not name.startswith("?")}
         plain = {name: number(value) for name, value in alone.equations[kind](at).items()}
@@ -90,7 +90,7 @@ def test_equations_of_an_enabled_block_are_those_of_the_block_alone(block: Block
 @each_block
 def test_a_restart_sets_all_states_to_their_initial_values(block: Block) -> None:
     alone, inside = features_alone_and_gated(block, ON, RESTART)
-    at = arguments(block, inside, {ON: 1.0, RESTART: 1.0, "?works": 1.0})
+    at = arguments(block, inside, {ON: 1.0, RESTART: 1.0, "?running": 1.0})
     after = inside.equations[SlotKind.RESET](at)
     starts = alone.initial_states(at.p)
     assert starts.keys() >= {state.name for state in (*alone.states, *alone.discrete)}

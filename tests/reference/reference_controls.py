@@ -100,25 +100,25 @@ class Enable(_ControlBlock):
     At events the outputs of the subsystem are updated after the restart.
     """
 
-    memory = ("seen",)
+    memory = ("previous",)
     sides = ("side",)
 
     def begin(self) -> None:
-        self.arrays["x:seen"][:] = -1.0
+        self.arrays["x:previous"][:] = -1.0
 
     def value(self, kind: str, port: str) -> np.ndarray:
         on = self.arrays["x:side"][0] * self.u("outer")
-        begins = bool(on and self.arrays["x:seen"][0] == 0.0)
+        begins = bool(on and self.arrays["x:previous"][0] == 0.0)
         values = {
             "on": on,
-            "works": on if self.ticking else on * (not begins),
-            "restart": float((begins and self.block.restarts) or bool(self.u("anew", 0.0))),
+            "running": on if self.ticking else on * (not begins),
+            "restart": float((begins and self.block.restarts) or bool(self.u("outer_restart", 0.0))),
         }
         return np.array([values[port]])
 
     def act(self, t: float) -> bool:
-        on, previous = self.value("out", "on")[0], self.arrays["x:seen"][0]
-        self.arrays["x:seen"][:] = on
+        on, previous = self.value("out", "on")[0], self.arrays["x:previous"][0]
+        self.arrays["x:previous"][:] = on
         return bool(on != previous)
 
 
@@ -128,17 +128,17 @@ class Trigger(_ControlBlock):
     It does not fire at an instant at which the outer subsystem restarts.
     """
 
-    memory = ("seen", "last")
+    memory = ("previous", "last")
     sides = ("side",)
 
     def begin(self) -> None:
-        self.arrays["x:seen"][:] = -1.0
+        self.arrays["x:previous"][:] = -1.0
 
     def value(self, kind: str, port: str) -> np.ndarray:
-        side, previous = self.arrays["x:side"][0], self.arrays["x:seen"][0]
+        side, previous = self.arrays["x:side"][0], self.arrays["x:previous"][0]
         rises, falls = side == 1.0 and previous == 0.0, side == 0.0 and previous == 1.0
         fires = {"rising": rises, "falling": falls, "either": rises or falls}[self.block.edge]
-        outer_restarts = bool(self.u("anew", 0.0))
+        outer_restarts = bool(self.u("outer_restart", 0.0))
         fires = fires and bool(self.u("outer")) and not outer_restarts and not self.was_restarted
         values = {
             "fire": float(fires),
@@ -148,14 +148,14 @@ class Trigger(_ControlBlock):
         return np.array([values[port]])
 
     def act(self, t: float) -> bool:
-        side, previous = self.arrays["x:side"][0], self.arrays["x:seen"][0]
+        side, previous = self.arrays["x:side"][0], self.arrays["x:previous"][0]
         if t <= 0.0:
-            self.arrays["x:seen"][:] = side
+            self.arrays["x:previous"][:] = side
             return False
-        if self.value("out", "fire")[0] or self.u("anew", 0.0):
+        if self.value("out", "fire")[0] or self.u("outer_restart", 0.0):
             self.arrays["x:last"][:] = t
-        self.was_restarted = self.was_restarted or bool(self.u("anew", 0.0))
-        self.arrays["x:seen"][:] = side
+        self.was_restarted = self.was_restarted or bool(self.u("outer_restart", 0.0))
+        self.arrays["x:previous"][:] = side
         return bool(side != previous)
 
 
@@ -171,15 +171,15 @@ class Held(_ControlBlock):
         self.arrays["x:held"][:] = np.ravel(self.block.initial)
 
     def value(self, kind: str, port: str) -> np.ndarray:
-        if self.u("works"):
+        if self.u("running"):
             return self.arrays["u:u"] + 0.0 * self.arrays["x:held"]
         reset = kind == "out" and not self.block.pulsed and self.block.when_off == "reset"
-        if reset or self.u("anew", 0.0):
+        if reset or self.u("outer_restart", 0.0):
             return np.zeros_like(self.arrays["x:held"]) + np.ravel(self.block.initial)
         return self.arrays["x:held"]
 
     def followed(self, port: str) -> str | None:
-        return "u" if self.u("works") else None
+        return "u" if self.u("running") else None
 
     def inputs_followed(self, port: str) -> list[str]:
         return ["u"]
@@ -188,9 +188,9 @@ class Held(_ControlBlock):
         return ["held"] if kind == "capture" and not self.block.pulsed else []
 
     def act(self, t: float) -> bool:
-        if self.u("anew", 0.0):
+        if self.u("outer_restart", 0.0):
             self.arrays["x:held"][:] = np.ravel(self.block.initial)
-        if self.block.pulsed and self.u("works"):
+        if self.block.pulsed and self.u("running"):
             self.arrays["x:held"][:] = self.arrays["u:u"]
         return False
 
@@ -210,13 +210,13 @@ class Merged(_ControlBlock):
         return [f"u{number}" for number in range(1, self.block.inputs + 1)]
 
     def followed(self, port: str) -> str | None:
-        return next((u for u in self.inputs_followed(port) if self.u(f"works{u[1:]}")), None)
+        return next((u for u in self.inputs_followed(port) if self.u(f"running{u[1:]}")), None)
 
     def value(self, kind: str, port: str) -> np.ndarray:
         source = self.followed(port)
         if source is not None:
             return self.arrays[f"u:{source}"] + 0.0 * self.arrays["x:held"]
-        if self.u("anew", 0.0):
+        if self.u("outer_restart", 0.0):
             return np.zeros_like(self.arrays["x:held"]) + np.ravel(self.block.initial)
         return self.arrays["x:held"]
 

@@ -21,7 +21,7 @@ INITIAL_SOURCES = ("internal", "external", "external at resets")
 """Source of the initial value: the parameter; a port; or the parameter at the start and a port at resets."""
 
 PREVIOUS_SIGN = State(
-    "seen", (), "sign of the trigger at the previous tick: 1 or 0; -1 before the first tick"
+    "previous", (), "sign of the trigger at the previous tick: 1 or 0; -1 before the first tick"
 )
 """The state of a sampled block that holds the previous sign of its trigger."""
 

@@ -22,9 +22,9 @@ from armblocks.diagram.port import Guard, State, name_before
 ON, RESTART, FIRE, ELAPSED = "?on", "?restart", "?fire", "?elapsed"
 """Hidden inputs: whether the block is active; whether its states are reset now; whether the trigger fires
 now; the time since the previous trigger event, s."""
-_TICK_RESET, _INSTANT_RESET = "?done", "?begun"
+_TICK_RESET, _INSTANT_RESET = "?done", "?restarted"
 """Hidden states: whether the present tick has reset the block, and whether the present instant has."""
-_MODES_CONSISTENT = "?works"
+_MODES_CONSISTENT = "?running"
 """Hidden mode: whether the control is on and the modes of the block are consistent."""
 _CONTROL_GUARD = "?turned"
 """Hidden guard: the control crosses 0.5."""

@@ -1,9 +1,9 @@
 """Blocks that replace conditional subsystems in a flat diagram: controls, held outputs, merged outputs.
 
 They are not in the library and never in a file. An event has two iterations. In the first, the control's mode
-follows its signal, and ``restart`` or ``fire`` becomes 1. In the second, the guard ``acts`` triggers: the
-blocks inside are reset or executed, and the state ``seen`` stores the new value of the control. At a tick the
-modes follow immediately, so that one iteration is sufficient."""
+follows its signal, and ``restart`` or ``fire`` becomes 1. In the second, the guard ``changed`` triggers: the
+blocks inside are reset or executed, and the state ``previous`` stores the new value of the control. At a
+tick the modes follow immediately, so that one iteration is sufficient."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from armblocks.diagram.shape_rules import broadcast
 THRESHOLD_OFFSET = 1e-300
 """Offset below the resolution of all signals. With it, a signal of exactly zero has a definite sign."""
 _STATES = ("held", "reset")
-_RESET_PORT = Port("anew", "whether the enclosing subsystem is reset", "", ())
+_RESET_PORT = Port("outer_restart", "whether the enclosing subsystem is reset", "", ())
 _EDGES = ("rising", "falling", "either")
 
 
@@ -36,7 +36,7 @@ def _outer_ports(block: EnableControl | TriggerControl) -> tuple[Port, ...]:
 
 def _held_value(block: HeldOutput | MergedOutput, x: Signals, u: Signals, p: Signals) -> SX:
     """The held value of an output; a reset of the enclosing subsystem sets it to the initial value."""
-    return if_else(u["anew"], p["initial"], x["held"]) if block.resettable else x["held"]
+    return if_else(u["outer_restart"], p["initial"], x["held"]) if block.resettable else x["held"]
 
 
 def _outer_active(u: Signals) -> SX:
@@ -50,15 +50,15 @@ def _is_positive(u: SX) -> SX:
 
 def _start_pending(on: SX, x: Signals) -> SX:
     """Whether a control has turned on at this instant, and the blocks inside have not started yet."""
-    return logic_and(on, x["seen"] == 0.0)
+    return logic_and(on, x["previous"] == 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class EnableControl(Block):
     """Whether an enabled subsystem is active, and whether its states are reset at this time: on = u > 0.
 
-    ``works`` follows ``on`` after the blocks inside have consistent modes and initial states. Events outside
-    the subsystem therefore never read outputs of old modes and states.
+    ``running`` follows ``on`` after the blocks inside have consistent modes and initial states. Events
+    outside the subsystem therefore never read outputs of old modes and states.
     """
 
     title: ClassVar[str] = "Enable"
@@ -75,49 +75,52 @@ class EnableControl(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (
             Port("on", "1 while the subsystem is active", "", ()),
-            Port("works", "1 while the subsystem is active and its blocks have started", "", ()),
+            Port("running", "1 while the subsystem is active and its blocks have started", "", ()),
             Port("restart", "1 where states are reset", "", ()),
         )
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("seen", (), "value of on at the last action; -1 before the first"),)
+        return (State("previous", (), "value of on at the last action; -1 before the first"),)
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        works = State("works", (), "1 while on is 1 and the blocks inside have started", follows=True)
-        return (State("side", (), "1 where u is positive, else 0", follows=True), works)
+        running = State("running", (), "1 while on is 1 and the blocks inside have started", follows=True)
+        return (State("side", (), "1 where u is positive, else 0", follows=True), running)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return (Guard("side", (), "u passes zero", locates=True), Guard("acts", (), "on has changed", 1))
+        return (Guard("side", (), "u passes zero", locates=True), Guard("changed", (), "on has changed", 1))
 
     def initial_states(self, p: Signals) -> Signals:
-        return {"seen": SX(-1.0)}
+        return {"previous": SX(-1.0)}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        on, outer_reset = x["side"] * _outer_active(u), u.get("anew", SX(0.0))
+        on, outer_reset = x["side"] * _outer_active(u), u.get("outer_restart", SX(0.0))
         start = _start_pending(on, x) if self.restarts else SX(0.0)
-        return {"on": on, "works": x["works"], "restart": logic_or(start, outer_reset)}
+        return {"on": on, "running": x["running"], "restart": logic_or(start, outer_reset)}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        changed = fabs(x["side"] * _outer_active(u) - x["seen"])
-        return {"side": u["u"] - THRESHOLD_OFFSET, "acts": if_else(x["seen"] < 0.0, 0.0, changed) - 0.5}
+        changed = fabs(x["side"] * _outer_active(u) - x["previous"])
+        return {
+            "side": u["u"] - THRESHOLD_OFFSET,
+            "changed": if_else(x["previous"] < 0.0, 0.0, changed) - 0.5,
+        }
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         side = _is_positive(u["u"])
-        return {"side": side, "works": side * _outer_active(u)}
+        return {"side": side, "running": side * _outer_active(u)}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         on = x["side"] * _outer_active(u)
-        inconsistent = logic_and(x["works"] != on, logic_not(_start_pending(on, x)))
-        return {"side": x["side"] != _is_positive(u["u"]), "works": inconsistent}
+        inconsistent = logic_and(x["running"] != on, logic_not(_start_pending(on, x)))
+        return {"side": x["side"] != _is_positive(u["u"]), "running": inconsistent}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         side = if_else(e["side"] == 0.0, x["side"], if_else(e["side"] > 0.0, 1.0, 0.0))
         start = _is_positive(u["u"]) * _outer_active(u)
-        seen = if_else(e["acts"] == 0.0, x["seen"], x["side"] * _outer_active(u))
+        previous = if_else(e["changed"] == 0.0, x["previous"], x["side"] * _outer_active(u))
         return {
             "side": side,
-            "seen": if_else(logic_or(x["seen"] < 0.0, t <= 0.0), start, seen),
-            "works": if_else(e["acts"] == 0.0, x["works"], x["side"] * _outer_active(u)),
+            "previous": if_else(logic_or(x["previous"] < 0.0, t <= 0.0), start, previous),
+            "running": if_else(e["changed"] == 0.0, x["running"], x["side"] * _outer_active(u)),
         }
 
 
@@ -125,8 +128,8 @@ class EnableControl(Block):
 class TriggerControl(Block):
     """Whether a trigger fires at this time, and the time since the previous trigger event.
 
-    The trigger does not fire at an instant at which the enclosing subsystem is reset: ``begun`` is 1 from the
-    reset to the end of the instant.
+    The trigger does not fire at an instant at which the enclosing subsystem is reset: ``restarted`` is 1 from
+    the reset to the end of the instant.
     """
 
     title: ClassVar[str] = "Trigger"
@@ -151,10 +154,10 @@ class TriggerControl(Block):
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         return (
-            State("seen", (), "sign of u at the last action; -1 before the first"),
+            State("previous", (), "sign of u at the last action; -1 before the first"),
             State("last", (), "time of the last trigger event or reset", "s"),
             *(
-                (State("begun", (), "1 from a reset to the end of its instant", momentary=True),)
+                (State("restarted", (), "1 from a reset to the end of its instant", momentary=True),)
                 * self.resettable
             ),
         )
@@ -165,44 +168,48 @@ class TriggerControl(Block):
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         return (
             Guard("side", (), "u passes zero", locates=True),
-            Guard("acts", (), "the sign has changed", 1),
+            Guard("changed", (), "the sign has changed", 1),
         )
 
     def initial_states(self, p: Signals) -> Signals:
-        return {"seen": SX(-1.0), "last": SX(0.0)}
+        return {"previous": SX(-1.0), "last": SX(0.0)}
 
     def _outer_reset(self, x: Signals, u: Signals) -> SX:
         """Whether the enclosing subsystem is or was reset at this instant."""
-        return logic_or(u["anew"], x["begun"]) if self.resettable else SX(0.0)
+        return logic_or(u["outer_restart"], x["restarted"]) if self.resettable else SX(0.0)
 
     def _fires(self, x: Signals, u: Signals) -> SX:
-        rises = logic_and(x["side"] == 1.0, x["seen"] == 0.0)
-        falls = logic_and(x["side"] == 0.0, x["seen"] == 1.0)
+        rises = logic_and(x["side"] == 1.0, x["previous"] == 0.0)
+        falls = logic_and(x["side"] == 0.0, x["previous"] == 1.0)
         fires = {"rising": rises, "falling": falls, "either": logic_or(rises, falls)}[self.edge]
         return logic_and(logic_and(fires, _outer_active(u)), logic_not(self._outer_reset(x, u)))
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         fires = self._fires(x, u)
-        return {"fire": fires, "restart": logic_or(fires, u.get("anew", SX(0.0))), "elapsed": t - x["last"]}
+        return {
+            "fire": fires,
+            "restart": logic_or(fires, u.get("outer_restart", SX(0.0))),
+            "elapsed": t - x["last"],
+        }
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        changed = logic_and(x["seen"] >= 0.0, x["side"] != x["seen"])
-        return {"side": u["u"] - THRESHOLD_OFFSET, "acts": if_else(changed, 0.5, -0.5)}
+        changed = logic_and(x["previous"] >= 0.0, x["side"] != x["previous"])
+        return {"side": u["u"] - THRESHOLD_OFFSET, "changed": if_else(changed, 0.5, -0.5)}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"side": _is_positive(u["u"])}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         side = if_else(e["side"] == 0.0, x["side"], if_else(e["side"] > 0.0, 1.0, 0.0))
-        acts = e["acts"] != 0.0
-        seen = if_else(acts, x["side"], x["seen"])
-        starts = logic_or(logic_and(acts, self._fires(x, u)), u.get("anew", SX(0.0)))
+        changed = e["changed"] != 0.0
+        previous = if_else(changed, x["side"], x["previous"])
+        starts = logic_or(logic_and(changed, self._fires(x, u)), u.get("outer_restart", SX(0.0)))
         after = {
             "side": side,
-            "seen": if_else(logic_or(x["seen"] < 0.0, t <= 0.0), _is_positive(u["u"]), seen),
+            "previous": if_else(logic_or(x["previous"] < 0.0, t <= 0.0), _is_positive(u["u"]), previous),
             "last": if_else(starts, t, x["last"]),
         }
-        return {**after, "begun": self._outer_reset(x, u)} if self.resettable else after
+        return {**after, "restarted": self._outer_reset(x, u)} if self.resettable else after
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -217,7 +224,7 @@ class HeldOutput(Block):
     resettable: bool = parameter(
         False, doc="whether the block is inside a subsystem whose states can be reset"
     )
-    pulsed: bool = parameter(False, doc="whether works is 1 at single instants only")
+    pulsed: bool = parameter(False, doc="whether running is 1 at single instants only")
     when_off: str = parameter("held", choices=_STATES, doc="whether y is held or reset to initial")
     initial: ArrayLike = parameter(
         0.0, kind=ParameterKind.ARRAY, doc="y before the subsystem has been active"
@@ -226,7 +233,7 @@ class HeldOutput(Block):
     def input_ports(self) -> tuple[Port, ...]:
         return (
             Port("u", "the output inside the subsystem"),
-            Port("works", "1 while or when the subsystem is active", "", ()),
+            Port("running", "1 while or when the subsystem is active", "", ()),
             *((_RESET_PORT,) * self.resettable),
         )
 
@@ -253,15 +260,15 @@ class HeldOutput(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         held = self.pulsed or self.when_off == "held"
-        return {"y": if_else(u["works"], u["u"], _held_value(self, x, u, p) if held else p["initial"])}
+        return {"y": if_else(u["running"], u["u"], _held_value(self, x, u, p) if held else p["initial"])}
 
     def captures(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {} if self.pulsed else {"held": if_else(u["works"], u["u"], x["held"])}
+        return {} if self.pulsed else {"held": if_else(u["running"], u["u"], x["held"])}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         held = _held_value(self, x, u, p)
         if self.pulsed:
-            return {"held": if_else(u["works"], u["u"], held)}
+            return {"held": if_else(u["running"], u["u"], held)}
         return {"held": held} if self.resettable else {}
 
 
@@ -287,7 +294,7 @@ class MergedOutput(Block):
         return (
             *(Port(f"u{number}", "an output") for number in numbers),
             *(
-                Port(f"works{number}", "1 while or when its subsystem is active", "", ())
+                Port(f"running{number}", "1 while or when its subsystem is active", "", ())
                 for number in numbers
             ),
             *((_RESET_PORT,) * self.resettable),
@@ -315,7 +322,7 @@ class MergedOutput(Block):
     def _selected_output(self, x: Signals, u: Signals, p: Signals) -> SX:
         chosen = _held_value(self, x, u, p)
         for number in range(self.inputs, 0, -1):
-            chosen = if_else(u[f"works{number}"], u[f"u{number}"], chosen)
+            chosen = if_else(u[f"running{number}"], u[f"u{number}"], chosen)
         return chosen
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:

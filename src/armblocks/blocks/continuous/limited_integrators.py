@@ -101,10 +101,12 @@ class ResettableIntegrator(Block):
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         shape = self.output_shapes(inputs)["y"]
-        begun = (State("begun", (), "0 until the initial value has been read from the port, then 1"),)
-        left_limit = (State("kept", shape, "left limit of the initial value"),)
+        initialised = (
+            State("initialised", (), "0 until the initial value has been read from the port, then 1"),
+        )
+        left_limit = (State("left_limit", shape, "left limit of the initial value"),)
         return (
-            *(begun if self.initial_condition_source == "external" else ()),
+            *(initialised if self.initial_condition_source == "external" else ()),
             *(left_limit if self.external_reset == "level hold" else ()),
         )
 
@@ -118,11 +120,11 @@ class ResettableIntegrator(Block):
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         reset = Guard("reset", (), "the trigger", EDGES.get(self.external_reset, 0))
-        begins = Guard("begins", (), "the initial value is read from the port", 1)
+        initialisation = Guard("initialisation", (), "the initial value is read from the port", 1)
         shape = self.output_shapes(inputs)["y"]
         return (
             *(() if self.external_reset == "none" else (reset,)),
-            *((begins,) if self.initial_condition_source == "external" else ()),
+            *((initialisation,) if self.initial_condition_source == "external" else ()),
             *(_limit_guards(shape) if self.limit_output else ()),
         )
 
@@ -137,15 +139,19 @@ class ResettableIntegrator(Block):
 
     def initial_states(self, p: Signals) -> Signals:
         start = self._within(p["initial"], p)
-        begun = {"begun": SX(0.0)} if self.initial_condition_source == "external" else {}
-        return {"x": start, **begun, **({"kept": start} if self.external_reset == "level hold" else {})}
+        initialised = {"initialised": SX(0.0)} if self.initial_condition_source == "external" else {}
+        return {
+            "x": start,
+            **initialised,
+            **({"left_limit": start} if self.external_reset == "level hold" else {}),
+        }
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         values = _limit_guard_values(x, u, p) if self.limit_output else {}
         if self.external_reset != "none":
             values["reset"] = (self._level(u) if self._by_level else u["reset"]) - THRESHOLD_OFFSET
         if self.initial_condition_source == "external":
-            values["begins"] = 0.5 - x["begun"]
+            values["initialisation"] = 0.5 - x["initialised"]
         return values
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
@@ -153,7 +159,7 @@ class ResettableIntegrator(Block):
         return {**held, **({"mode": _limit_side(x["x"], x["mode"], u, p)} if self.limit_output else {})}
 
     def captures(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"kept": self._start(u, p)} if self.external_reset == "level hold" else {}
+        return {"left_limit": self._start(u, p)} if self.external_reset == "level hold" else {}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         after = _limited(x, p, e) if self.limit_output else {"x": x["x"]}
@@ -161,16 +167,16 @@ class ResettableIntegrator(Block):
         if self._by_level:
             # When the trigger returns to 0, the state starts from the value that was held.
             is_reset = e["reset"] < 0.0
-            start = x["kept"] if self.external_reset == "level hold" else start
+            start = x["left_limit"] if self.external_reset == "level hold" else start
             after["held"] = if_else(e["reset"] == 0.0, x["held"], e["reset"] > 0.0)
         elif self.external_reset != "none":
             is_reset = e["reset"] != 0.0
         if self.initial_condition_source == "external":
             # At t = 0 the signal at the port may still change during the mode iteration.
-            begins = logic_or(x["begun"] == 0.0, t <= 0.0)
-            start = if_else(begins, self._start(u, p), start)
-            is_reset = logic_or(is_reset, begins)
-            after["begun"] = SX(1.0)
+            initialises = logic_or(x["initialised"] == 0.0, t <= 0.0)
+            start = if_else(initialises, self._start(u, p), start)
+            is_reset = logic_or(is_reset, initialises)
+            after["initialised"] = SX(1.0)
         after["x"] = if_else(is_reset, start, after["x"])
         if self.limit_output:
             after["mode"] = if_else(is_reset, _limit_side(after["x"], SX(0.0), u, p), after["mode"])

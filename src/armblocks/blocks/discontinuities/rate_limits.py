@@ -2,8 +2,8 @@
 
 In continuous time the start and the end of a rate limitation are events. While no limit is active, the output
 is u. While a limit is active, the output is a state y with y' equal to that limit, until y and u are equal
-again. The output is continuous: ``kept`` is its left limit at the latest tick, event or breakpoint, so that
-``u - kept`` is the jump of u at that time.
+again. The output is continuous: ``left_limit`` is its left limit at the latest tick, event or breakpoint,
+so that ``u - left_limit`` is the jump of u at that time.
 """
 
 from __future__ import annotations
@@ -57,11 +57,11 @@ class RateLimiting(Block):
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         left_limit = State(
-            "kept",
+            "left_limit",
             self.output_shapes(inputs)["y"],
             "left limit of the output at the latest tick, event or breakpoint",
         )
-        return (left_limit, State("kept_at", (), "time of the latest tick, event or breakpoint", "s"))
+        return (left_limit, State("left_limit_time", (), "time of the latest tick, event or breakpoint", "s"))
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         doc = "1 at the rising limit, -1 at the falling limit, 0 following u"
@@ -77,7 +77,7 @@ class RateLimiting(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         jumps = fabs(self._jump(t, x, u)) > self._band(u)
-        follows = if_else(jumps, x["kept"], u["u"])
+        follows = if_else(jumps, x["left_limit"], u["u"])
         return {"y": if_else(x["mode"] == 0.0, follows, x["y"])}
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
@@ -86,10 +86,10 @@ class RateLimiting(Block):
         return {"y": if_else(x["mode"] == 0.0, u["u'"], limit)}
 
     def initial_states(self, p: Signals) -> Signals:
-        return {"y": p["initial"], "kept": p["initial"], "kept_at": SX(0.0)}
+        return {"y": p["initial"], "left_limit": p["initial"], "left_limit_time": SX(0.0)}
 
     def captures(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"kept": self.outputs(t, x, u, p)["y"], "kept_at": t}
+        return {"left_limit": self.outputs(t, x, u, p)["y"], "left_limit_time": t}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         limits = self.limits(u, p)
@@ -114,12 +114,12 @@ class RateLimiting(Block):
         leaves = logic_and(x["mode"] == 0.0, next_mode != 0.0)
         return {
             "mode": if_else(fired, next_mode, x["mode"]),
-            "y": if_else(logic_and(leaves, same_instant(t, x["kept_at"])), x["kept"], x["y"]),
+            "y": if_else(logic_and(leaves, same_instant(t, x["left_limit_time"])), x["left_limit"], x["y"]),
         }
 
     def _jump(self, t: SX, x: Signals, u: Signals) -> SX:
         """The jump of u at this time."""
-        return if_else(same_instant(t, x["kept_at"]), u["u"] - x["kept"], 0.0)
+        return if_else(same_instant(t, x["left_limit_time"]), u["u"] - x["left_limit"], 0.0)
 
     def _band(self, u: Signals) -> SX:
         """The largest jump that the output follows."""

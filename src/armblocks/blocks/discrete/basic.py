@@ -121,11 +121,11 @@ class DiscreteIntegrator(Block):
         after = {"x": self._limited(self._state_after_reset(x, u, p) + p["gain"] * p["T"] * u["u"], p)}
         if self._has_resets:
             untriggered = self.external_reset == "none"
-            after["seen"] = SX(0.0) if untriggered else trigger_state(self.external_reset, u["reset"])
+            after["previous"] = SX(0.0) if untriggered else trigger_state(self.external_reset, u["reset"])
         return after
 
     def initial_states(self, p: Signals) -> Signals:
-        return {"x": p["initial"], **({"seen": SX(-1.0)} if self._has_resets else {})}
+        return {"x": p["initial"], **({"previous": SX(-1.0)} if self._has_resets else {})}
 
     def initial_outputs(self, p: Signals) -> Signals:
         return {port.name: SX(0.0) for port in self.output_ports()} | {"y": p["initial"]}
@@ -140,9 +140,9 @@ class DiscreteIntegrator(Block):
             return x["x"]
         resets = SX(0.0)
         if self.external_reset != "none":
-            resets = fires_at_tick(self.external_reset, u["reset"], x["seen"])
+            resets = fires_at_tick(self.external_reset, u["reset"], x["previous"])
         if self.initial_condition_source == "external":
-            resets = logic_or(resets, x["seen"] < 0.0)
+            resets = logic_or(resets, x["previous"] < 0.0)
         return if_else(resets, u.get("initial", p["initial"]), x["x"])
 
     def _limited(self, value: SX, p: Signals) -> SX:

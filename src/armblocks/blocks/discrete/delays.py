@@ -220,7 +220,7 @@ class ResettableDelay(Block):
         row = SX.zeros(1, history.shape[1])
         start = repmat(self._start(u, p).T + row, self.length, 1)
         buffer = if_else(self._resets(x, u), start, history)
-        after = {"x": vertcat(buffer[1:, :], u["u"].T + row), "seen": self._side(u)}
+        after = {"x": vertcat(buffer[1:, :], u["u"].T + row), "previous": self._side(u)}
         if not self.enable_port:
             return after
         enabled = u["enable"] != 0.0
@@ -230,7 +230,7 @@ class ResettableDelay(Block):
     def initial_states(self, p: Signals) -> Signals:
         many = p["initial"].numel() > 1
         history = repmat(p["initial"].T, self.length, 1) if many else p["initial"]
-        return {"x": history, "seen": SX(-1.0), **({"held": p["initial"]} if self.enable_port else {})}
+        return {"x": history, "previous": SX(-1.0), **({"held": p["initial"]} if self.enable_port else {})}
 
     def initial_outputs(self, p: Signals) -> Signals:
         return {"y": p["initial"]}
@@ -243,10 +243,10 @@ class ResettableDelay(Block):
 
     def _resets(self, x: Signals, u: Signals) -> SX:
         """1 at a reset by the trigger, and at the first tick if a port gives the initial value; else 0."""
-        first = x["seen"] < 0.0 if self.initial_condition_source == "external" else SX(0.0)
+        first = x["previous"] < 0.0 if self.initial_condition_source == "external" else SX(0.0)
         if self.external_reset == "none":
             return first
-        return logic_or(first, fires_at_tick(self.external_reset, u["reset"], x["seen"]))
+        return logic_or(first, fires_at_tick(self.external_reset, u["reset"], x["previous"]))
 
 
 def _vector_shape(shape: Shape) -> Shape:

@@ -95,7 +95,7 @@ class _Controls:
 
     def _enabled(self, level: str, port: str, outer: Gate, *, restarts: bool) -> Gate:
         control = self._enable(level, port, outer, restarts=restarts)
-        self._hold(level, PortRef(control, "works"), outer, pulsed=False)
+        self._hold(level, PortRef(control, "running"), outer, pulsed=False)
         gate = {ON: PortRef(control, "on")}
         if restarts or RESTART in outer:
             gate[RESTART] = PortRef(control, "restart")
@@ -136,11 +136,11 @@ class _Controls:
                 self.blocks[path] = HeldOutput(
                     resettable=RESTART in outer, pulsed=pulsed, when_off=block.when_off, initial=block.initial
                 )
-                self.drivers[PortRef(path, "works")] = active
+                self.drivers[PortRef(path, "running")] = active
                 self._connect_reset(path, outer)
                 self.held.add(path)
 
     def _connect_reset(self, path: str, outer: Gate) -> None:
         """Connect the reset of the enclosing subsystem to a control or held output."""
         if RESTART in outer:
-            self.drivers[PortRef(path, "anew")] = outer[RESTART]
+            self.drivers[PortRef(path, "outer_restart")] = outer[RESTART]

@@ -2,8 +2,8 @@
 
 Input: Merge blocks whose inputs are held outputs of conditional subsystems.
 
-Result: ``MergedOutput`` blocks without a gate; their inputs ``works1``, ``works2`` and so on are 1 for active
-subsystems.
+Result: ``MergedOutput`` blocks without a gate; their inputs ``running1``, ``running2`` and so on are 1 for
+active subsystems.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ def resolve_merges(net: Netlist) -> Netlist:
         resettable = RESTART in outer
         blocks[path] = MergedOutput(resettable=resettable, inputs=block.inputs, initial=block.initial)
         if resettable:
-            drivers[PortRef(path, "anew")] = outer[RESTART]
+            drivers[PortRef(path, "outer_restart")] = outer[RESTART]
         for number in range(1, block.inputs + 1):
             active = _active_signal(net, path, f"u{number}")
             if active is None:  # a subsystem that is commented out
-                inactive = f"{path}.works{number}"
+                inactive = f"{path}.running{number}"
                 blocks[inactive], origins[inactive] = Grounded.of({"y": ()}), path
                 active = contents[PortRef(inactive, "y")] = PortRef(inactive, "y")
-            drivers[PortRef(path, f"works{number}")] = active
+            drivers[PortRef(path, f"running{number}")] = active
     return dataclasses.replace(
         net, blocks=blocks, drivers=drivers, gates=gates, origins=origins, contents=contents
     )
@@ -53,7 +53,7 @@ def _active_signal(net: Netlist, path: str, port: str) -> PortRef | None:
     if isinstance(content, PortRef) and isinstance(net.blocks[content.block], Grounded):
         return None
     if isinstance(content, PortRef) and isinstance(net.blocks[content.block], HeldOutput):
-        return net.drivers[PortRef(content.block, "works")]
+        return net.drivers[PortRef(content.block, "running")]
     source = f"'{content}'" if isinstance(content, PortRef) else "a bus"
     raise DiagramError(
         f"input '{port}' is {source}, which is not an output of a conditional subsystem",
