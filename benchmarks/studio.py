@@ -281,7 +281,7 @@ def run_rows(browser: Browser, repeats: int) -> list[list[str]]:
     return [
         median_row("first Run of a new studio on `kr180model`, cached → first samples drawn", first, 0.6),
         median_row("later Run → first samples drawn", firsts, 0.25),
-        median_row("part of it: until the samples arrive in the browser", arrivals, 0.25),
+        median_row("later Run → samples arrived in the browser", arrivals, 0.25),
         median_row("later Run → all samples of 10 s drawn", lasts, 1.5),
     ]
 
@@ -292,7 +292,7 @@ def live_rows(browser: Browser) -> list[list[str]]:
     label = f"{condition}: lost samples of {expected:,}"
     return [
         [label, f"{expected - received:,}", "", "0", verdict(expected - received, 0)],
-        median_row(f"the same: key → next frame (largest {max(waits):.3f} s)", waits, 0.1),
+        median_row(f"16 channels at 10 kHz: key → next frame (largest {max(waits):.3f} s)", waits, 0.1),
     ]
 
 
@@ -324,7 +324,7 @@ def session_rows() -> list[list[str]]:
             verdict(SESSIONS, completed),
         ],
         [
-            f"the same: edit → reply, 95th percentile of {len(waits)} (largest {max(waits):.3f} s)",
+            f"20 sessions: edit → reply, 95th percentile of {len(waits)} (largest {max(waits):.3f} s)",
             f"{late:.3f} s",
             f"{min(waits):.3f} s",
             "0.2 s",

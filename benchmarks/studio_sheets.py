@@ -242,7 +242,7 @@ def sheet_rows(browser: Browser, count: int, repeats: int) -> list[list[str]]:
         target = NUDGE_TARGETS[count]
         rows.append(median_row(f"nudge of a block at {count} blocks: key → picture", pictures, target))
         if count == 1000:
-            rows.append(median_row("the same: edit → reply", replies, 0.05))
+            rows.append(median_row("edit at 1000 blocks → reply", replies, 0.05))
             worst = longest_frames(page, count, repeats)
             rows.append(median_row("drag of a block at 1000 blocks: longest frame of each drag", worst, 0.06))
         if count in SCROLL_TARGETS:

@@ -7,7 +7,8 @@ run also prevents the C library, NumPy and OpenBLAS from using newer instruction
 preparation and installs nothing. The script unpacks ARM64 packages of Debian's Python, qemu-user-static (if
 absent) and ARM64 wheels of PyPI into ``build/arm64``. The emulation takes about an hour.
 
-Each run prints a hash for each group of numbers (``scripts/bits_hashes.py``). Exit code 1 if any two differ.
+Each run prints a hash for each group of numbers (``scripts/bits_hashes.py``). The exit code is 1 if two
+hashes differ.
 """
 
 from __future__ import annotations

@@ -87,11 +87,11 @@ def linearise(
         discrete_names, discrete_units = _elements(system.discrete)
         names += tuple(discrete_names[k] for k in updated.tolist())
         units += tuple(discrete_units[k] for k in updated.tolist())
-        keep: list[int] = _needed_states(system, matrices, updated).tolist()
+        needed: list[int] = _needed_states(system, matrices, updated).tolist()
         a, b, c, d = matrices
-        matrices = (a[np.ix_(keep, keep)], b[keep], c[:, keep], d)
-        names = tuple(names[k] for k in keep)
-        units = tuple(units[k] for k in keep)
+        matrices = (a[np.ix_(needed, needed)], b[needed], c[:, needed], d)
+        names = tuple(names[k] for k in needed)
+        units = tuple(units[k] for k in needed)
     return LinearSystem(
         *matrices,
         dt=dt,

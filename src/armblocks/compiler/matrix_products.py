@@ -148,12 +148,12 @@ def _matrices(tape: Tape, rows: Sequence[_Row]) -> Iterator[list[_Row]]:
         matrix: list[_Row] = []
         for row in sorted(rows_of_vector, key=lambda row: row.first):
             extended = [*matrix, row]
-            ready = tape.first_operation + min(row.last for row in extended)
+            first_result = tape.first_operation + min(row.last for row in extended)
             belongs = not matrix or (
                 row.first == matrix[-1].first + len(vector)
                 and tape.input_position(row.first)[0] == tape.input_position(matrix[0].first)[0]
                 and len(matrix) < MAX_ROWS
-                and all(row.start is None or row.start < ready for row in extended)
+                and all(row.start is None or row.start < first_result for row in extended)
             )
             if not belongs:
                 yield matrix

@@ -241,7 +241,7 @@ class Instants:
         follows = vertcat(jumped, SX.zeros(2), sources != 0.0, SX.zeros(arrived.numel()))
         follows = logic_and(follows, _any_marked(vertcat(*at_fixed)))
         instants: list[SX] = []
-        apart = SX.zeros(marks.numel())
+        differing = SX.zeros(marks.numel())
         for k, known in enumerate(self.instant_p):
             steady = if_else(self.g_rate == 0.0, 1.0, self.g_rate)
             by_guards = -self.by_parameter(self.g, k) / steady
@@ -250,11 +250,11 @@ class Instants:
             mean = dot(if_else(marks, derivatives, 0.0), marks) / fmax(dot(marks, marks), 1.0)
             differs = fabs(derivatives - mean) > SAME_DERIVATIVE * (1.0 + fabs(mean))
             differs = logic_or(logic_and(marks, differs), logic_and(follows, mean != 0.0))
-            apart = logic_or(apart, differs)
+            differing = logic_or(differing, differs)
             instants.append(if_else(self.known, known, mean))
         last = SX(0.0)
-        for number in range(apart.numel()):
-            last = if_else(apart[number], float(number + 1), last)
+        for number in range(differing.numel()):
+            last = if_else(differing[number], float(number + 1), last)
         return instants, if_else(self.known, 0.0, last)
 
     def _is_now(self, k: int) -> SX:

@@ -118,16 +118,16 @@ def _lines(text: str) -> Iterator[str]:
 
 def _delimiter(head: Sequence[str]) -> str:
     """A semicolon or a tab where one is in the first line outside quotes, else a comma, else spaces."""
-    bare = [re.sub(r'"[^"]*"', "", line) for line in head]
+    unquoted = [re.sub(r'"[^"]*"', "", line) for line in head]
     for candidate in (";", "\t"):
-        if candidate in bare[0]:
+        if candidate in unquoted[0]:
             return candidate
-    spaced = [len(line.split()) > 1 and all(map(_is_plain, line.split())) for line in bare]
+    spaced = [len(line.split()) > 1 and all(map(_is_plain, line.split())) for line in unquoted]
     if any(spaced) and all(spaced[min(spaced.index(True), 2) :]):  # after names and units
         return " "
-    if any("," in line for line in bare):
+    if any("," in line for line in unquoted):
         return ","
-    fields = [len(line.split()) for line in bare]
+    fields = [len(line.split()) for line in unquoted]
     return " " if fields[0] > 1 and len(set(fields)) == 1 and not any('"' in line for line in head) else ","
 
 
@@ -197,9 +197,9 @@ def _commented_names(text: str, delimiter: str, count: int) -> list[str] | None:
 
 def _is_value(field: str) -> bool:
     """Whether a field is a number, a word for a missing value, a boolean or a date."""
-    bare = field.strip()
-    is_word = bare.casefold() in _GAPS | _BOOLEANS.keys() and bool(bare)
-    return is_word or any(pattern.fullmatch(bare) for pattern in (_POINT_NUMBER, _COMMA_NUMBER, _DATE))
+    text = field.strip()
+    is_word = text.casefold() in _GAPS | _BOOLEANS.keys() and bool(text)
+    return is_word or any(pattern.fullmatch(text) for pattern in (_POINT_NUMBER, _COMMA_NUMBER, _DATE))
 
 
 def _numeric_columns(

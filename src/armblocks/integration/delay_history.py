@@ -91,9 +91,9 @@ class DelayHistory:
         z, unknowns, taus = (reals.after(place) for place in (workspace.z, workspace.trial_w, workspace.taus))
         if not all(line.fixed for line in self.lines):
             r.call(system_functions.delay_times, t, x, z, unknowns, p, taus)
-        now = t[0]
+        time = t[0]
         for k, line in enumerate(self.lines):
-            instant = now - taus[k]
+            instant = time - taus[k]
             value, derivative = self.at_instant(r, reals, counts, instant, k)
             z[line.value] = value
             z[line.derivative] = derivative
@@ -238,9 +238,9 @@ class DelayHistory:
 
     # Jumps of signals.
 
-    def _pass_jumps(self, r: Routine, now: Real, reals: Reals, counts: Integers) -> None:
+    def _pass_jumps(self, r: Routine, time: Real, reals: Reals, counts: Integers) -> None:
         """Move each line past the jumps that it has reached, and find the next one."""
-        until = now * SAME_ABOVE
+        until = time * SAME_ABOVE
         first_rows, last_rows = self.first_rows(counts), self.last_rows(counts)
         for k, line in enumerate(self.lines):
             if not line.fixed:
@@ -254,20 +254,20 @@ class DelayHistory:
                 last_rows[k] = -1
                 i.value = first_rows[k]
                 with r.part() as rows:
-                    here = i.value
-                    after = here + 1
-                    search.leave_unless(after < counts[Count.HISTORY_ROWS])
-                    i.value = after
-                    same_time = self.time(reals, here) == self.time(reals, after)
-                    jumps = self.value(reals, here, k) != self.value(reals, after, k)
-                    derivative_jumps = self.derivative(reals, here, k) != self.derivative(reals, after, k)
+                    row = i.value
+                    next_row = row + 1
+                    search.leave_unless(next_row < counts[Count.HISTORY_ROWS])
+                    i.value = next_row
+                    same_time = self.time(reals, row) == self.time(reals, next_row)
+                    jumps = self.value(reals, row, k) != self.value(reals, next_row, k)
+                    derivative_jumps = self.derivative(reals, row, k) != self.derivative(reals, next_row, k)
                     with r.unless(same_time & (jumps | derivative_jumps)):
                         rows.again()
-                last_rows[k] = here
+                last_rows[k] = row
 
     def _next_jump(self, r: Routine, reals: Reals, counts: Integers) -> Real:
         """The time at which a line reaches its next jump; infinite if none is known."""
-        soonest = r.constant(float("inf"))
+        next_arrival = r.constant(float("inf"))
         for k, line in enumerate(self.lines):
             if not line.fixed:
                 continue
@@ -275,34 +275,34 @@ class DelayHistory:
             known = last >= 0
             row = select(known, last, 0)
             arrival = self.time(reals, row) + reals[self.workspace.taus + k]
-            soonest = select(known & (arrival < soonest), arrival, soonest)
-        return soonest
+            next_arrival = select(known & (arrival < next_arrival), arrival, next_arrival)
+        return next_arrival
 
     # Memory.
 
-    def _ensure_capacity(self, r: Routine, now: Real, reals: Reals, counts: Integers) -> Boolean:
+    def _ensure_capacity(self, r: Routine, time: Real, reals: Reals, counts: Integers) -> Boolean:
         """Drop rows that no line reads any more; return whether there is memory for another step."""
         workspace = self.workspace
         capacity = counts[Count.HISTORY_CAPACITY]
         needed = counts[Count.HISTORY_ROWS] + ROWS_OF_A_STEP
         with r.when(needed <= capacity):
             r.return_(r.constant_boolean(True))
-        oldest = now - reals[workspace.longest]
+        oldest = time - reals[workspace.longest]
         # Keep the rows from the last end of a step that is earlier than all readable times.
-        keep, i = r.integer(0), r.integer(0)
+        first_row, i = r.integer(0), r.integer(0)
         with r.loop() as search:
-            here = i.value
-            inside = here < counts[Count.HISTORY_ROWS]
-            safe = select(inside, here, 0)
-            old = self.time(reals, safe) < oldest
-            search.leave_unless(inside & old)
-            at_end = self.middle(reals, safe) == 0.0
-            keep.value = select(at_end, here, keep.value)
+            row = i.value
+            exists = row < counts[Count.HISTORY_ROWS]
+            existing_row = select(exists, row, 0)
+            old = self.time(reals, existing_row) < oldest
+            search.leave_unless(exists & old)
+            at_end = self.middle(reals, existing_row) == 0.0
+            first_row.value = select(at_end, row, first_row.value)
             i.value = i.value + 1
-        dropped = keep.value
-        left = counts[Count.HISTORY_ROWS] - dropped
-        counts[Count.HISTORY_ROWS] = left
-        total, shift = left * workspace.history_width, dropped * workspace.history_width
+        dropped_rows = first_row.value
+        remaining_rows = counts[Count.HISTORY_ROWS] - dropped_rows
+        counts[Count.HISTORY_ROWS] = remaining_rows
+        total, shift = remaining_rows * workspace.history_width, dropped_rows * workspace.history_width
         for n in r.range(0, total):
             target = n + workspace.history
             reals[target] = reals[target + shift]
@@ -310,12 +310,12 @@ class DelayHistory:
             first, last = self.first_rows(counts), self.last_rows(counts)
             # ``first`` becomes 0 if its row was dropped. -1 in ``last`` means the newest row and stays.
             for rows, unknown in ((first, 0), (last, last[k])):
-                shifted = rows[k] - dropped
+                shifted = rows[k] - dropped_rows
                 rows[k] = select(shifted >= 0, shifted, unknown)
         # Also request more memory if less than half is free, so that requests are rare.
-        enough = left * 2 <= capacity
-        fits = left + ROWS_OF_A_STEP <= capacity
-        return enough & fits
+        half_is_free = remaining_rows * 2 <= capacity
+        fits = remaining_rows + ROWS_OF_A_STEP <= capacity
+        return half_is_free & fits
 
 
 def is_derivative(derivative: Real) -> Boolean:

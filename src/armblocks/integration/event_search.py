@@ -103,12 +103,12 @@ class EventSearch:
             # The window extends to the limit if the rest is shorter than half a window, or if rounding
             # makes the middle of the window equal to one of its ends.
             whole = fma(0.5, length.value, reached) >= limit.value
-            apart = (middle > a) & (middle < reached)
-            whole = whole | ~apart
+            middle_inside = (middle > a) & (middle < reached)
+            whole = whole | ~middle_inside
             middle = select(whole, fma(0.5, limit.value - a, a), middle)
             reached = select(whole, limit.value, reached)
             length.value = reached - a
-            divisible = apart & (length.value > shortest)
+            divisible = middle_inside & (length.value > shortest)
             high.value = middle
             with r.unless(self.count_fired_at(middle, time, h) == 0):
                 found.leave_unless(divisible)
@@ -161,9 +161,9 @@ class EventSearch:
         """Set ``reason`` to the reason why the event location is unreliable, or to 0 if it is reliable.
 
         A location on the dense output is unreliable near the start of the step, and if the guard is near zero
-        at the start. A guard that leaves zero like a high power of time may have the wrong sign on the
-        dense output; an example is the position of a mass that starts from rest. At the ends of steps its
-        sign is correct.
+        at the start. A guard that leaves zero in proportion to a high power of time may have the wrong sign
+        on the dense output. An example is the position of a mass that starts from rest. At the ends of steps
+        the sign of the guard is correct.
         """
         f, r, functions, t = self.frame, self.frame.r, self.functions, self.events.point.memory
         self.count_fired_at(instant, time, h)

@@ -90,9 +90,9 @@ class GuardFunctions:
         directions = r.reals("guard.directions", self.directions)
         total = r.integer(0)
         for i in r.each(self.count):
-            now, known, wanted = sign(values[i]), signs[i], directions[i]
-            crossed = (now * known < 0.0) & (now * wanted >= 0.0)
-            fired[i] = select(crossed, now, 0.0)
+            new_sign, old_sign, direction = sign(values[i]), signs[i], directions[i]
+            crossed = (new_sign * old_sign < 0.0) & (new_sign * direction >= 0.0)
+            fired[i] = select(crossed, new_sign, 0.0)
             total.value = total.value + crossed.count()
         z = reals.after(workspace.z)
         for guard, place in self._each_silenced_guard(r):
@@ -110,7 +110,7 @@ class GuardFunctions:
         step."""
         workspace, found = self.workspace, r.integer(0)
         for i in r.each(self.count):
-            fired, known, before, after = (
+            fired, old_sign, value_at_start, value_at_end = (
                 reals.after(place)[i]
                 for place in (
                     workspace.fired,
@@ -119,8 +119,8 @@ class GuardFunctions:
                     workspace.guards,
                 )
             )
-            near = abs(before) <= NEAR_ZERO_FRACTION * abs(after)
-            reason = select(known == 0.0, r.constant_integer(NO_SIGN), near.count())
+            near = abs(value_at_start) <= NEAR_ZERO_FRACTION * abs(value_at_end)
+            reason = select(old_sign == 0.0, r.constant_integer(NO_SIGN), near.count())
             worse = (fired != 0.0) & (reason > found.value)
             found.value = select(worse, reason, found.value)
         return found.value
@@ -129,11 +129,11 @@ class GuardFunctions:
         """Whether a guard without a sign at the start of the step has a sign now and is zero at the end."""
         workspace, found = self.workspace, r.boolean(False)
         for i in r.each(self.count):
-            before, now, value = (
+            old_sign, new_sign, value = (
                 reals.after(place)[i]
                 for place in (workspace.signs_at_start, workspace.signs, workspace.guards)
             )
-            found.value = found.value | ((before == 0.0) & (now != 0.0) & (value == 0.0))
+            found.value = found.value | ((old_sign == 0.0) & (new_sign != 0.0) & (value == 0.0))
         return found.value
 
     def _any_fired(self, r: Routine, reals: Reals, locating: Boolean) -> Boolean:
@@ -250,9 +250,9 @@ class GuardFunctions:
 
         False where the previous derivative is NaN."""
         A, M, B = distances
-        known = side * reals.after(self.workspace.guard_derivatives)[i]
-        now = fma(-1.5, A, fma(2.0, M, -0.5 * B))
-        jump = abs(now - known * half)
+        previous_derivative = side * reals.after(self.workspace.guard_derivatives)[i]
+        derivative = fma(-1.5, A, fma(2.0, M, -0.5 * B))
+        jump = abs(derivative - previous_derivative * half)
         least = minimum(A, minimum(M, B))
         large = 0.5 * jump > least
         return (least > 0.0) & large
@@ -272,15 +272,15 @@ class GuardFunctions:
         )
         directions = r.reals("guard.directions", self.directions)
         for i in r.each(self.count):
-            now, known, mark = sign(values[i]), signs[i], fired[i]
-            has_fired, nonzero = mark != 0.0, now != 0.0
-            side = select(nonzero, now, known)
+            new_sign, old_sign, mark = sign(values[i]), signs[i], fired[i]
+            has_fired, nonzero = mark != 0.0, new_sign != 0.0
+            present_sign = select(nonzero, new_sign, old_sign)
             # A guard of one direction that is zero after its reset gets the sign opposite to the crossing. A
             # ball at floor level with a downward speed therefore bounces again.
             directed = directions[i] != 0.0
-            back = select(directed & has_fired, -1.0 * mark, now)
-            after = select(has_fired, select(nonzero, now, back), known)
-            signs[i] = select(only_fired, after, side)
+            sign_after_reset = select(directed & has_fired, -1.0 * mark, new_sign)
+            sign_after_event = select(has_fired, select(nonzero, new_sign, sign_after_reset), old_sign)
+            signs[i] = select(only_fired, sign_after_event, present_sign)
 
     def _store_silenced_signs(self, r: Routine, reals: Reals) -> None:
         """Set the signs of silenced guards to the signs of their values, including 0."""

@@ -186,11 +186,11 @@ class Instants(Schedule):
     def fixed_step_end(self, time: Real, new_time: Real) -> Real:
         """The end of a fixed step, which is earlier right after an event."""
         f = self.frame
-        following = (time.bits() + 10).from_bits()
-        soon = maximum(time + f.scalar[Scalar.BOUND].value, following)
+        ten_units_later = (time.bits() + 10).from_bits()
+        shortened_end = maximum(time + f.scalar[Scalar.BOUND].value, ten_units_later)
         if self.delays:
-            soon = minimum(soon, time + f.max_step)
-        return minimum(soon, new_time)
+            shortened_end = minimum(shortened_end, time + f.max_step)
+        return minimum(shortened_end, new_time)
 
     def next_step_length(self, proposed: Real) -> Real:
         """The length of the next step. A step that was shortened to end at a tick does not reduce it."""
@@ -213,8 +213,8 @@ class Instants(Schedule):
         if self.search:
             # An event is located to the last place: a sample time just before it is recorded with the values
             # before the event, unless a tick or breakpoint is at this instant as well.
-            apart = (self.search.event_located.value != 0) & (new_time < f.end.value * SAME_BELOW)
-            before = select(apart, (new_time.bits() - 1).from_bits(), before)
+            event_only = (self.search.event_located.value != 0) & (new_time < f.end.value * SAME_BELOW)
+            before = select(event_only, (new_time.bits() - 1).from_bits(), before)
         records.samples(time, before, h)
         if self.delays:
             self.delays.write_step(time, new_time, h)

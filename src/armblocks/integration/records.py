@@ -116,8 +116,8 @@ class Records:
             f.store_variables()
             r.copy(f.reals, arrays.saved_reals, self._length())
             r.copy(f.counts, arrays.saved_counts, f.workspace.counts)
-            fresh = f.count[Count.RESTARTED].value != 0
-            stage = select(fresh, r.constant_integer(Stage.START), Stage.RUNNING)
+            after_restart = f.count[Count.RESTARTED].value != 0
+            stage = select(after_restart, r.constant_integer(Stage.START), Stage.RUNNING)
             arrays.saved_counts[Count.STAGE] = stage
             f.count[Count.SAVED].value = 1
 

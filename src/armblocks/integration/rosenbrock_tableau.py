@@ -119,8 +119,8 @@ class RosenbrockTableau:
     @property
     def dense_rows(self) -> tuple[Row, ...]:
         """``dense`` over the rows of ``K``."""
-        nothing = (0.0,) * len(self.dense[0])
-        return (nothing, *self.dense, nothing)
+        zeros = (0.0,) * len(self.dense[0])
+        return (zeros, *self.dense, zeros)
 
     @property
     def needs_jacobian(self) -> bool:

@@ -92,20 +92,20 @@ class Calls:
 
     def _due_clocks(self, integration: Integration) -> list[int]:
         """The clocks that tick now and whose functions have not been called."""
-        now = integration.time * SAME_INSTANT
+        until = integration.time * SAME_INSTANT
         return [
             clock
             for clock in self._clocks
-            if integration.next_tick(clock) <= now and not self._is_called(integration, clock)
+            if integration.next_tick(clock) <= until and not self._is_called(integration, clock)
         ]
 
     def _call_due_functions(self, integration: Integration, p: Array) -> None:
         due = self._due_clocks(integration)
         if not due:
             return
-        time, now = integration.time, integration.time * SAME_INSTANT
+        time, until = integration.time, integration.time * SAME_INSTANT
         clocks = range(len(self._compiled.sizes.clocks))
-        ticking = np.array([float(integration.next_tick(clock) <= now) for clock in clocks])
+        ticking = np.array([float(integration.next_tick(clock) <= until) for clock in clocks])
         for function in self._functions:
             if function.clock not in due:
                 continue

@@ -59,9 +59,9 @@ class JumpTable:
     @staticmethod
     def empty(signals: int, states: int) -> JumpTable:
         """A table without jumps."""
-        nothing = Side(states=np.empty((0, states)), signals=np.empty((signals, 0)))
+        empty_side = Side(states=np.empty((0, states)), signals=np.empty((signals, 0)))
         jumping = np.empty((signals, 0), dtype=np.bool_)
-        return JumpTable(time=np.empty(0), before=nothing, after=nothing, jumping=jumping)
+        return JumpTable(time=np.empty(0), before=empty_side, after=empty_side, jumping=jumping)
 
     def selected(self, rows: Places | slice, begin: float, end: float) -> JumpTable:
         """The instants after ``begin`` up to ``end`` (s) at which a signal of ``rows`` jumps."""

@@ -125,9 +125,9 @@ class Recording:
     def samples(self, begin: int) -> Samples:
         """Signals of the samples from number ``begin`` on that are in memory."""
         parts, compiled = self._rows(begin), self._compiled
-        nothing = np.empty((compiled.signals_layout.size, 0))
+        no_signals = np.empty((compiled.signals_layout.size, 0))
         time = _concatenated([rows.time for rows in parts] or [np.empty(0)])
-        signals = _concatenated([rows.signals(compiled) for rows in parts] or [nothing], axis=1)
+        signals = _concatenated([rows.signals(compiled) for rows in parts] or [no_signals], axis=1)
         return Samples(
             begin=parts[0].begin if parts else min(begin, self.recorded),
             time=time,

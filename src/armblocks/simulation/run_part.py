@@ -138,8 +138,8 @@ class RunPart:
         """The samples in memory from number ``begin`` on, as views."""
         start = 0 if begin is None else min(self.in_memory, max(0, begin - self.begin))
         in_memory, run = self.in_memory, self.integration
-        nothing = np.empty((in_memory, 0))
-        parts = (nothing,) * 3 if run is None else (run.states, run.discrete, run.algebraic)
+        no_columns = np.empty((in_memory, 0))
+        parts = (no_columns,) * 3 if run is None else (run.states, run.discrete, run.algebraic)
         states, discrete, algebraic = (part[start:in_memory] for part in parts)
         return Rows(
             begin=self.begin + start,

@@ -230,8 +230,8 @@ class SecondOrderIntegratorLimited(Block):
         hits = logic_or(at_upper, at_lower)
         bounced = fmin(fmax(u["dx0"] if self.reinitialize else SX(0.0), p["lower_speed"]), p["upper_speed"])
         # The speed points away from the limit, or the bounce is below the rest speed.
-        away = if_else(at_upper, -bounced, bounced)
-        stops = logic_and(hits, away <= p["rest_speed"])
+        speed_inwards = if_else(at_upper, -bounced, bounced)
+        stops = logic_and(hits, speed_inwards <= p["rest_speed"])
         presses = if_else(at_upper, u["u"] >= 0.0, u["u"] <= 0.0)
         position = if_else(at_upper, p["upper"], if_else(at_lower, p["lower"], x["x"]))
         speed = if_else(hits, if_else(stops, 0.0, bounced), x["dx"])

@@ -262,10 +262,10 @@ class ArmPlant(Block):
             reversed_joints = (
                 self._on_all_joints("rest", guards) < 0.0 if "rest" in guards else SX.zeros(self.robot.n)
             )
-            away = logic_or(
+            started = logic_or(
                 self._on_all_joints("forwards", guards) > 0.0, self._on_all_joints("backwards", guards) < 0.0
             )
-            inconsistent["mode"] = logic_or(reversed_joints, away)
+            inconsistent["mode"] = logic_or(reversed_joints, started)
         if self._lower_stop_joints() or self._upper_stop_joints():
             contact = self._elastic_contact(x["q"], x["qd"], p) if self.stops == "elastic" else x["contact"]
             inconsistent["contact"] = contact != x["contact"]
@@ -281,8 +281,8 @@ class ArmPlant(Block):
         hits_upper, hits_lower = fired["upper"] > 0.0, fired["lower"] < 0.0
         contact = if_else(hits_upper, 1.0, if_else(hits_lower, -1.0, contact))
         if self.stops == "elastic":
-            departed = logic_or(fired["upper"] < 0.0, fired["lower"] > 0.0)
-            contact = if_else(departed, 0.0, contact)
+            released = logic_or(fired["upper"] < 0.0, fired["lower"] > 0.0)
+            contact = if_else(released, 0.0, contact)
         if not self._lockable_joints():
             return {"contact": contact}
         stopping = fired["rest"] < 0.0
@@ -296,8 +296,8 @@ class ArmPlant(Block):
             qd = if_else(dot(impact, impact) > 0.0, after, qd)
             q = if_else(hits_upper, self._limits(1), if_else(hits_lower, self._limits(0), q))
             stopping = logic_or(stopping, impact)
-        away = (fired["forwards"] > 0.0) - (fired["backwards"] < 0.0)
-        guess = if_else(stopping, 0.0, if_else(away != 0.0, away, mode))
+        start_direction = (fired["forwards"] > 0.0) - (fired["backwards"] < 0.0)
+        guess = if_else(stopping, 0.0, if_else(start_direction != 0.0, start_direction, mode))
         after_impact = {**x, "q": q, "qd": qd, "contact": contact}
         rest = self._consistent_rest(
             after_impact, u, p, JointModes(guess, if_else(guess == 0.0, self._rigid(contact), 0.0))

@@ -58,9 +58,9 @@ def axes_of(joint: Frame, frames: Frames, reverse: bool) -> list[tuple[Joint, Mo
         axis = joint.element.first(tag)
         x, y, z = _direction(joint, axis, tag, frames)
         limits = _limits(joint, axis, kind == "continuous", frames.context)
-        made = Prismatic if kind == "prismatic" else Revolute
+        joint_type = Prismatic if kind == "prismatic" else Revolute
         direction = (-x, -y, -z) if reverse else (x, y, z)
-        found.append((made(axis=direction, limits=limits), motor_of(joint, axis, frames.context)))
+        found.append((joint_type(axis=direction, limits=limits), motor_of(joint, axis, frames.context)))
     return found[::-1] if reverse else found
 
 

@@ -32,8 +32,10 @@ def shapes_of(link: Frame, frames: Frames, material: Material) -> tuple[Shape, .
     if shapes:
         return tuple(shapes)
     collisions = [*link.element.all("collision")] if elements[0].tag == "visual" else []
-    quiet = replace(context, findings=[])
-    shapes = [shape for element in collisions for shape in _readable(element, link, frames, quiet, material)]
+    unreported = replace(context, findings=[])
+    shapes = [
+        shape for element in collisions for shape in _readable(element, link, frames, unreported, material)
+    ]
     return tuple(shapes) if shapes else (None if len(context.findings) > before else ())
 
 

@@ -27,8 +27,8 @@ def shapes_of(link: Element, context: FileContext, material: Material) -> tuple[
     if shapes:
         return tuple(shapes)
     collisions = [*link.all("collision")] if elements[0].tag == "visual" else []
-    quiet = replace(context, findings=[])
-    shapes = [shape for element in collisions for shape in _readable(element, link, quiet, material)]
+    unreported = replace(context, findings=[])
+    shapes = [shape for element in collisions for shape in _readable(element, link, unreported, material)]
     return tuple(shapes) if shapes else (None if len(context.findings) > before else ())
 
 

@@ -56,12 +56,12 @@ def changed_aspects(before: Diagram, after: Diagram, path: Aspect = ()) -> set[A
     return aspects
 
 
-def clash(mine: Iterable[Aspect], theirs: Set[Aspect]) -> bool:
+def clash(aspects: Iterable[Aspect], others: Set[Aspect]) -> bool:
     """Whether two sets of aspects conflict. Adding or removing a block conflicts with every change inside."""
-    mine = set(mine)
-    if mine & theirs:
+    aspects = set(aspects)
+    if aspects & others:
         return True
-    return _covers(mine, theirs) or _covers(theirs, mine)
+    return _covers(aspects, others) or _covers(others, aspects)
 
 
 def _covers(aspects: Set[Aspect], others: Set[Aspect]) -> bool:

@@ -317,8 +317,10 @@ class OpenFiles(ABC, Generic[OpenedT]):
         """Write to an existing journal that the file contains version ``of``."""
         if open_file.journal is None:
             return
-        now, version, on_disk = open_file.document.value, open_file.document.version, open_file.on_disk
-        self._write(open_file, now, version, lambda journal: journal.write_saved(path, of, version, on_disk))
+        value, version, on_disk = open_file.document.value, open_file.document.version, open_file.on_disk
+        self._write(
+            open_file, value, version, lambda journal: journal.write_saved(path, of, version, on_disk)
+        )
 
     def _refuse_overwriting(self, open_file: OpenedT, path: str) -> None:
         if path != open_file.path:

@@ -77,9 +77,9 @@ def singularity(J: NDArray[np.float64], joints: Sequence[str], length: float) ->
     return f"{degree}: {words}; the tool cannot {_direction(left[:, len(values) - 1])}."
 
 
-def _direction(lost: NDArray[np.float64]) -> str:
-    """Describe the lost motion of the tool, in world axes."""
-    linear, angular = lost[:3], lost[3:]
+def _direction(singular_vector: NDArray[np.float64]) -> str:
+    """Describe the lost motion of the tool, a left singular vector of the Jacobian, in world axes."""
+    linear, angular = singular_vector[:3], singular_vector[3:]
     is_linear = float(np.linalg.norm(linear)) >= float(np.linalg.norm(angular))
     motion = linear if is_linear else angular
     axis = int(np.argmax(np.abs(motion)))

@@ -280,12 +280,12 @@ class _Run:
         """Send the recorded samples that are due by the clock; if paused, all."""
         samples = history.samples(self.count)
         target = math.inf if self.state == "paused" else self.pace.target_time
-        ready = int(np.searchsorted(samples.time, target, "right"))
-        last = history.run.finished and ready == samples.time.size
+        count = int(np.searchsorted(samples.time, target, "right"))
+        last = history.run.finished and count == samples.time.size
         if not last:
-            ready -= ready % self.stride
-        if ready:
-            self._send(samples.time[:ready], samples.signals[:, :ready], samples.jumps, last=last)
+            count -= count % self.stride
+        if count:
+            self._send(samples.time[:count], samples.signals[:, :count], samples.jumps, last=last)
         self.time = min(target, history.run.time)
 
     def _send(self, time: Array, signals: Array, jumps: Jumps, *, last: bool) -> None:
