@@ -1,6 +1,6 @@
-"""Build the page of the studio into the package: ``python3 frontend/build_page.py``.
+"""Build the front end of the studio into the package: ``python3 frontend/build_page.py``.
 
-Nothing is done if the page is up to date; a file with a hash records its sources. Standard library only.
+Nothing is done if the build is up to date; a file with a hash records its sources. Standard library only.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ SOURCES = (
 
 
 def is_outdated() -> bool:
-    """Whether the page is missing or outdated, and its sources are present."""
+    """Whether the build is missing or outdated, and its sources are present."""
     return not SOURCES_HASH_FILE.is_file() or SOURCES_HASH_FILE.read_text(encoding="utf-8") != digest()
 
 
 def digest() -> str:
-    """A hash of all sources of the page."""
+    """A hash of all sources of the front end."""
     hasher = hashlib.sha256()
     for name in SOURCES:
         top = FRONTEND / name
@@ -52,14 +52,14 @@ def digest() -> str:
 
 
 def build() -> None:
-    """Install the libraries of the lock file if they are missing or outdated, and build the page."""
+    """Install the libraries of the lock file if they are missing or outdated, and build the front end."""
     npm = npm_command()
     lock, installed = FRONTEND / "package-lock.json", FRONTEND / "node_modules" / ".armblocks-lock"
     lock_digest = hashlib.sha256(lock.read_bytes()).hexdigest()
     if not installed.is_file() or installed.read_text(encoding="utf-8") != lock_digest:
-        _call("download the libraries of the page", [*npm, "ci", "--no-audit", "--no-fund"])
+        _call("download the libraries of the front end", [*npm, "ci", "--no-audit", "--no-fund"])
         installed.write_text(lock_digest, encoding="utf-8")
-    _call("build the page", [*npm, "run", "build"])
+    _call("build the front end", [*npm, "run", "build"])
     write_notices(PAGE_FOLDER)
     SOURCES_HASH_FILE.write_text(digest(), encoding="utf-8")
 
@@ -81,15 +81,15 @@ def _call(title: str, command: list[str]) -> None:
     if completed.returncode != 0:
         sys.stderr.write(completed.stdout + completed.stderr)
         raise SystemExit(
-            "The page of the studio could not be built; the reason is printed above.\n"
-            "To install armblocks without the page: ARMBLOCKS_SKIP_WEB=1 pip install .\n"
+            "The front end of the studio could not be built; the reason is printed above.\n"
+            "To install armblocks without the front end: ARMBLOCKS_SKIP_WEB=1 pip install .\n"
             "With Node.js 20.19 or newer and access to the npm registry, build it with\n"
             f"python3 {FRONTEND / 'build_page.py'}"
         )
 
 
 def main() -> None:
-    """Build the page if it is missing or outdated."""
+    """Build the front end if it is missing or outdated."""
     if is_outdated():
         build()
 

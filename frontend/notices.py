@@ -1,6 +1,6 @@
-"""The third-party notices of the packages in the page of the studio.
+"""The third-party notices of the packages in the front end of the studio.
 
-The bundler lists packages with code, styles or fonts in the page (``bundled_packages.ts``). Their licence
+The bundler lists packages with code, styles or fonts in the bundle (``bundled_packages.ts``). Their licence
 texts come from their folders in ``node_modules``, or from ``frontend/licences`` for packages without a
 licence file.
 """
@@ -18,12 +18,12 @@ LICENCE_FOLDER = FRONTEND / "licences"
 NOTICES_FILE = "THIRD-PARTY-NOTICES.txt"
 PACKAGE_LIST = "bundled-packages.json"
 LICENCE_FILES = ("licence", "license", "copying", "notice", "unlicense")
-HEADING = "The page of the armblocks studio contains the packages below, or parts of them.\n"
+HEADING = "The front end of the armblocks studio contains the packages below, or parts of them.\n"
 
 
 @dataclass(frozen=True)
 class Package:
-    """A package in the page, with the text of its licence."""
+    """A package in the bundle, with the text of its licence."""
 
     name: str
     version: str
@@ -32,7 +32,7 @@ class Package:
 
 
 def write_notices(web: Path) -> None:
-    """Write the notices into the folder of the built page, and remove the lists of the bundler."""
+    """Write the notices into the folder of the built front end, and remove the lists of the bundler."""
     lists = [web / PACKAGE_LIST, web / "notebook" / PACKAGE_LIST]
     folders = {folder for path in lists for folder in json.loads(path.read_text(encoding="utf-8"))}
     (web / NOTICES_FILE).write_text(notices(map(package, sorted(folders))), encoding="utf-8")
@@ -64,7 +64,7 @@ def package(folder: str, root: Path = FRONTEND) -> Package:
     ]
     if not texts:
         raise SystemExit(
-            f"the package {name} is part of the page of the studio and has no licence text:\n"
+            f"the package {name} is part of the front end of the studio and has no licence text:\n"
             f"copy the text from its repository to {stored_text}"
         )
     return Package(name, manifest["version"], manifest.get("license", "see below"), "\n\n".join(texts))

@@ -6,7 +6,7 @@ import { bundledPackages } from './bundled_packages'
 
 /** Unused themes of the dock layout, which are most of its styles. */
 const OTHER_THEME = /\.dockview-theme-(?!(light|dark)(?![\w-]))/
-/** A font format for browsers that do not support the page. */
+/** A font format for browsers that the studio does not support. */
 const OLD_FONT = /,\s*url\([^)]*\.woff\)\s*format\('woff'\)/
 
 /** Removes unused styles. */
@@ -47,9 +47,9 @@ function characters(ranges: string): string {
 /**
  * The Latin part of the sans-serif font without unused weights and alternates: half the size.
  */
-function lighterSans(): Plugin {
+function reducedSansFont(): Plugin {
   return {
-    name: 'lighter-sans',
+    name: 'reduced-sans-font',
     apply: 'build',
     async generateBundle(_, bundle) {
       for (const asset of Object.values(bundle))
@@ -64,12 +64,12 @@ function lighterSans(): Plugin {
 
 export default defineConfig({
   base: './',
-  plugins: [react(), lighterSans(), bundledPackages()],
+  plugins: [react(), reducedSansFont(), bundledPackages()],
   css: { postcss: { plugins: unusedStyles } },
   build: {
     outDir: process.env['ARMBLOCKS_OUT'] ?? '../src/armblocks/studio/web',
     emptyOutDir: true,
-    assetsInlineLimit: 0, // the security policy of the page allows only fonts and pictures of the server
+    assetsInlineLimit: 0, // the security policy of the studio allows only fonts and pictures of the server
     chunkSizeWarningLimit: 1200,
   },
 })

@@ -23,7 +23,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from environment import PYTHON, ROOT, prepare, say
+from environment import PYTHON, ROOT, prepare, print_line
 
 FOLDER = ROOT / "build" / "arm64"
 HASHES = "scripts/bits_hashes.py"
@@ -67,12 +67,12 @@ def x86_64_hashes(groups: Sequence[str]) -> dict[str, str]:
     hashes: dict[str, str] = {}
     for title, cpu, lanes, feature, environment in X86_64:
         if f"+{feature}" not in features:
-            say(f"== {title}: skipped, not supported by this processor")
+            print_line(f"== {title}: skipped, not supported by this processor")
             continue
         with tempfile.TemporaryDirectory() as cache:
             variables = {"ARMBLOCKS_CACHE_DIR": cache, "PYTHONPATH": str(ROOT / "src"), **environment}
             hashes[title] = output([PYTHON, HASHES, "--cpu", cpu, "--lanes", str(lanes), *groups], variables)
-        say(f"== {title}\n{hashes[title]}")
+        print_line(f"== {title}\n{hashes[title]}")
     return hashes
 
 
@@ -91,7 +91,7 @@ class Arm64:
 
     def _unpack_system(self) -> None:
         """Unpack Python and its dependencies, with a separate package list; the system is not changed."""
-        say("== fetch ARM64 packages of Debian")
+        print_line("== fetch ARM64 packages of Debian")
         state = self.folder / "apt"
         for part in ("state/lists/partial", "cache/archives/partial"):
             (state / part).mkdir(parents=True)
@@ -117,7 +117,7 @@ class Arm64:
 
     def _unpack_wheels(self) -> None:
         """Unpack ARM64 wheels of the versions in the x86-64 environment."""
-        say("== fetch ARM64 wheels")
+        print_line("== fetch ARM64 wheels")
         names = (*REQUIREMENTS, *TEST_REQUIREMENTS)
         code = f"from importlib.metadata import version; print(*(version(name) for name in {names}))"
         requirements = [
@@ -143,7 +143,7 @@ class Arm64:
                 return Path(installed)
         unpacked = self.folder / "qemu"
         if not unpacked.exists():
-            say("== fetch qemu-user-static")
+            print_line("== fetch qemu-user-static")
             output(["apt-get", "-q", "download", "qemu-user-static"], cwd=self.folder)
             output(["dpkg-deb", "-x", next(self.folder.glob("qemu-user-static*.deb")), unpacked])
         return unpacked / "usr" / "bin" / "qemu-aarch64-static"
@@ -179,10 +179,10 @@ def main() -> int:
     if requested.arm64:
         arm64 = Arm64(FOLDER)
         hashes["ARM64"] = arm64.run(HASHES, *requested.groups)
-        say(f"== ARM64\n{hashes['ARM64']}")
+        print_line(f"== ARM64\n{hashes['ARM64']}")
         if not requested.no_tests:
-            say("== tests on ARM64")
-            say(
+            print_line("== tests on ARM64")
+            print_line(
                 arm64.run(
                     "-m",
                     "pytest",
@@ -197,9 +197,9 @@ def main() -> int:
                 )
             )
     if len(set(hashes.values())) > 1:
-        say("the hashes differ")
+        print_line("the hashes differ")
         return 1
-    say(f"the hashes of {', '.join(hashes)} agree")
+    print_line(f"the hashes of {', '.join(hashes)} agree")
     return 0
 
 

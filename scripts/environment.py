@@ -25,7 +25,7 @@ ENVIRONMENT = {name: value for name, value in os.environ.items() if name != "PYT
 """The environment of commands. Bytecode is allowed, because processes start three times as fast with it."""
 
 
-def say(text: str) -> None:
+def print_line(text: str) -> None:
     """Print and flush, so that redirected output has the order of the commands."""
     print(text, flush=True)
 
@@ -55,7 +55,7 @@ def prepare(*extras: str) -> None:
         return
     all_extras = sorted(set(extras) | (installed or set()))
     target = f".[{','.join(all_extras)}]" if all_extras else "."
-    say(f"== install armblocks {target} (a minute or more the first time)")
+    print_line(f"== install armblocks {target} (a minute or more the first time)")
     code = _pip_install("--editable", target)
     if code != 0:
         sys.exit(f"pip could not install armblocks (exit code {code}); see its message above")
@@ -75,7 +75,7 @@ def prepare_browser() -> None:
     if shutil.which("apt-get") and hasattr(os, "geteuid"):
         sudo = [] if os.geteuid() == 0 else ["sudo", "-n"]
         apt = [*sudo, "apt-get", "-q", "-y", "-o", "DPkg::Lock::Timeout=500"]
-        say("== install chromium")
+        print_line("== install chromium")
         if run(*apt, "update") == 0 and run(*apt, "install", "--no-install-recommends", "chromium") == 0:
             return
     sys.exit(f"the tests of the studio need a browser: install one of {', '.join(BROWSERS)}")
@@ -90,7 +90,7 @@ def _interpreter_works() -> bool:
 
 
 def _create() -> None:
-    say(f"== create {VENV.name} with Python {sys.version.split()[0]}")
+    print_line(f"== create {VENV.name} with Python {sys.version.split()[0]}")
     if run(sys.executable, "-m", "venv", "--clear", VENV) != 0:
         sys.exit(
             f"Python could not create a virtual environment in {VENV}. "
@@ -130,7 +130,7 @@ def _pip_install(*arguments: str) -> int:
         for line in pip.stdout:
             step = line.strip()
             if step.startswith(PIP_STEPS):
-                say(f"   {time.monotonic() - start:4.0f} s  {step.partition(':')[0]}")
+                print_line(f"   {time.monotonic() - start:4.0f} s  {step.partition(':')[0]}")
     return pip.returncode
 
 

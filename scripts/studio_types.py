@@ -17,7 +17,7 @@ from armblocks.studio.protocol.schema import message_schema
 
 FRONTEND = Path(__file__).resolve().parent.parent / "frontend"
 BANNER = """/*
- * The types of all messages between server and page; long, because there are many messages.
+ * The types of all messages between server and front end; long, because there are many messages.
  * Made from src/armblocks/studio/protocol/messages by scripts/studio_types.py: do not edit.
  */"""
 

@@ -19,7 +19,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from threading import Event
 
-from environment import BINARIES, ENVIRONMENT, PYTHON, ROOT, prepare, prepare_browser, say
+from environment import BINARIES, ENVIRONMENT, PYTHON, ROOT, prepare, prepare_browser, print_line
 
 SOURCES = ("src", "tests", "scripts", "docs", "benchmarks", "hatch_build.py", "frontend")
 WEB_TOOL = (PYTHON, "frontend/node.py", "exec", "--offline", "--")
@@ -85,7 +85,7 @@ class Step:
 
     def follow(self) -> None:
         """Show the existing output, and new output until the command ends."""
-        say(f"== {self.name}: {' '.join(self.command).replace(f'{ROOT}/', '')}")
+        print_line(f"== {self.name}: {' '.join(self.command).replace(f'{ROOT}/', '')}")
         with self._output.open("rb") as output:
             while True:
                 ended = self._ended.wait(POLL_SECONDS)
@@ -148,11 +148,11 @@ def main() -> int:
     prepare_browser()
     start = time.perf_counter()
     results = run_steps([name for name in STEPS if not requested or name in requested])
-    say("== summary")
+    print_line("== summary")
     for step in results:
         verdict = "passed" if step.code == 0 else f"FAILED (exit code {step.code})"
-        say(f"   {step.name:<10} {verdict:<24} {step.seconds:6.1f} s")
-    say(f"   total {time.perf_counter() - start:38.1f} s")
+        print_line(f"   {step.name:<10} {verdict:<24} {step.seconds:6.1f} s")
+    print_line(f"   total {time.perf_counter() - start:38.1f} s")
     return 1 if any(step.code != 0 for step in results) else 0
 
 

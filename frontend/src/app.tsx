@@ -25,7 +25,7 @@ function Tab({ api }: IDockviewPanelHeaderProps) {
   return <span className="tab">{api.title}</span>
 }
 
-/** A separate component: opening or closing a dialog renders no other part of the page. */
+/** A separate component: opening or closing a dialog renders no other component. */
 function DialogsOnDemand() {
   const ready = useDeferredReady()
   const requested = useDialogRequested()

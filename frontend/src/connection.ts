@@ -13,7 +13,7 @@ export class Refusal extends Error {
   }
 }
 
-/** `up`; `down`: no reply; `rejected`: the server replies but does not accept the session of this page. */
+/** `up`; `down`: no reply; `rejected`: the server replies but does not accept the session of this client. */
 export type ConnectionState = 'up' | 'down' | 'rejected'
 
 interface PendingRequest {
@@ -32,7 +32,7 @@ const RECONNECT_AFTER_MS = 10_000
 
 /**
  * The websocket to the server. After a reconnection or a reload of the page, the server first reopens the
- * documents of the page. Then requests without a reply are sent again (`resend`). Edits carry keys, so the
+ * documents of the client. Then requests without a reply are sent again (`resend`). Edits carry keys, so the
  * server applies each of them once.
  */
 export class Connection {
@@ -40,7 +40,7 @@ export class Connection {
   private lastNumber = 0
   private readonly pending = new Map<number, PendingRequest>()
   private reconnectDelay = FIRST_DELAY_MS
-  /** Whether the server has reopened the documents of this page, so that requests may be sent. */
+  /** Whether the server has reopened the documents of this client, so that requests may be sent. */
   private attached = false
   private pingedAt = 0
   private onEvent: (event: ServerEvent) => void = () => {}
@@ -120,7 +120,7 @@ export class Connection {
     })
   }
 
-  /** Send all requests without a reply; called when the server has reopened the documents of the page. */
+  /** Send all requests without a reply; called when the server has reopened the documents of the client. */
   resend(): void {
     this.attached = true
     for (const [number, { request }] of this.pending) this.send(number, request)
@@ -149,7 +149,7 @@ export class Connection {
   }
 }
 
-/** Whether the server replies but rejects this page because it was restarted with a new login. */
+/** Whether the server replies but rejects this client because it was restarted with a new login. */
 async function isRejected(): Promise<boolean> {
   try {
     const response = await fetch(new URL('index.html', location.href), { method: 'HEAD', cache: 'no-store' })

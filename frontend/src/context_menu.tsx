@@ -33,7 +33,7 @@ export function ContextMenu() {
   )
 }
 
-/** If some entries have room for a mark, all have, so that the titles begin below each other. */
+/** If one entry has a check mark, all titles are indented in the same way, so that they are aligned. */
 const classOf = (entries: Entries) =>
   entries.some((entry) => entry?.checked !== undefined) ? 'context-menu marked' : 'context-menu'
 

@@ -8,8 +8,8 @@ const IDLE_TIMEOUT_MS = 1500
 const loaders: (() => Promise<unknown>)[] = []
 
 /**
- * A part of the page that is not in the first download. It is fetched when the page has shown its document
- * and is idle, or earlier if it is needed. Until then, `placeholder` is displayed in its place.
+ * A part of the front end that is not in the first download. It is fetched when the front end has shown
+ * its document and is idle, or earlier if it is needed. Until then, `placeholder` is displayed in its place.
  */
 export function deferred(load: () => Promise<ComponentType>, placeholder = ''): ComponentType {
   const Part = lazy(() => load().then((part) => ({ default: part })))
@@ -38,7 +38,7 @@ export function usePrefetch(): void {
   }, [shown])
 }
 
-/** Whether a dialog is requested, now or before the page was idle. */
+/** Whether a dialog is requested, now or before the front end was idle. */
 export function useDialogRequested(): boolean {
   const dialog = useDialogs((s) => s.open !== null)
   const touring = useTour((s) => s.stop !== null)

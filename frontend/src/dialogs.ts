@@ -40,7 +40,7 @@ interface Dialogs {
 }
 
 /**
- * The open dialog. This state is loaded before the dialogs, which load after the first rendering of the page.
+ * The open dialog. This state is loaded before the dialogs, which load after the first rendering.
  */
 export const useDialogs = create<Dialogs>(() => ({
   open: null,
@@ -81,9 +81,9 @@ export function openParameterSets(): void {
   if (useStudio.getState().document) showDialog('parameter_sets')
 }
 
-/** The bookmarks of the document; `typed` begins a bookmark of the present view. */
-export function openBookmarks(typed: 'add' | '' = ''): void {
-  if (useStudio.getState().document) showDialog('bookmarks', typed)
+/** The bookmarks of the document; with `add`, the form for a bookmark of the present view is open. */
+export function openBookmarks(form: 'add' | '' = ''): void {
+  if (useStudio.getState().document) showDialog('bookmarks', form)
 }
 
 /** Edit the mask of a subsystem on the sheet; without a block, the mask of the sheet. */

@@ -1,6 +1,6 @@
 import type { DockviewApi } from 'dockview-react'
 
-/** The dock of the page; `null` before it is shown. */
+/** The dock of the panels; `null` before it is shown. */
 let dock: DockviewApi | null = null
 
 export function setDock(api: DockviewApi): void {

@@ -232,7 +232,7 @@ function refuseInTab(document: string, fault: Fault): void {
   refuse({ ...fault, where: [title, fault.where].filter(Boolean).join(' › ') })
 }
 
-/** Reopen the last document of this page, or the one in its address; then send the pending requests. */
+/** Reopen the last document of this client, or the one in its address; then send the pending requests. */
 async function restoreDocuments(welcome: EventOf<'welcome'>): Promise<void> {
   const robot = await reattachRobots()
   await restoreDiagram(welcome)

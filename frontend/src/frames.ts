@@ -1,7 +1,7 @@
 /**
  * Views of data outside React's state: samples, the time cursor, sizes. Each view is called in the animation
- * frame after a change and compares the present data with the drawn data. Without changes the page requests
- * no frames.
+ * frame after a change and compares the present data with the drawn data. Without changes the front end
+ * requests no frames.
  */
 type FrameCallback = (now: number) => void
 

@@ -1,4 +1,4 @@
-/** Keys that are not commands, such as navigation keys, for one part of the page. */
+/** Keys that are not commands, such as navigation keys, for one part of the front end. */
 interface KeyGroup {
   title: string
   /** The source files that handle these keys; a test compares them. */

@@ -74,12 +74,12 @@ interface Studio {
   /** The open and the recoverable documents of the server. */
   documents: DocumentState[]
   recoveries: Recovery[]
-  /** Whether this page has reopened its document; it then shows no recovery dialog for other documents. */
+  /** Whether this client has reopened its document; it then shows no recovery dialog for other documents. */
   returned: boolean
   welcome: EventOf<'welcome'> | null
   library: Map<string, BlockType>
   document: OpenDocument | null
-  /** Moves of this page that the displayed state of the server does not contain yet. */
+  /** Moves of this client that the displayed state of the server does not contain yet. */
   sent: SentMove[]
   run: RunView | null
   selection: ReadonlySet<string>
@@ -147,7 +147,7 @@ export async function ask<R extends Request>(request: R): Promise<ReplyTo<R> | u
   }
 }
 
-/** Identifies the edits of this page. */
+/** Identifies the edits of this client. */
 export const author = newKey()
 
 /** The common fields of all changes of a document: document, displayed version, author and unique key. */

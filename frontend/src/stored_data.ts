@@ -1,4 +1,4 @@
-/** Data that the page stored in the browser. `null` if there are none, or if they cannot be read. */
+/** Data that the front end stored in the browser. `null` if there are none, or if they cannot be read. */
 export function storedData<Data>(storage: Storage, key: string): Data | null {
   try {
     return JSON.parse(storage.getItem(key) ?? 'null') as Data | null

@@ -63,7 +63,7 @@ def test_an_installation_without_the_studio_page_is_reported(
     monkeypatch.setattr("armblocks.studio.server.launch.built_page", missing)
     text = plain_text(refusal("studio", "--no-browser"))
     assert "this installation has no studio page" in text
-    assert "install a wheel that has the page" in text
+    assert "install a wheel that has the front end" in text
 
 
 def test_a_checkout_builds_the_page_once_and_reports_why_a_build_fails(tmp_path: Path) -> None:
@@ -72,7 +72,7 @@ def test_a_checkout_builds_the_page_once_and_reports_why_a_build_fails(tmp_path:
     build_in_checkout(lines.append, web, script)  # not a checkout: there are no sources to build
     assert lines == []
     script.write_text("raise SystemExit(3)")
-    with pytest.raises(FormatError, match=r"page of the studio could not be built.*install Node\.js"):
+    with pytest.raises(FormatError, match=r"front end of the studio could not be built.*install Node\.js"):
         build_in_checkout(lines.append, web, script)
     with pytest.raises(FormatError, match=r"run 'python .*build_page\.py'"):
         built_page(web, script)

@@ -4,7 +4,7 @@ import json
 import subprocess
 import sys
 
-# Further modules that are imported only after the page of the studio is served.
+# Further modules that are imported only after the front end of the studio is served.
 LOADED_LATER = {"casadi", "pydantic"} | {
     f"armblocks.{package}" for package in ("blocks", "diagram", "drawing", "rendering", "report")
 }

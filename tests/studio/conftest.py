@@ -22,7 +22,7 @@ from interruptible import start_interruptible
 
 DISABLED_FEATURES = (
     # The browser's own address bar: Chromium loads two pages for its suggestions into every new window, which
-    # takes as much processor time as the page of the studio.
+    # takes as much processor time as the front end of the studio.
     "WebUIOmniboxPopup",
     "WebUIOmniboxAimPopup",
     # The features that Playwright disables; Chromium reads only the last of two lists.

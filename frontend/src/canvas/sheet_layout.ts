@@ -34,7 +34,7 @@ export function nameWidth(name: string): number {
   if (!measuringContext) return 6 * name.length
   measuringContext.font = NAME_FONT
   const width = Math.min(measuringContext.measureText(name).width, MAX_NAME_WIDTH)
-  // Before the page's font is loaded, a fallback font is measured.
+  // Before the font of the front end is loaded, a fallback font is measured.
   if (document.fonts.check(NAME_FONT)) widths.set(name, width)
   return width
 }

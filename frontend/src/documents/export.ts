@@ -3,7 +3,7 @@ import { useStudio } from '../store'
 const REQUEST_OPTIONS = { headers: { 'X-Armblocks': '1' } }
 
 /**
- * Save a drawing of the visible sheet, as `armblocks diagram` does; SVG and PNG have the theme of this page.
+ * Save a drawing of the visible sheet, as `armblocks diagram` does; SVG and PNG have the present theme.
  */
 export function exportDrawing(kind: 'svg' | 'png' | 'pdf'): void {
   const { document } = useStudio.getState()

@@ -9,7 +9,7 @@ const dateText = (seconds: number) =>
 
 const counted = (count: number, noun: string) => `${count} ${noun}${count === 1 ? '' : 's'}`
 
-/** Unsaved work of the last session; offered when a page connects, and later in the menu. */
+/** Unsaved work of the last session; offered when a client connects, and later in the menu. */
 export function RecoveryDialog() {
   const recoveries = useStudio((s) => s.recoveries)
   const opened = useDialogs((s) => s.open === 'recovery')

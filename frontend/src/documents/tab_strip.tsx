@@ -8,7 +8,7 @@ import { useRobotEditor } from '../robot/editor/state'
 import { ask, useStudio } from '../store'
 import { closeDocument, showTab, useTabs } from './tabs'
 
-/** The tabs of the documents that are open in this page; they scroll if there is no room for all. */
+/** The tabs of the documents that are open in this client; they scroll if there is no room for all. */
 export function TabStrip() {
   const tabs = useTabs((s) => s.tabs)
   const labels = tabLabels(tabs)

@@ -19,7 +19,7 @@ interface Tabs {
   closing: string | null
 }
 
-/** The documents that are open in this page, in the order of their tabs. */
+/** The documents that are open in this client, in the order of their tabs. */
 export const useTabs = create<Tabs>(() => ({ tabs: storedTabs(), requested: null, closing: null }))
 
 function storedTabs(): Tab[] {
@@ -40,7 +40,7 @@ useStudio.subscribe(({ documents }, before) => {
 export const documentInFront = (): string | undefined =>
   useRobotEditor.getState().current ?? useStudio.getState().document?.state.document
 
-/** Add a tab for a document that this page shows. */
+/** Add a tab for a document that this client shows. */
 export function addTab(state: DocumentState): void {
   useTabs.setState((s) => ({
     tabs: withTab(s.tabs, tabOf(state)),
@@ -106,13 +106,13 @@ async function attach(
     return await connection.ask({ ...request, inside })
   } catch (error) {
     if (!(error instanceof Refusal)) throw error
-    return ask(request) // another page has removed or renamed the subsystem
+    return ask(request) // another client has removed or renamed the subsystem
   }
 }
 
 const dialogIsOpen = () => useDialogs.getState().open !== null || useStudio.getState().editing !== null
 
-/** Whether the page has other tabs and no dialog, which belongs to the document in front. */
+/** Whether the client has other tabs and no dialog, which belongs to the document in front. */
 export const canStepTabs = (): boolean => useTabs.getState().tabs.length > 1 && !dialogIsOpen()
 
 /** Whether the document in front can be closed now. */
@@ -132,7 +132,7 @@ export function closeInFront(): void {
 }
 
 /**
- * Close a document; with unsaved changes the user is asked. A document that another page shows stays open
+ * Close a document; with unsaved changes the user is asked. A document that another client shows stays open
  * there.
  */
 export async function closeDocument(document: string, discard = false): Promise<void> {

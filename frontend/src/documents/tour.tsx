@@ -76,7 +76,7 @@ function closeTour(): void {
   localStorage.setItem(SEEN_KEY, 'yes')
 }
 
-/** A tour of the page, about two minutes; offered at the first visit and in the menu. */
+/** A tour of the studio, about two minutes; offered at the first visit and in the menu. */
 export function Tour() {
   const { stop } = useTour()
   const offered = useStudio((s) => s.document !== null)

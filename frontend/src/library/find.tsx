@@ -65,7 +65,7 @@ export function Find() {
   )
 }
 
-/** Search all diagrams of the page, and its robots by name. */
+/** Search all open diagrams of this client, and its robots by name. */
 async function search(text: string): Promise<SearchResult<Tab>[]> {
   const { tabs } = useTabs.getState()
   const labels = tabLabels(tabs)

@@ -1,4 +1,4 @@
-/** Key combinations of one part of the page, and their effects. */
+/** Key combinations of one part of the front end, and their effects. */
 export interface KeyGroup {
   title: string
   keys: [combinations: string, effect: string][]
@@ -10,7 +10,7 @@ interface KeyedCommand {
   sheetOnly?: boolean
 }
 
-/** The groups of the key map: the commands with keys, then the keys of the parts of the page. */
+/** The groups of the key map: the commands with keys, then the keys of the parts of the front end. */
 export function keyGroups(commands: readonly KeyedCommand[], parts: readonly KeyGroup[]): KeyGroup[] {
   const keysOf = (sheetOnly: boolean) =>
     commands

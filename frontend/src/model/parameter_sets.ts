@@ -57,7 +57,7 @@ export function setRows(table: ParameterSetTable, names: string[]): Row[] {
 }
 
 /** The first reason why a set cannot be applied to the model or, with `asTrial`, tried. */
-export function obstacle(table: ParameterSetTable, name: string, asTrial: boolean): string | undefined {
+export function refusalReason(table: ParameterSetTable, name: string, asTrial: boolean): string | undefined {
   const fault = Object.entries(table.faults[name] ?? {})[0]
   if (fault) return `${fault[0]}: ${fault[1]}`
   const values = table.sets[name] ?? {}

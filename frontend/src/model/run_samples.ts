@@ -19,8 +19,8 @@ const INITIAL_CAPACITY = 1024
 let lastVersion = 0
 
 /**
- * The samples of one run, stored outside React because frames arrive faster than the page may render. In the
- * animation frame after a change, each view compares `version` with the version that it has drawn.
+ * The samples of one run, stored outside React because frames arrive faster than the front end may render. In
+ * the animation frame after a change, each view compares `version` with the version that it has drawn.
  */
 export class RunSamples {
   version = ++lastVersion

@@ -1,7 +1,7 @@
 import type { Place, SheetBlock, SheetNote } from '../protocol'
 
 /**
- * Positions that this page has sent to the server. The sheet shows them at once; the server's answer, which
+ * Positions that this client has sent to the server. The sheet shows them at once; the server's answer, which
  * takes longer on a large sheet, replaces them.
  */
 export interface SentMove {

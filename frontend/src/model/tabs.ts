@@ -1,6 +1,6 @@
 import type { DocumentState, Recovery } from '../protocol'
 
-/** A document that is open in this page; the fields identify it also after a restart of the studio. */
+/** A document that is open in this client; the fields identify it also after a restart of the studio. */
 export type Tab = Pick<DocumentState, 'document' | 'kind' | 'path' | 'origin' | 'title'>
 
 export const tabOf = ({ document, kind, path, origin, title }: DocumentState): Tab => ({

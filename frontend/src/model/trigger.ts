@@ -19,7 +19,7 @@ export interface TriggerSettings {
   /** Width of the window, s, and the part of it before the trigger. */
   span: number
   position: number
-  /** Time after a trigger during which others are ignored, s. */
+  /** Time after a trigger during which other triggers are ignored, s. */
   holdOff: number
 }
 
@@ -74,7 +74,7 @@ interface Samples {
  * A rising crossing begins below the level and ends at or above it; a falling one begins above it and ends
  * at or below it. A trace that then remains at the level does not trigger again. Between samples the time is
  * interpolated linearly, as the trace is drawn; a jump, which has two samples of the same time, triggers
- * once at this time. After a crossing, others are ignored for the hold-off time.
+ * once at this time. After a crossing, other crossings are ignored for the hold-off time.
  */
 export class TriggerDetector {
   /** The trigger times, ascending, s. */
@@ -121,15 +121,15 @@ export class TriggerDetector {
 }
 
 /** The window about a trigger: `position` is the part of `span` (s) before it. */
-export function triggerWindow(at: number, span: number, position: number): [number, number] {
-  return [at - position * span, at + (1 - position) * span]
+export function triggerWindow(time: number, span: number, position: number): [number, number] {
+  return [time - position * span, time + (1 - position) * span]
 }
 
 interface Choice {
   mode: Mode
   span: number
   position: number
-  /** The time from which on `single` accepts a trigger, s. */
+  /** The earliest time of a trigger that `single` accepts, s. */
   armedAt: number
   /** Index of the trigger that the user has chosen; null: the last one. */
   chosen: number | null

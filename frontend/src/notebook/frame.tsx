@@ -18,7 +18,7 @@ import { useStudio } from '../store'
 import { theme } from '../theme'
 import { shareCursor } from './shared_cursor'
 
-/** The messages from the notebook to this page; see `studio/notebook.py`. */
+/** The messages from the notebook to this frame; see `studio/notebook.py`. */
 interface ShowMessage {
   kind: 'show'
   dark: boolean

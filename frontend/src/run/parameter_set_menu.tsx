@@ -1,7 +1,7 @@
 import { Button, Menu } from '@mantine/core'
 import { IconChevronDown } from '@tabler/icons-react'
 import { openParameterSets } from '../dialogs'
-import { activeSet, obstacle, setNames } from '../model/parameter_sets'
+import { activeSet, refusalReason, setNames } from '../model/parameter_sets'
 import { useRuns } from './runs'
 import { setTrialValues } from './trial_values'
 import { useParameterSets } from './use_parameter_sets'
@@ -40,8 +40,8 @@ export function ParameterSetMenu() {
                 key={name}
                 checked={name === active}
                 closeMenuOnClick
-                disabled={obstacle(table, name, true) !== undefined}
-                title={obstacle(table, name, true) ?? ''}
+                disabled={refusalReason(table, name, true) !== undefined}
+                title={refusalReason(table, name, true) ?? ''}
                 onChange={() => void setTrialValues(table.sets[name]!)}
               >
                 {name}

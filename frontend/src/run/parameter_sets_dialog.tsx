@@ -6,7 +6,7 @@ import { showDialog, useDialogs } from '../dialogs'
 import { valueText } from '../inspector/value_text'
 import { newKey } from '../keys'
 import type { Edit } from '../messages'
-import { activeSet, obstacle, setNames, setRows, type Cell, type Row } from '../model/parameter_sets'
+import { activeSet, refusalReason, setNames, setRows, type Cell, type Row } from '../model/parameter_sets'
 import type { ParameterSetTable } from '../protocol'
 import { ask, useStudio } from '../store'
 import { useRuns } from './runs'
@@ -38,7 +38,7 @@ async function applyToModel(edit: Edit): Promise<boolean> {
 
 /** Write a set into the model, as one undo step; a run in progress gets its values as well. */
 async function putIntoModel(table: ParameterSetTable, name: string): Promise<void> {
-  if (obstacle(table, name, true) === undefined) await setTrialValues(table.sets[name]!)
+  if (refusalReason(table, name, true) === undefined) await setTrialValues(table.sets[name]!)
   if (await applyToModel({ kind: 'apply_parameter_set', name })) useRuns.setState({ trialValues: {} })
 }
 
@@ -170,8 +170,8 @@ interface HeadProps {
 /** The name of a set, the button that tries it, and the menu of its other commands. */
 function SetHead({ table, name, active, rename }: HeadProps) {
   const trialValues = useRuns((s) => s.trialValues)
-  const noTrial = obstacle(table, name, true)
-  const invalid = obstacle(table, name, false)
+  const noTrial = refusalReason(table, name, true)
+  const invalid = refusalReason(table, name, false)
   const apply = () => void setTrialValues(active ? {} : table.sets[name]!)
   return (
     <div className="set-head">

@@ -46,7 +46,7 @@ interface Runs {
   remove: (key: string) => void
 }
 
-/** All runs since the page was opened, latest last; the oldest are dropped if there are too many. */
+/** All runs of this tab, latest last; the oldest are removed if there are too many. */
 export const useRuns = create<Runs>((set) => ({
   runs: [],
   trialValues: {},
@@ -65,7 +65,7 @@ function update(key: string, change: (run: StoredRun) => Partial<StoredRun>): vo
   }))
 }
 
-/** Store a run that has started. `displayed`: whether the page shows its diagram. */
+/** Store a run that has started. `displayed`: whether the client shows its diagram. */
 export function onRunStarted(event: EventOf<'run_started'>, displayed: boolean): void {
   const stored = useRuns.getState().runs.find(({ key }) => key === event.run)
   if (stored) {

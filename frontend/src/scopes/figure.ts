@@ -209,7 +209,7 @@ export function paint(figure: Figure, canvas: HTMLCanvasElement, scale: number):
 
 const escaped = (text: string) => text.replace(/[&<>"]/g, (mark) => `&#${mark.charCodeAt(0)};`)
 
-/** The figure as an SVG document, in the present theme of the page. */
+/** The figure as an SVG document, in the present theme. */
 export function svgOf(figure: Figure): string {
   const parts: string[] = []
   draw(figure, {

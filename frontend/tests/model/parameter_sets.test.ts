@@ -2,7 +2,7 @@ import { describe, expect, it } from 'vitest'
 import {
   activeSet,
   changedTrials,
-  obstacle,
+  refusalReason,
   sameValues,
   setNames,
   setRows,
@@ -58,11 +58,11 @@ describe('parameter sets', () => {
   })
 
   it('name the reason for which they cannot be applied', () => {
-    expect(obstacle(TABLE, 'set 2', true)).toBeUndefined()
-    expect(obstacle(TABLE, 'stale', false)).toContain('pid.kd')
-    expect(obstacle(TABLE, 'steps', true)).toContain('delay.steps')
-    expect(obstacle(TABLE, 'steps', false)).toBeUndefined()
-    expect(obstacle(TABLE, 'empty', false)).toContain('no values')
+    expect(refusalReason(TABLE, 'set 2', true)).toBeUndefined()
+    expect(refusalReason(TABLE, 'stale', false)).toContain('pid.kd')
+    expect(refusalReason(TABLE, 'steps', true)).toContain('delay.steps')
+    expect(refusalReason(TABLE, 'steps', false)).toBeUndefined()
+    expect(refusalReason(TABLE, 'empty', false)).toContain('no values')
   })
 
   it('replace the trial values of a run in progress', () => {

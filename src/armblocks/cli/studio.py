@@ -33,7 +33,7 @@ def studio(
     ] = 0,
     new_session: Annotated[
         bool,
-        typer.Option("--new-session", help="Require the new link: pages of an earlier session lose access."),
+        typer.Option("--new-session", help="Require the new link: earlier sessions lose access."),
     ] = False,
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")

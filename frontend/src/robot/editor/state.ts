@@ -5,7 +5,7 @@ import type { CellColumn, DocumentState, Readings, RobotContent, RobotTables } f
 import { alteration, ask, connection } from '../../store'
 import { storedData } from '../../stored_data'
 
-/** A robot that this page shows or has shown, in the last state sent by the server. */
+/** A robot that this client shows or has shown, in the last state sent by the server. */
 export interface OpenRobot extends RobotContent {
   state: DocumentState
 }
@@ -58,7 +58,7 @@ function storeRobot(state: DocumentState, content: RobotContent): void {
   if (useRobotEditor.getState().current === state.document) requestReadings()
 }
 
-/** Add a robot that this page shows from now on. */
+/** Add a robot that this client shows from now on. */
 export function robotOpened(event: EventOf<'opened'>, content: ContentOf<'robot'>): void {
   storeRobot(event.state, content)
   if (event.in_front) showRobot(event.state.document, event.notes)
@@ -69,7 +69,7 @@ export function robotChanged({ state }: EventOf<'changed'>, change: ChangeOf<'ro
   storeRobot(state, change.content)
 }
 
-/** Display a robot that this page has loaded. */
+/** Display a robot that this client has loaded. */
 export function showRobot(robot: string, notes: string[] = []): void {
   useRobotEditor.setState({ current: robot, notes, readings: null })
   if (!useRobotEditor.getState().tables)
@@ -101,7 +101,7 @@ useRobotEditor.subscribe(({ robots, current }, before) => {
 })
 
 /**
- * After a reconnection or a reload, let the server reopen the robots of this page under the same keys.
+ * After a reconnection or a reload, let the server reopen the robots of this client under the same keys.
  * Returns the key of the robot that the tab showed before a reload.
  */
 export async function reattachRobots(): Promise<string | undefined> {

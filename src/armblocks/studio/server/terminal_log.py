@@ -16,7 +16,7 @@ from typing import Any
 ExceptionInfo = tuple[type[BaseException], BaseException, TracebackType | None] | tuple[None, None, None]
 
 
-class DiscreetFormatter(logging.Formatter):
+class RedactingFormatter(logging.Formatter):
     """Formats log records without secrets and without exception messages."""
 
     def __init__(self, secrets: Callable[[], tuple[str, ...]]) -> None:
@@ -43,7 +43,7 @@ def log_settings(secrets: Callable[[], tuple[str, ...]]) -> dict[str, Any]:
     return {
         "version": 1,
         "disable_existing_loggers": False,
-        "formatters": {"discreet": {"()": DiscreetFormatter, "secrets": secrets}},
-        "handlers": {"terminal": {"class": "logging.StreamHandler", "formatter": "discreet"}},
+        "formatters": {"redacting": {"()": RedactingFormatter, "secrets": secrets}},
+        "handlers": {"terminal": {"class": "logging.StreamHandler", "formatter": "redacting"}},
         "root": {"handlers": ["terminal"], "level": "WARNING"},
     }
