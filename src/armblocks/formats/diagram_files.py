@@ -63,9 +63,9 @@ def load_diagram(
     text = fspath(name_or_path)
     if not isinstance(name_or_path, str) or "/" in text or "\\" in text or text.lower().endswith(SUFFIX):
         return read_diagram(text, library, resolve_robot, trust=trust, draft=draft)
-    known = list_examples()
-    if text not in known:
-        raise UnknownNameError("shipped diagram", text, known)
+    example_names = list_examples()
+    if text not in example_names:
+        raise UnknownNameError("shipped diagram", text, example_names)
     path = shipped_folder("examples") / f"{text}{SUFFIX}"
     return read_diagram(path, library, resolve_robot, trust=trust, draft=draft)
 

@@ -58,10 +58,10 @@ def diagram_to_python(diagram: Diagram) -> str:
     blocks = [block for level in diagrams for block in level.blocks.values()]
     kinds = sorted({block.type_name() for block in blocks if not _is_whole_link(block)})
     robots = _robots(diagrams)
-    shown = _identifiers({robot: name for robot, (name, _) in robots.items()}, _RESERVED_NAMES)
-    writer = _ProgramWriter(shown)
+    identifiers = _identifiers({robot: name for robot, (name, _) in robots.items()}, _RESERVED_NAMES)
+    writer = _ProgramWriter(identifiers)
     lines = ["import armblocks as ab", *_import(kinds), ""]
-    lines += [f"{shown[robot]} = {expression}" for robot, (_, expression) in robots.items()]
+    lines += [f"{identifiers[robot]} = {expression}" for robot, (_, expression) in robots.items()]
     lines += writer.lines(diagram, "builder")
     lines += ["diagram = builder.build()", "", f"result = ab.simulate({', '.join(_settings(diagram))})"]
     return "\n".join(lines) + "\n"

@@ -150,9 +150,9 @@ class DiagramReader:
                 )
             values[inside[0]] = self.libraries.linked(members["library"])
         mask = {rule.name: rule for value in values.values() for rule in cast("Diagram", value).mask}
-        known = {**mask, **{name: rule for name, rule in rules.items() if name not in inside}}
+        all_rules = {**mask, **{name: rule for name, rule in rules.items() if name not in inside}}
         masked: dict[str, object] = {}
-        for name, parameter_value in self._parameter_values(members, known, kind).items():
+        for name, parameter_value in self._parameter_values(members, all_rules, kind).items():
             (masked if name in mask else values)[name] = parameter_value
         missing = [name for name, rule in rules.items() if rule.required and name not in values]
         if missing:
@@ -194,8 +194,8 @@ class DiagramReader:
                 rules.append(mask_parameter_from_json(node, self._default))
         for name, member in values.items():
             if name not in [rule.name for rule in rules]:
-                known = [rule.name for rule in rules]
-                raise UnknownNameError("mask parameter", name, known, where=member.where)
+                parameter_names = [rule.name for rule in rules]
+                raise UnknownNameError("mask parameter", name, parameter_names, where=member.where)
         for rule, node in zip(rules, mask):
             value = parameter_from_json(rule, values[rule.name], self.robots) if rule.name in values else None
             with located(node):

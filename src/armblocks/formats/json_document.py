@@ -98,12 +98,12 @@ class Node:
 
     def choice(self, choices: Iterable[str]) -> str:
         """A text, which must be one of ``choices``."""
-        word, known = self.text(), list(choices)
-        if word not in known:
+        word, words = self.text(), list(choices)
+        if word not in words:
             raise self.error(
                 f"'{_short(word)}' is not known here",
-                allowed=", ".join(known),
-                fix=_nearest(word, known) or "choose an allowed value",
+                allowed=", ".join(words),
+                fix=_nearest(word, words) or "choose an allowed value",
             )
         return word
 

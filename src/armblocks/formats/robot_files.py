@@ -82,9 +82,9 @@ def load_robot_in(
 @cache
 def shipped_robot(name: str) -> Robot:
     """A shipped robot by its name; raises ``UnknownNameError`` with the nearest name."""
-    known = list_robots()
-    if name not in known:
-        raise UnknownNameError("shipped robot", name, known)
+    robot_names = list_robots()
+    if name not in robot_names:
+        raise UnknownNameError("shipped robot", name, robot_names)
     path = shipped_folder("robots") / name / ROBOT_FILE
     robot = robot_in_bytes(robot_file_bytes(path), path, FileContext())
     return replace(robot, source=name)

@@ -35,10 +35,10 @@ def findings_of(load: Callable[[], Robot], file: str, context: FileContext) -> t
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ArmblocksWarning)
         robot = load()
-    found = [*context.findings, *_robot_findings(robot, file, context)]
+    findings = [*context.findings, *_robot_findings(robot, file, context)]
     texts = [str(warning.message) for warning in caught if issubclass(warning.category, ArmblocksWarning)]
-    found += [FileFinding(rule=WARNED, file=file, what=text) for text in dict.fromkeys(texts)]
-    return tuple(sorted(found, key=lambda finding: finding.line or 10**9))
+    findings += [FileFinding(rule=WARNED, file=file, what=text) for text in dict.fromkeys(texts)]
+    return tuple(sorted(findings, key=lambda finding: finding.line or 10**9))
 
 
 def _robot_findings(robot: Robot, file: str, context: FileContext) -> Iterator[FileFinding]:

@@ -112,8 +112,8 @@ class RobotReader:
                 return self._resolve_robot(str(self._folder / reference))
             return self._resolve_robot(reference)
         except UnknownNameError as error:
-            known = [*error.known, *self._table_robots]
-            raise UnknownNameError(error.kind, error.name, known, where=node.where) from error
+            valid_names = [*error.known, *self._table_robots]
+            raise UnknownNameError(error.kind, error.name, valid_names, where=node.where) from error
         except ArmblocksError as error:
             problem = f"{error.where}: {error.what}" if error.where else error.what
             raise node.error(problem, allowed=error.allowed, fix=error.fix) from error

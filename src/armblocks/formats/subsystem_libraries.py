@@ -58,9 +58,9 @@ def library_path(reference: str, folder: Path | None) -> Path:
     Raises ``UnknownNameError`` for a name that is not shipped, ``FormatError`` for a file that is not JSON.
     """
     if not is_path(reference):
-        known = list_libraries()
-        if reference not in known:
-            raise UnknownNameError("shipped library", reference, known)
+        library_names = list_libraries()
+        if reference not in library_names:
+            raise UnknownNameError("shipped library", reference, library_names)
         return shipped_folder("libraries").resolve() / f"{reference}{SUFFIX}"
     if "\0" in reference or not reference.lower().endswith(SUFFIX):
         raise FormatError(
@@ -153,13 +153,13 @@ class Libraries:
                 fix="reduce the nesting",
             )
         root = self._root(path)
-        known = root.members()["library"].members()
-        if name not in known:
-            raise UnknownNameError("library block", name, known, where=str(path))
+        stored_libraries = root.members()["library"].members()
+        if name not in stored_libraries:
+            raise UnknownNameError("library block", name, stored_libraries, where=str(path))
         inner = Libraries(path.parent, self._read_entry, self._read_file, parent=self)
         self._chain.append(key)
         try:
-            diagram = self._read_entry(root, known[name], name, path.parent, inner)
+            diagram = self._read_entry(root, stored_libraries[name], name, path.parent, inner)
         finally:
             self._chain.pop()
         diagram = replace(diagram, link=f"{_link_file(path)}#{name}")

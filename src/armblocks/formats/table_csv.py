@@ -233,8 +233,11 @@ def _numeric_columns(
         raise _size_error(numbers.size)
     if decimal:
         notes.append(decimal)
-    named = unique_names(names if names is not None else [""] * numbers.shape[1])
-    return [Column(name=name, values=np.ascontiguousarray(values)) for name, values in zip(named, numbers.T)]
+    column_names = unique_names(names if names is not None else [""] * numbers.shape[1])
+    return [
+        Column(name=name, values=np.ascontiguousarray(values))
+        for name, values in zip(column_names, numbers.T)
+    ]
 
 
 def _body_lines(text: str) -> Iterator[tuple[int, int]]:

@@ -226,9 +226,9 @@ def _clipped(line: _Array, width: float, height: float) -> _Array | None:
 
 def _path_marks(stage: Stage, body: Rendering, path: _Array, current: int) -> list[Polyline | Disc]:
     """The future path as a dotted line; the past path fades with age and is dim behind bodies."""
-    x, y, nearness = stage.camera.project(path)
+    x, y, inverse_depth = stage.camera.project(path)
     points = np.column_stack([x, y])
-    hidden = body.nearness_at(x, y) > nearness * 1.01
+    hidden = body.inverse_depth_at(x, y) > inverse_depth * 1.01
     marks: list[Polyline | Disc] = []
     if current < len(path) - 1:
         marks.append(

@@ -67,11 +67,11 @@ class Camera:
     def project(self, points: _Array) -> tuple[_Array, _Array, _Array]:
         """Positions to the right and downwards (px), and 1/depth (1/m, larger is nearer) of points."""
         local = (points - self.eye) @ self.axes.T
-        nearness = -1.0 / local[..., 2]
+        inverse_depth = -1.0 / local[..., 2]
         return (
-            self.scale * local[..., 0] * nearness + self.shift[0],
-            -self.scale * local[..., 1] * nearness + self.shift[1],
-            nearness,
+            self.scale * local[..., 0] * inverse_depth + self.shift[0],
+            -self.scale * local[..., 1] * inverse_depth + self.shift[1],
+            inverse_depth,
         )
 
     def to_pixels(self, points: _Array) -> _Array:

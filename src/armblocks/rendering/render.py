@@ -42,24 +42,24 @@ _SKY, _GROUND = 0.40, 0.17
 class Rendering:
     """The pixels that a set of bodies covers, as a window of the panel.
 
-    ``pixels``: (rows, columns, 4) uint8, straight alpha. ``nearness``: (rows, columns), 1/depth of the
+    ``pixels``: (rows, columns, 4) uint8, straight alpha. ``inverse_depth``: (rows, columns), 1/depth of the
     visible surface, or 0. ``left`` and ``top``: the window's first column and row. ``scale``: pixels per px.
     """
 
     pixels: NDArray[np.uint8]
-    nearness: _Array
+    inverse_depth: _Array
     left: int
     top: int
     scale: float
 
-    def nearness_at(self, x: _Array, y: _Array) -> _Array:
+    def inverse_depth_at(self, x: _Array, y: _Array) -> _Array:
         """1/depth of the bodies at points of the panel (px), 0 without a body."""
         column = np.floor(x * self.scale).astype(np.intp) - self.left
         row = np.floor(y * self.scale).astype(np.intp) - self.top
-        rows, columns = self.nearness.shape
+        rows, columns = self.inverse_depth.shape
         inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
-        nearness = self.nearness[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)]
-        return np.where(inside, nearness, 0.0)
+        inverse_depth = self.inverse_depth[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)]
+        return np.where(inside, inverse_depth, 0.0)
 
 
 def render(
@@ -76,7 +76,7 @@ def render(
     material = np.repeat([_MATERIALS.index(mesh.material) for mesh in meshes], counts)
 
     # Pass 1: project, remove back faces, and determine the window that the bodies cover.
-    x, y, nearness = camera.project(corners)
+    x, y, inverse_depth = camera.project(corners)
     x, y = x * scale, y * scale
     left, right = _extent(x, round(width * scale))
     top, bottom = _extent(y, round(height * scale))
@@ -84,13 +84,13 @@ def render(
     x, y = (x - left) * SUPERSAMPLES, (y - top) * SUPERSAMPLES
     doubled_area = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
     front = doubled_area < -1e-9  # y runs downwards: anticlockwise is negative
-    x, y, nearness, doubled_area = x[front], y[front], nearness[front], doubled_area[front]
+    x, y, inverse_depth, doubled_area = x[front], y[front], inverse_depth[front], doubled_area[front]
     normals, material = normals[front], material[front]
 
     # Pass 2: fragments, and the nearest of each pixel.
     triangle, column, row = _fragments(x, y, columns, rows)
     pixel = row * columns + column
-    depth = _linear_in_pixels(x, y, doubled_area, nearness)(triangle, column, row)
+    depth = _linear_in_pixels(x, y, doubled_area, inverse_depth)(triangle, column, row)
     nearest = np.zeros(rows * columns)
     np.maximum.at(nearest, pixel, depth)
     visible = np.flatnonzero(depth == nearest[pixel])
@@ -118,7 +118,7 @@ def render(
     for k in range(3):
         pixels[..., k] = _SRGB[np.rint(averaged[k] / np.maximum(alpha, 1e-9) * _SRGB_STEPS).astype(np.intp)]
     pixels[..., 3] = np.rint(alpha * 255)
-    return Rendering(pixels=pixels, nearness=nearest[::n, ::n], left=left, top=top, scale=scale)
+    return Rendering(pixels=pixels, inverse_depth=nearest[::n, ::n], left=left, top=top, scale=scale)
 
 
 def _block_means(planes: _Array, n: int) -> _Array:
@@ -256,12 +256,12 @@ def _shade(normal: _Array, material: _Index) -> _Array:
     return np.clip(_BASE[:, material] * light + white, 0.0, 1.0)
 
 
-def _outlines(nearness: _Array, facing: _Array) -> _Array:
+def _outlines(inverse_depth: _Array, facing: _Array) -> _Array:
     """A factor (rows, columns) that is below 1 where depth or normal jumps between neighbouring pixels."""
-    factor = np.ones_like(nearness)
+    factor = np.ones_like(inverse_depth)
     views = (
-        (factor[:-1], nearness[:-1], nearness[1:], facing[:, :-1], facing[:, 1:]),
-        (factor[:, :-1], nearness[:, :-1], nearness[:, 1:], facing[:, :, :-1], facing[:, :, 1:]),
+        (factor[:-1], inverse_depth[:-1], inverse_depth[1:], facing[:, :-1], facing[:, 1:]),
+        (factor[:, :-1], inverse_depth[:, :-1], inverse_depth[:, 1:], facing[:, :, :-1], facing[:, :, 1:]),
     )
     for target, near, other, facing_near, facing_other in views:
         both = (near > 0) & (other > 0)

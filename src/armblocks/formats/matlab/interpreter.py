@@ -57,8 +57,8 @@ class Interpreter:
                 case Assignment():
                     self._assign(statement)
                 case Evaluation(value=value):
-                    if (shown := self._evaluation(value)) is not None:
-                        self.variables["ans"] = shown
+                    if (text := self._evaluation(value)) is not None:
+                        self.variables["ans"] = text
                 case Command(words=words):
                     self._command(self.source.location(statement.at), words)
 

@@ -70,12 +70,12 @@ class _Dae:
     def target(self, element: Element, attribute: str, tag: str) -> Element:
         """The element with a tag to which a reference ``#id`` refers."""
         reference = element.required(attribute, "#id")
-        found = self.by_id.get(reference.removeprefix("#"))
-        if not reference.startswith("#") or found is None or found.tag != tag:
+        target = self.by_id.get(reference.removeprefix("#"))
+        if not reference.startswith("#") or target is None or target.tag != tag:
             raise element.error(
                 f"there is no {tag} '{shortened(reference)}' in this file", allowed="#id of this file"
             )
-        return found
+        return target
 
     def node(self, key: Hashable) -> Placed:
         """A ``<node>``, or an ``<instance_node>`` with the node that it refers to."""
@@ -119,24 +119,24 @@ class _Dae:
             self.geometries[geometry] = np.concatenate(parts)
         return self.geometries[geometry]
 
-    def polygons(self, element: Element, known: dict[Element, Floats]) -> Floats:
-        """The triangles of one list of polygons. ``known``: the points of sources that were read before."""
+    def polygons(self, element: Element, points_of_sources: dict[Element, Floats]) -> Floats:
+        """The triangles of one list of polygons. ``points_of_sources``: those that were read before."""
         inputs = [*element.all("input")]
         offsets = [_offset(entry) for entry in inputs]
         vertex = next((k for k, i in enumerate(inputs) if i.attributes.get("semantic") == "VERTEX"), None)
         if vertex is None:
             return np.zeros((0, 3, 3))
         source = self.source_of(inputs[vertex])
-        if source not in known:
-            known[source] = self.points(source)
+        if source not in points_of_sources:
+            points_of_sources[source] = self.points(source)
         lists = [_indices(p) for p in element.all("p")]
         stride = max(offsets) + 1
         for p, indices in zip(element.all("p"), lists):
             if len(indices) % stride:
                 raise p.error(f"{len(indices)} indices are given", allowed=f"a multiple of {stride}")
         corners = [indices[offsets[vertex] :: stride] for indices in lists]
-        joined = np.concatenate([np.zeros(0, np.int64), *corners])
-        return corners_at(known[source], joined[_triangles(element, corners)], element.file)
+        all_corners = np.concatenate([np.zeros(0, np.int64), *corners])
+        return corners_at(points_of_sources[source], all_corners[_triangles(element, corners)], element.file)
 
     def source_of(self, entry: Element) -> Element:
         """The ``<source>`` of the positions of an input of the kind VERTEX."""

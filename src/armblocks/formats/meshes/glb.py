@@ -70,8 +70,8 @@ class _Glb:
         """The triangles of the default scene; of all nodes without a parent if there is no scene."""
         scenes = self.list("scenes")
         if scenes:
-            chosen = _at(scenes, self.root["scene"], "scene") if "scene" in self.root else scenes[0]
-            scene = chosen.members()
+            default_scene = _at(scenes, self.root["scene"], "scene") if "scene" in self.root else scenes[0]
+            scene = default_scene.members()
             roots = [_index(node, self.nodes, "node") for node in _elements(scene, "nodes")]
         else:
             inner = {

@@ -81,8 +81,8 @@ def _motor_of(element: Element, context: FileContext) -> Motor | None:
     damping, friction = _first(element, "damping"), element.number("frictionloss", 0.0)
     armature = element.number("armature", 0.0)
     if min(damping, friction, armature) < 0.0:
-        given = f"damping {damping:g}, frictionloss {friction:g}, armature {armature:g}"
-        what = f"{given}: negative values are left out"
+        text = f"damping {damping:g}, frictionloss {friction:g}, armature {armature:g}"
+        what = f"{text}: negative values are left out"
         note(context, FRICTION, element, what)
         damping, friction, armature = (max(value, 0.0) for value in (damping, friction, armature))
     if damping == friction == armature == 0.0:
@@ -107,8 +107,8 @@ def torque_limits(root: Element, defaults: Defaults, context: FileContext) -> di
     It is the force range of the actuator, or the control range of a motor, times the magnitude of the gear.
     """
     limits: dict[str, float] = {}
-    for given in sections(root, "actuator"):
-        actuator = defaults.applied(given)
+    for element in sections(root, "actuator"):
+        actuator = defaults.applied(element)
         if any(name in actuator.attributes for name in _TRANSMISSIONS_OF_TENDONS):
             note(context, TENDON, actuator, "the actuator does not act on a joint; it is left out")
             continue

@@ -22,24 +22,24 @@ def pose_of(element: Element, settings: Settings) -> Transform:
 
 def rotation_of(element: Element, settings: Settings) -> NDArray[np.float64]:
     """The rotation of an element, (3, 3)."""
-    given = element.attributes
-    if "axisangle" in given:
+    attributes = element.attributes
+    if "axisangle" in attributes:
         *axis, angle = element.numbers("axisangle", (4,))
         return _about(element, np.array(axis), angle * settings.angle_unit)
-    if "xyaxes" in given:
+    if "xyaxes" in attributes:
         numbers = np.array(element.numbers("xyaxes", (6,)))
         x = _direction(element, numbers[:3])
         y = _direction(element, numbers[3:] - (numbers[3:] @ x) * x)
         return np.column_stack((x, y, np.cross(x, y)))
-    if "zaxis" in given:
+    if "zaxis" in attributes:
         return towards(_direction(element, np.array(element.numbers("zaxis", (3,)))))
-    if "euler" in given:
+    if "euler" in attributes:
         result = np.eye(3)
         for axis, angle in zip(settings.euler_order, element.numbers("euler", (3,))):
             turn = np.array(_ABOUT[axis.lower()](angle * settings.angle_unit))
             result = result @ turn if axis.islower() else turn @ result
         return result
-    if "quat" in given:
+    if "quat" in attributes:
         return of_quaternion(element, element.numbers("quat", (4,)))
     return np.eye(3)
 

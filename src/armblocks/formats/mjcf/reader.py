@@ -115,8 +115,8 @@ class _Model:
         waiting: list[tuple[Element, _Place]] = []
         for world in reversed([*self.root.all("worldbody")]):
             default_class = world.attributes.get("childclass", MAIN)
-            found = self._contents(world, _Place(parent=None, default_class=default_class), shapes=False)
-            waiting += reversed(found.bodies)
+            contents = self._contents(world, _Place(parent=None, default_class=default_class), shapes=False)
+            waiting += reversed(contents.bodies)
         while waiting:
             body, place = waiting.pop()
             series, bodies = self._body(body, place)
@@ -214,11 +214,11 @@ class _Model:
             shape for geom in visible for shape in drawn(geom, self.meshes, label, context, Material.PAINT)
         )
 
-    def _free_name(self, wanted: str, substitute: str) -> str:
-        """The name of an element, or a new one if it has none or if it is taken; bodies keep their names."""
-        base = wanted.strip()[:_MAX_NAME] or substitute
+    def _free_name(self, given_name: str, substitute: str) -> str:
+        """The name of an element, or a new name if the element has none or its name is in use."""
+        base = given_name.strip()[:_MAX_NAME] or substitute
         name, number = base, 2
-        is_body = substitute == "body" and wanted.strip() != ""
+        is_body = substitute == "body" and given_name.strip() != ""
         while name in self.names or (name in self.body_names and not (is_body and name == base)):
             name, number = f"{base} {number}", number + 1
         self.names.add(name)
@@ -231,8 +231,8 @@ class _Model:
                 what = f"the constraint <{shortened(constraint.tag)}> is left out: its joints are independent"
                 note(self.context, EQUALITY, constraint, what)
         for tendon in sections(self.root, "tendon"):
-            given = self.defaults.applied(tendon)
-            if any(given.number(name, 0.0) for name in ("stiffness", "damping", "frictionloss")):
+            element = self.defaults.applied(tendon)
+            if any(element.number(name, 0.0) for name in ("stiffness", "damping", "frictionloss")):
                 note(self.context, TENDON, tendon, "the forces of the tendon are left out")
         for option in self.root.all("option"):
             if option.number("density", 0.0) or option.number("viscosity", 0.0):

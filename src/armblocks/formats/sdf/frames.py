@@ -42,9 +42,10 @@ class Frame:
     """The frame of a link, joint, ``<frame>``, model or world.
 
     ``kind``: the tag of its element, or ``merged`` for the frame of a model whose content became a part of
-    another model. ``name`` includes the names of nested models. ``scope``: where the names in its element are
-    searched; ``home``: the frame that they mean by ``__model__``. ``pose``: its ``<pose>``. ``inner``: the
-    scope inside a model, ``placement``: the name of the frame in it that the pose places.
+    another model. ``name`` includes the names of nested models. ``scope``: the names that its element can
+    refer to. ``model_frame``: the meaning of ``__model__`` in this element. ``pose``: its ``<pose>``.
+    ``inner``: the scope inside a model. ``placement``: the name of the frame inside a model to which the pose
+    applies.
     """
 
     kind: str
@@ -52,7 +53,7 @@ class Frame:
     element: Element
     source: Source
     scope: Scope
-    home: Frame | None = None
+    model_frame: Frame | None = None
     pose: Element | None = None
     inner: Scope | None = None
     placement: str = ""
@@ -63,7 +64,8 @@ class Scope:
     """The names inside a model or a world.
 
     ``frame``: that of the model or world. ``fixed``: the model is static, or a part of a static model.
-    ``prefix`` of the full names. ``canonical``: the name of the link that the frame of the model moves with.
+    ``prefix``: that of the full names. ``canonical``: the name of the link to which the frame of the model is
+    attached.
     """
 
     prefix: str = ""
@@ -110,13 +112,13 @@ class Frames:
         self._computing: list[Frame] = []
         self._bodies: dict[Frame, Frame] = {}
 
-    def named(self, owner: Frame, name: str, element: Element) -> Frame:
+    def lookup(self, owner: Frame, name: str, element: Element) -> Frame:
         """The frame that ``name`` means in an element of ``owner``. Raises ``UnknownNameError``."""
-        return self._found(owner.scope, owner.home, name, element)
+        return self._lookup(owner.scope, owner.model_frame, name, element)
 
-    def _found(self, scope: Scope, home: Frame | None, name: str, element: Element) -> Frame:
-        if name == MODEL_FRAME and home is not None:
-            return home
+    def _lookup(self, scope: Scope, model_frame: Frame | None, name: str, element: Element) -> Frame:
+        if name == MODEL_FRAME and model_frame is not None:
+            return model_frame
         if name in scope.names:  # before SDF 1.7, names may have the separator in them, or be "world"
             return scope.names[name]
         if name == WORLD:
@@ -152,7 +154,8 @@ class Frames:
         return self.between(link, self._relative_to(link, value.relative_to, pose, link)) @ value.transform
 
     def body(self, frame: Frame) -> Frame:
-        """The link that a frame moves with; the frame of the world if it does not move."""
+        """The link to which a frame is attached, directly or through other frames; the frame of the world if
+        the frame does not move."""
         path: list[Frame] = []
         while frame not in self._bodies:
             if frame in path:
@@ -167,7 +170,7 @@ class Frames:
         return self._bodies[frame]
 
     def _carrier(self, frame: Frame) -> Frame:
-        """The frame that this one is attached to; links and the world themselves."""
+        """The frame to which a frame is attached; a link or the world is returned unchanged."""
         if frame.kind in (WORLD, "link"):
             return frame
         if frame.kind in ("joint", "frame"):
@@ -179,7 +182,7 @@ class Frames:
         if inner.fixed:
             return _world(inner)
         if inner.canonical:
-            return self._found(inner, frame, inner.canonical, frame.element)
+            return self._lookup(inner, frame, inner.canonical, frame.element)
         entries = [
             entry for kind in ("link", "model") for entry in inner.names.values() if entry.kind == kind
         ]
@@ -190,11 +193,11 @@ class Frames:
     def _default(self, frame: Frame) -> Frame:
         """The frame that the pose of ``frame`` is relative to if it names none."""
         if frame.kind == "joint":
-            return self.named(frame, text_in(frame.element, "child"), frame.element)
+            return self.lookup(frame, text_in(frame.element, "child"), frame.element)
         attached_to = frame.element.attributes.get("attached_to", "").strip() if frame.kind == "frame" else ""
         if attached_to:
-            return self.named(frame, attached_to, frame.element)
-        return frame.home or _world(frame.scope)
+            return self.lookup(frame, attached_to, frame.element)
+        return frame.model_frame or _world(frame.scope)
 
     def _chain(self, frame: Frame) -> list[Frame]:
         """The frame, the frame that its pose is relative to, and so on to the world."""
@@ -233,7 +236,7 @@ class Frames:
             parent = self._relative_to(frame, value.relative_to, frame.pose, parent)
         if frame.placement:
             scope = frame.inner or frame.scope
-            placed = self._found(scope, frame, frame.placement, frame.element)
+            placed = self._lookup(scope, frame, frame.placement, frame.element)
             chain = [placed]
             while chain[-1] is not frame:
                 step, _ = self._step(chain[-1])
@@ -246,7 +249,7 @@ class Frames:
     def _relative_to(self, owner: Frame, name: str, pose: Element, default: Frame) -> Frame:
         """The frame that the pose of an element of ``owner`` names."""
         try:
-            return self.named(owner, name, pose)
+            return self.lookup(owner, name, pose)
         except UnknownNameError:
             if not owner.source.before_frames:
                 raise

@@ -49,8 +49,8 @@ def inertial_of(link: Frame, frames: Frames, moves: bool) -> Inertial:
     moments = element.first("inertia")
     xx, yy, zz = (number_in(moments, name, 1.0) for name in ("ixx", "iyy", "izz"))
     xy, yz, xz = (number_in(moments, name, 0.0) for name in ("ixy", "iyz", "ixz"))
-    given: Matrix3 = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+    matrix: Matrix3 = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
     if pose.rotation == IDENTITY3:
-        return Inertial(mass, pose.translation, given)
-    rotated = pose.R @ np.array(given) @ pose.R.T
+        return Inertial(mass, pose.translation, matrix)
+    rotated = pose.R @ np.array(matrix) @ pose.R.T
     return Inertial(mass, pose.translation, matrix3((rotated + rotated.T) / 2))

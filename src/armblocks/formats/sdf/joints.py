@@ -53,15 +53,15 @@ def axes_of(joint: Frame, frames: Frames, reverse: bool) -> list[tuple[Joint, Mo
     relative to the child: the order is reversed, and the axes are negated, so that the coordinates remain.
     """
     kind = joint_type_of(joint)
-    found: list[tuple[Joint, Motor | None]] = []
+    axes: list[tuple[Joint, Motor | None]] = []
     for tag in AXES[kind]:
         axis = joint.element.first(tag)
         x, y, z = _direction(joint, axis, tag, frames)
         limits = _limits(joint, axis, kind == "continuous", frames.context)
         joint_type = Prismatic if kind == "prismatic" else Revolute
         direction = (-x, -y, -z) if reverse else (x, y, z)
-        found.append((joint_type(axis=direction, limits=limits), motor_of(joint, axis, frames.context)))
-    return found[::-1] if reverse else found
+        axes.append((joint_type(axis=direction, limits=limits), motor_of(joint, axis, frames.context)))
+    return axes[::-1] if reverse else axes
 
 
 def _direction(joint: Frame, axis: Element | None, tag: str, frames: Frames) -> Vector3:
@@ -91,7 +91,7 @@ def _direction(joint: Frame, axis: Element | None, tag: str, frames: Frames) -> 
         name = MODEL_FRAME if joint.source.version < (1, 5) or flag_in(axis, "use_parent_model_frame") else ""
     if not name:
         return x, y, z
-    rotation = frames.between(joint, frames.named(joint, name, place)).rotation
+    rotation = frames.between(joint, frames.lookup(joint, name, place)).rotation
     return Transform(rotation=rotation).apply((x, y, z))
 
 

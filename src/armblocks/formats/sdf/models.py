@@ -49,7 +49,7 @@ class Models:
         self._includes = 0
 
     def world(self, element: Element, source: Source) -> Scope:
-        """The models in a world, or in the root of a file, which is then a world with one place.
+        """The models in a ``<world>``, or in the root element of a file without a world.
 
         If a model of a world cannot be read, a finding says why, and the error is added to ``errors``.
         """
@@ -70,7 +70,7 @@ class Models:
         elsewhere = "" if place == element.where.partition(", ")[0] else f"{place}: "
         note(self.context, MODEL, element, f"it is not read: {elsewhere}{error.what}")
 
-    def _add(self, child: Element, scope: Scope, home: Frame, source: Source, level: int) -> None:
+    def _add(self, child: Element, scope: Scope, model_frame: Frame, source: Source, level: int) -> None:
         """Add the frames of an element of a model or world."""
         in_world = scope.frame.kind == "world"
         if child.tag in ("link", "joint") and in_world:
@@ -85,21 +85,21 @@ class Models:
                 element=child,
                 source=source,
                 scope=scope,
-                home=None if in_world else home,
+                model_frame=None if in_world else model_frame,
                 pose=child.first("pose") or child.first("origin"),
             )
             scope.add(name, frame)
         elif child.tag == "model":
-            self._model(child, None, scope, home, (source, source), level)
+            self._model(child, None, scope, model_frame, (source, source), level)
         elif child.tag == "include":
-            self._include(child, scope, home, source, level)
+            self._include(child, scope, model_frame, source, level)
 
     def _model(
         self,
         model: Element,
         include: Element | None,
         scope: Scope,
-        home: Frame,
+        model_frame: Frame,
         sources: tuple[Source, Source],
         level: int,
     ) -> None:
@@ -128,7 +128,7 @@ class Models:
             element=model,
             source=sources[0],
             scope=scope,
-            home=None if in_world else home,
+            model_frame=None if in_world else model_frame,
             pose=pose,
             placement=placement,
         )
@@ -144,7 +144,9 @@ class Models:
         for child in model.children:
             self._add(child, inner, frame, sources[1], level + 1)
 
-    def _include(self, include: Element, scope: Scope, home: Frame, source: Source, level: int) -> None:
+    def _include(
+        self, include: Element, scope: Scope, model_frame: Frame, source: Source, level: int
+    ) -> None:
         self._includes += 1
         if self._includes > MAX_INCLUDES or level >= MAX_LEVELS:
             raise include.error(
@@ -169,7 +171,7 @@ class Models:
             return
         if len(models) != 1:
             raise root.error(f"the included file has {len(models)} models", allowed="one model")
-        self._model(models[0], include, scope, home, (source, inside), level)
+        self._model(models[0], include, scope, model_frame, (source, inside), level)
 
     def _file(self, uri: str, folder: Path | None) -> Path | str:
         """The SDF file of a URI, or the reason why there is none."""
@@ -183,8 +185,8 @@ class Models:
         uri = uri.rstrip("/")
         manifest = resolved(f"{uri}/model.config", self.context, folder)
         if isinstance(manifest, Path):
-            listed = read_elements(read_bounded(manifest, _MANIFEST_BYTES), str(manifest)).all("sdf")
-            files = sorted((_version(entry), entry.text) for entry in listed)
+            sdf_elements = read_elements(read_bounded(manifest, _MANIFEST_BYTES), str(manifest)).all("sdf")
+            files = sorted((_version(entry), entry.text) for entry in sdf_elements)
             if files:
                 return resolved(files[-1][1], self.context, manifest.parent)
         path = resolved(f"{uri}/model.sdf", self.context, folder)

@@ -210,7 +210,7 @@ def _end(joint: Frame, tag: str, frames: Frames) -> Frame | None:
             f"the joint has no <{tag}>", allowed=f"<{tag}>name of a link</{tag}>", fix=f"add the {tag} link"
         )
     name = element.text or element.required("link", "the name of a link")
-    link = frames.body(frames.named(joint, name, element))
+    link = frames.body(frames.lookup(joint, name, element))
     return None if link.kind == WORLD or link.scope.fixed else link
 
 

@@ -48,8 +48,8 @@ def inertial_of(link: Element, context: FileContext) -> Inertial:
     xx, yy, zz, xy, yz, xz = (
         moments.number(name, 0.0) for name in ("ixx", "iyy", "izz", "ixy", "iyz", "ixz")
     )
-    given: Matrix3 = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+    matrix: Matrix3 = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
     if pose.rotation == IDENTITY3:
-        return Inertial(kilograms, pose.translation, given)
-    rotated = pose.R @ np.array(given) @ pose.R.T
+        return Inertial(kilograms, pose.translation, matrix)
+    rotated = pose.R @ np.array(matrix) @ pose.R.T
     return Inertial(kilograms, pose.translation, matrix3((rotated + rotated.T) / 2))

@@ -37,8 +37,8 @@ def joint_type_of(element: Element) -> str:
     """The type of a joint. Raises ``FormatError`` for types that are not supported."""
     kind = element.required("type", ", ".join(JOINT_KINDS))
     if kind not in JOINT_KINDS:
-        known = {"floating": 6, "planar": 3, "spherical": 3, "ball": 3}
-        freedoms = f" with {known[kind]} degrees of freedom" if kind in known else ""
+        freedoms_of_types = {"floating": 6, "planar": 3, "spherical": 3, "ball": 3}
+        freedoms = f" with {freedoms_of_types[kind]} degrees of freedom" if kind in freedoms_of_types else ""
         raise element.error(
             f"the joint is of type '{kind[:40]}'{freedoms}, which is not supported",
             allowed=", ".join(JOINT_KINDS),
@@ -152,7 +152,7 @@ def transmissions_of(root: Element, context: FileContext) -> dict[str, Transmiss
     ``mechanicalReduction`` is in the actuator (or in the joint or the transmission, as in older files), the
     rotor's inertia in ``rotorInertia``, ``motorInertia`` or ``drake:rotor_inertia`` of the actuator.
     """
-    found: dict[str, Transmission] = {}
+    transmissions: dict[str, Transmission] = {}
     for transmission in root.all("transmission"):
         joints, actuators = list(transmission.all("joint")), list(transmission.all("actuator"))
         places = [*actuators, *joints, transmission]
@@ -172,8 +172,8 @@ def transmissions_of(root: Element, context: FileContext) -> dict[str, Transmiss
             note(context, TRANSMISSION, transmission, f"it is not read: {what}")
             continue
         if (G, rotor) != (1.0, 0.0):
-            found[joints[0].attributes.get("name", "").strip()] = Transmission(G, rotor)
-    return found
+            transmissions[joints[0].attributes.get("name", "").strip()] = Transmission(G, rotor)
+    return transmissions
 
 
 def _value(places: list[Element], names: tuple[str, ...]) -> float | None:

@@ -104,27 +104,27 @@ def _note_unknown(root: Element, context: FileContext) -> None:
 def _named(root: Element, tag: str, context: FileContext) -> dict[str, Element]:
     """The links or joints by name.
 
-    A second joint of the same name gets another one, because nothing but its own elements refers to it. A
-    second link is left out if it is equal to the first, and refused if it is not.
+    A second joint of the same name gets another name, because no other element refers to it. A
+    second link is ignored if it is equal to the first, and refused otherwise.
     """
-    found: dict[str, Element] = {}
+    elements: dict[str, Element] = {}
     names = {element.attributes.get("name", "").strip() for element in root.all(tag)}
     for element in root.all(tag):
         name = element.required("name", "a name that is not empty")
-        if name in found:
-            place = f"there is another {tag} of this name in line {found[name].line}"
+        if name in elements:
+            place = f"there is another {tag} of this name in line {elements[name].line}"
             if tag == "joint":
                 new = free_joint_name(name, names)
                 note(context, NAME, element, f"{place}; this one is read as '{shortened(new)}'")
                 names.add(new)
                 name = element.attributes["name"] = new
-            elif _equal(element, found[name]):
+            elif _equal(element, elements[name]):
                 note(context, NAME, element, f"{place} with the same content; this one is left out")
                 continue
             else:
                 raise element.error(place, allowed="unique names", fix="rename one of them")
-        found[name] = element
-    return found
+        elements[name] = element
+    return elements
 
 
 def _equal(a: Element, b: Element) -> bool:

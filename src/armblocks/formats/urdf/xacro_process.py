@@ -153,9 +153,9 @@ def _limit_resources(seconds: float) -> None:
 
 def _reason(error: BaseException) -> str:
     """The text of the innermost error."""
-    seen: set[int] = set()
-    while id(error) not in seen:
-        seen.add(id(error))
+    visited_ids: set[int] = set()
+    while id(error) not in visited_ids:
+        visited_ids.add(id(error))
         inner = getattr(error, "exc", None) or error.__cause__
         if isinstance(inner, BaseException):
             error = inner
