@@ -15,7 +15,7 @@
 
     ArmblocksWarning(UserWarning)
     ├── InertiaWarning        an inertia that no body can have
-    └── LimitWarning          a joint beyond its range or speed
+    └── LimitWarning          a joint beyond its range, speed or torque
 """
 
 from __future__ import annotations
@@ -221,4 +221,4 @@ class InertiaWarning(ArmblocksWarning):
 
 
 class LimitWarning(ArmblocksWarning):
-    """A joint exceeded its position or speed limit. The message contains joint, time and value."""
+    """A joint exceeded its position, speed or torque limit. The message contains joint, time and value."""

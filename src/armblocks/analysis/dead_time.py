@@ -89,7 +89,7 @@ def dead_time(
     for _ in range(indices.size):
         read = read | inputs.z[np.ix_(np.flatnonzero(read), indices)].any(axis=0)
     needed: Indices = np.flatnonzero(read)
-    chosen = Jacobians(
+    jacobians = Jacobians(
         t=inputs.t[needed], x=inputs.x[needed], z=inputs.z[needed], w=inputs.w[needed], p=inputs.p[needed]
     )
     needed_indices = indices[needed]
@@ -97,7 +97,7 @@ def dead_time(
         indices=needed_indices,
         names=tuple(names[int(k)] for k in needed_indices),
         delays=delays[needed],
-        inputs=chosen,
+        inputs=jacobians,
     )
 
 

@@ -306,9 +306,9 @@ def ticks_of_a_period(system: HybridSystem) -> tuple[Fraction, list[tuple[Fracti
     period = common_period(clocks)
     count = sum(int(period / clock_period) for clock_period in periods)
     if count > MAX_TICKS:
-        listed = ", ".join(f"{float(clock_period):g} s" for clock_period in periods)
+        period_texts = ", ".join(f"{float(clock_period):g} s" for clock_period in periods)
         raise InputError(
-            f"the clocks ({listed}) have the common period {float(period):g} s with {count} ticks",
+            f"the clocks ({period_texts}) have the common period {float(period):g} s with {count} ticks",
             where=system.name,
             allowed=f"{MAX_TICKS} ticks in the least common multiple of the sample times",
             fix="choose sample times that are multiples of one another",
@@ -326,11 +326,11 @@ def _needed_states(
     """All states except held outputs that are recomputed before they are read."""
     a, _, c, _ = matrices
     n = a.shape[0] - updated.size
-    held = np.zeros(n + updated.size, dtype=np.bool_)
+    is_held = np.zeros(n + updated.size, dtype=np.bool_)
     names = [slot.name for slot in system.discrete for _ in range(slot.size)]
-    held[n:] = [names[k] in system.signals_layout.ranges for k in updated]
+    is_held[n:] = [names[k] in system.signals_layout.ranges for k in updated]
     unread = ~(a.any(axis=0) | c.any(axis=0))
-    return np.flatnonzero(~(held & unread))
+    return np.flatnonzero(~(is_held & unread))
 
 
 def input_scalars(system: HybridSystem, paths: Mapping[str, str]) -> tuple[list[int], tuple[str, ...]]:
@@ -359,8 +359,8 @@ def output_scalars(system: HybridSystem, paths: Mapping[str, str]) -> tuple[list
     for name, alias in paths.items():
         path = system.aliases.get(alias, alias)
         if path not in system.signals_layout.ranges:
-            known = [*system.signals_layout.names, *system.aliases]
-            raise UnknownNameError("signal", name, known, where=system.name)
+            signal_names = [*system.signals_layout.names, *system.aliases]
+            raise UnknownNameError("signal", name, signal_names, where=system.name)
         slot = system.signals_layout[path]
         rows += range(*system.signals_layout.ranges[path].indices(system.signals_layout.size))
         names += [name + element.removeprefix(path) for element in slot.elements]

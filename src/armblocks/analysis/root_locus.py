@@ -51,11 +51,11 @@ def root_locus(system: LinearSystem, gains: Array | None = None) -> RootLocus:
     loop = system.minimal()
     zeros = loop.zeros()
     if gains is not None:
-        chosen = np.asarray(gains, dtype=np.float64)
-        rows = [_roots(loop, float(gain)) for gain in chosen]
+        given_gains = np.asarray(gains, dtype=np.float64)
+        rows = [_roots(loop, float(gain)) for gain in given_gains]
     else:
-        chosen, rows = _adaptive_gains(loop, zeros)
-    return RootLocus(system=loop, gains=chosen, roots=_tracked(rows), zeros=zeros)
+        given_gains, rows = _adaptive_gains(loop, zeros)
+    return RootLocus(system=loop, gains=given_gains, roots=_tracked(rows), zeros=zeros)
 
 
 def extent(loop: LinearSystem, zeros: Complex) -> float:

@@ -89,19 +89,19 @@ def shown_poles(system: StateSpaceModel) -> Complex:
     with from_extra("analysis", "poles of a linear system"):
         from scipy.linalg import eigvals
 
-    shown: list[complex] = []
+    roots_shown: list[complex] = []
     for part in irreducible_parts(system.A):
         block = system.A[np.ix_(part, part)]
         if len(part) == 1:
-            shown.append(complex(block[0, 0]))  # exact
+            roots_shown.append(complex(block[0, 0]))  # exact
             continue
         no_ports = np.empty((0, len(part)))
         matrix, _, _ = balanced(block, no_ports.T, no_ports)
         norm = float(np.linalg.norm(matrix))
         pencil = _Pencil(matrix, np.eye(len(part)), ROUNDOFFS * len(part) * EPSILON * norm)
         roots = eigvals(block).tolist()
-        shown += [pencil.shown(root, _candidates(root, system.is_discrete)) for root in roots]
-    return in_order(np.array(shown, dtype=np.complex128), discrete=system.is_discrete)
+        roots_shown += [pencil.shown(root, _candidates(root, system.is_discrete)) for root in roots]
+    return in_order(np.array(roots_shown, dtype=np.complex128), discrete=system.is_discrete)
 
 
 def shown_zeros(system: StateSpaceModel) -> Complex:

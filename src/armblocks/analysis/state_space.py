@@ -159,10 +159,10 @@ def _checked_matrices(system: StateSpaceModel) -> tuple[int, int, int]:
 def _chosen(names: tuple[str, ...], selection: str | Sequence[str] | None, kind: str) -> list[int]:
     if selection is None:
         return list(range(len(names)))
-    chosen: list[int] = []
+    selected_indices: list[int] = []
     for name in (selection,) if isinstance(selection, str) else selection:
         indices = [k for k, known in enumerate(names) if known == name or known.rpartition("[")[0] == name]
         if not indices:
             raise UnknownNameError(kind, name, names)
-        chosen += indices
-    return chosen
+        selected_indices += indices
+    return selected_indices

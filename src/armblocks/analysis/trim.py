@@ -377,12 +377,12 @@ def _failure(problem: TrimProblem, search: _Search, point: Point, result: TrimRe
     worst = sorted(
         violated, key=lambda name: -abs(violated[name]) if np.isfinite(violated[name]) else -np.inf
     )
-    listed = ", ".join(
+    text = ", ".join(
         f"{name} is {_residual_text(name, violated[name])}" for name in worst[:MAX_NAMED_EQUATIONS]
     )
     others = f" and {len(worst) - MAX_NAMED_EQUATIONS} more" if len(worst) > MAX_NAMED_EQUATIONS else ""
     return SimulationError(
-        f"no operating point was found: {listed}{others}",
+        f"no operating point was found: {text}{others}",
         where=problem.system.name,
         allowed=_cause(problem, search, point, worst, result),
         fix="free another parameter, give another start, or name states in moving",
@@ -403,8 +403,8 @@ def _cause(
     rows = {name: jacobian[k] for k, name in enumerate(search.equations)}
     fixed = [name for name in worst if not rows[name].any()]
     if fixed:
-        named = ", ".join(fixed[:MAX_NAMED_EQUATIONS])
-        return f"equations that depend on a free variable; {named} depends on none"
+        names = ", ".join(fixed[:MAX_NAMED_EQUATIONS])
+        return f"equations that depend on a free variable; {names} depends on none"
     if result.at_bounds:
         return f"values within the bounds; {', '.join(result.at_bounds[:MAX_NAMED_EQUATIONS])} is at a bound"
     if len(search.equations) > len(search.unknowns):

@@ -97,10 +97,10 @@ def blocks_table(kinds: list[type[Block]]) -> Table:
 
     rows = table(("block", "left"), ("description", "left"))
     for family, members in BLOCKS.families.items():
-        listed = [kind for kind in members if kind in kinds]
-        if listed:
+        listed_kinds = [kind for kind in members if kind in kinds]
+        if listed_kinds:
             rows.add_row(Text(f"\n{family}", STRONG))
-        for kind in listed:
+        for kind in listed_kinds:
             rows.add_row(kind.type_name(), kind.summary())
     return rows
 

@@ -87,16 +87,16 @@ def linearize(
         parameters=parameters,
     )
     loop = bool(opened) and opened == inputs == outputs and system.is_siso
-    shown = -system if loop else system
+    shown_system = -system if loop else system
     console = results_console()
-    print_system(shown, console, loop=loop, hertz=hertz)
+    print_system(shown_system, console, loop=loop, hertz=hertz)
     if save is not None:
-        shown.save(save)
+        shown_system.save(save)
         console.print(f"saved: {save}", soft_wrap=True)
     if report is not None:
         from armblocks.report import write_linear_report
 
-        files = write_linear_report(report, shown, loop=loop, hertz=hertz)
+        files = write_linear_report(report, shown_system, loop=loop, hertz=hertz)
         console.print(f"report: {report}, {len(files)} files", soft_wrap=True)
 
 

@@ -91,12 +91,12 @@ def _mask_lines(diagram: Diagram) -> Iterator[Text]:
 def _values(block: DiagramBlock) -> str:
     """The values of the mask parameters and their formulas: ``"w = 20 rad/s (from w0), G = 107.8"``."""
     formulas = dict(block.formulas)
-    shown: list[str] = []
+    texts: list[str] = []
     for rule in block.diagram.mask:
         value = value_text(block.parameter_value(rule.name)) + (f" {rule.unit}" if rule.unit else "")
         text = f" (from {formulas[rule.name]})" if rule.name in formulas else ""
-        shown.append(f"{rule.name} = {value}{text}".replace(" ", "\u00a0"))
-    return ", ".join(shown)
+        texts.append(f"{rule.name} = {value}{text}".replace(" ", "\u00a0"))
+    return ", ".join(texts)
 
 
 def _link_name(link: str) -> str:

@@ -46,17 +46,19 @@ def print_run(result: SimulationResult, console: Console) -> None:
 
 def print_displays(diagram: Diagram, result: SimulationResult, console: Console) -> None:
     """Print the last values of all Display blocks."""
-    shown = table(("display", "left"), ("signal", "left"), ("at the end", "left"), ("", "left"))
+    displays = table(("display", "left"), ("signal", "left"), ("at the end", "left"), ("", "left"))
     for block, view in diagram_views(diagram):
         if view.kind is not ViewKind.VALUE or not result.time.size:
             continue
         labels = view.labels or ("",) * len(view.signals)
         for signal, label in zip(view.signals, labels):
             path = result.resolve(f"{block}/{signal}")
-            shown.add_row(block, label or path, _value_text(np.asarray(result[path][-1])), result.units[path])
-    if shown.row_count:
+            displays.add_row(
+                block, label or path, _value_text(np.asarray(result[path][-1])), result.units[path]
+            )
+    if displays.row_count:
         console.print()
-        console.print(shown)
+        console.print(displays)
 
 
 def _value_text(value: NDArray[np.float64]) -> str:

@@ -85,7 +85,7 @@ def debugging() -> bool:
 @contextmanager
 def tidy_warnings(console: Console) -> Generator[None]:
     """Show each armblocks warning once, as one line on ``console``; others as Python does."""
-    shown: set[str] = set()
+    shown_texts: set[str] = set()
     default_show = warnings.showwarning
 
     def show(
@@ -98,8 +98,8 @@ def tidy_warnings(console: Console) -> Generator[None]:
     ) -> None:
         if not issubclass(category, ArmblocksWarning):
             default_show(message, category, filename, lineno, file, line)
-        elif str(message) not in shown:
-            shown.add(str(message))
+        elif str(message) not in shown_texts:
+            shown_texts.add(str(message))
             console.print(
                 Text.assemble(("warning: ", WARNING), str(message)), soft_wrap=not console.is_terminal
             )

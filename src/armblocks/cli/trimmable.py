@@ -63,8 +63,8 @@ def _print_slots(
     for slot in slots[:MAX_ROWS]:
         size = "x".join(str(length) for length in slot.shape) or "1"
         numbers = np.ravel(starts[slot.name]).tolist()
-        shown = " ".join(f"{number:.6g}" for number in numbers[:MAX_NUMBERS])
-        rows.add_row(slot.name, size, slot.unit, shown + (" …" if len(numbers) > MAX_NUMBERS else ""))
+        text = " ".join(f"{number:.6g}" for number in numbers[:MAX_NUMBERS])
+        rows.add_row(slot.name, size, slot.unit, text + (" …" if len(numbers) > MAX_NUMBERS else ""))
     console.print()
     console.print(f"{kind}s, for {options}:")
     console.print(rows)

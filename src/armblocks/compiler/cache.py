@@ -30,9 +30,9 @@ _SUFFIX = ".bin"
 
 def folder() -> Path | None:
     """The cache folder; None if the cache is disabled or there is no folder for it."""
-    chosen = os.environ.get("ARMBLOCKS_CACHE_DIR")
-    if chosen is not None:
-        return Path(chosen) if chosen else None
+    folder_name = os.environ.get("ARMBLOCKS_CACHE_DIR")
+    if folder_name is not None:
+        return Path(folder_name) if folder_name else None
     return cache_folder()
 
 

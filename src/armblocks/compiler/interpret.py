@@ -74,8 +74,8 @@ def _read(registers: Sequence[Values], tape: Tape, first: int, count: int, index
     entries = np.clip(np.nan_to_num(np.trunc(registers[index]), nan=0.0), 0, size - 1).astype(np.intp)
     values = np.empty(entries.shape)
     for entry in np.unique(entries):
-        chosen = entries == entry
-        values[chosen] = registers[first + int(entry)][chosen]
+        is_entry = entries == entry
+        values[is_entry] = registers[first + int(entry)][is_entry]
     return values
 
 

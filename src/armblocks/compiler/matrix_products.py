@@ -57,8 +57,8 @@ def with_matrix_products(tape: Tape) -> Tape:
     choices = [rows for chain in _chains(tape) for rows in _rows(tape, chain)]
     # If the factors of both sides are contiguous in memory, the side that several rows share is the vector.
     shared = Counter(row.vector for rows in choices for row in rows)
-    chosen = [max(rows, key=lambda row: shared[row.vector]) for rows in choices]
-    products = [group for group in _matrices(tape, chosen) if _entries(group) >= MIN_ENTRIES]
+    chosen_rows = [max(rows, key=lambda row: shared[row.vector]) for rows in choices]
+    products = [group for group in _matrices(tape, chosen_rows) if _entries(group) >= MIN_ENTRIES]
     return _with_products(tape, products) if products else tape
 
 
@@ -164,14 +164,14 @@ def _matrices(tape: Tape, rows: Sequence[_Row]) -> Iterator[list[_Row]]:
 def _with_products(tape: Tape, products: Sequence[Sequence[_Row]]) -> Tape:
     """The tape with a ``PRODUCT`` for each group of rows, at the position of the first of its results."""
     constants = list(tape.constants)
-    known: dict[str, int] = {}
+    registers: dict[str, int] = {}
 
     def constant(value: float) -> int:
         text = value.hex()
-        if text not in known:
-            known[text] = tape.first_constant + len(constants)
+        if text not in registers:
+            registers[text] = tape.first_constant + len(constants)
             constants.append(value)
-        return known[text]
+        return registers[text]
 
     heads: dict[int, tuple[Sequence[_Row], list[int]]] = {}
     removed: set[int] = set()

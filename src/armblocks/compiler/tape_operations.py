@@ -179,8 +179,8 @@ def _emit_number(body: Body, opcode: Opcode, values: list[str]) -> str:
             return body.select(body.compare("ogt", x, zero), body.number(1.0), negative)
         case Opcode.MINIMUM | Opcode.MAXIMUM:
             a, b = values
-            chosen = body.select(body.compare("olt" if opcode is Opcode.MINIMUM else "ogt", a, b), a, b)
-            return body.select(body.compare("uno", a, a), a, chosen)
+            extreme = body.select(body.compare("olt" if opcode is Opcode.MINIMUM else "ogt", a, b), a, b)
+            return body.select(body.compare("uno", a, a), a, extreme)
         case _:
             from armblocks.compiler import elementary
 

@@ -118,9 +118,9 @@ def with_analysis_points(
     shapes = infer_shapes(hierarchy)
     blocks, wires = dict(diagram.blocks), list(diagram.connections)
     levels: dict[str, str] = {}
-    chosen = {*perturbed, *opened}
+    chosen_ports = {*perturbed, *opened}
     # Output ports first: a point at an input port is then inserted after the point of its driver.
-    for ref in sorted(chosen, key=lambda ref: (not _is_output(diagram, ref), ref)):
+    for ref in sorted(chosen_ports, key=lambda ref: (not _is_output(diagram, ref), ref)):
         source = ref if _is_output(diagram, ref) else diagram.drivers[ref]
         name = _new_name(ref, blocks)
         shape = shapes.outputs[source.block][source.port]
@@ -153,9 +153,9 @@ def _parameter(diagram: Diagram, name: str) -> str | None:
     block, dot, parameter_name = name.rpartition(".")
     if not dot or "/" in parameter_name:
         return None
-    known = [rule.name for rule in diagram.block(block).parameters() if rule.tunable]
-    if parameter_name not in known:
-        raise UnknownNameError("tunable parameter", parameter_name, known, where=f"block '{block}'")
+    tunable_names = [rule.name for rule in diagram.block(block).parameters() if rule.tunable]
+    if parameter_name not in tunable_names:
+        raise UnknownNameError("tunable parameter", parameter_name, tunable_names, where=f"block '{block}'")
     return name
 
 
@@ -167,9 +167,9 @@ def _port(form: FlatForm, name: str, kind: str) -> PortRef:
     block = form.diagram.block(block_name)
     outputs = [entry.name for entry in block.output_ports()]
     if port:
-        known = [*outputs, *(entry.name for entry in block.input_ports())]
-        if port not in known:
-            raise UnknownNameError("port", port, known, where=f"block '{block_name}'")
+        port_names = [*outputs, *(entry.name for entry in block.input_ports())]
+        if port not in port_names:
+            raise UnknownNameError("port", port, port_names, where=f"block '{block_name}'")
         return PortRef(block_name, port)
     if len(outputs) != 1:
         raise InputError(

@@ -185,10 +185,10 @@ class Block(ABC):
 
         Raises ``UnknownNameError`` for an unknown parameter, ``InputError`` for an invalid value.
         """
-        known = [rule.name for rule in self.own_parameters()]
+        parameter_names = [rule.name for rule in self.own_parameters()]
         for name in values:
-            if name not in known:
-                raise UnknownNameError("parameter", name, known, where=self.type_name())
+            if name not in parameter_names:
+                raise UnknownNameError("parameter", name, parameter_names, where=self.type_name())
         texts = {name: value.text for name, value in values.items() if isinstance(value, ParameterFormula)}
         formulas = {name: text for name, text in self.formulas if name not in values} | texts
         plain = {name: value for name, value in values.items() if name not in texts}

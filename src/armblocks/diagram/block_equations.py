@@ -232,8 +232,8 @@ def _required_shapes(
     features: Features, clocked: bool, results: Mapping[SlotKind, Signals]
 ) -> dict[SlotKind, dict[str, Shape]]:
     """The shapes of the values that the equations of each role return."""
-    held = (*features.states, *features.discrete, *features.modes)
-    states = {state.name: state.shape for state in held}
+    stored_slots = (*features.states, *features.discrete, *features.modes)
+    states = {state.name: state.shape for state in stored_slots}
     modes = {mode.name: mode.shape for mode in features.modes}
     delayed = {line.name: line.shape for line in features.delays}
     resets, captures = results[SlotKind.RESET], results[SlotKind.CAPTURE]

@@ -38,9 +38,9 @@ class BlockHandle:
 
     def __getitem__(self, port: str) -> PortRef:
         """The port of this name; raises ``UnknownNameError`` with the nearest name."""
-        known = [entry.name for entry in (*self.block.output_ports(), *self.block.input_ports())]
-        if port not in known:
-            raise UnknownNameError("port", port, known, where=_where(self.name, self.block))
+        port_names = [entry.name for entry in (*self.block.output_ports(), *self.block.input_ports())]
+        if port not in port_names:
+            raise UnknownNameError("port", port, port_names, where=_where(self.name, self.block))
         return PortRef(self.name, port)
 
     def __repr__(self) -> str:

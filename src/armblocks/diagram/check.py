@@ -36,5 +36,5 @@ def _is_part(diagram: Diagram) -> bool:
         for name, block in level.blocks.items()
         if name not in level.commented
     ]
-    sent = {block.tag for block in blocks if isinstance(block, Goto)}
-    return any(isinstance(block, From) and block.tag not in sent for block in blocks)
+    sent_tags = {block.tag for block in blocks if isinstance(block, Goto)}
+    return any(isinstance(block, From) and block.tag not in sent_tags for block in blocks)

@@ -111,10 +111,10 @@ def check_connected(levels: Mapping[str, Diagram]) -> None:
     """Raise ``DiagramError`` with a list of the unconnected inputs of all diagrams of a hierarchy."""
     unconnected = [str(ref) for ref in open_inputs(levels)]
     if unconnected:
-        shown = ", ".join(unconnected[:MAX_LISTED])
+        listed_ports = ", ".join(unconnected[:MAX_LISTED])
         rest = len(unconnected) - MAX_LISTED
         raise DiagramError(
-            f"{len(unconnected)} unconnected input{'s' * (len(unconnected) > 1)}: {shown}"
+            f"{len(unconnected)} unconnected input{'s' * (len(unconnected) > 1)}: {listed_ports}"
             + (f" and {rest} more" if rest > 0 else ""),
             where=f"diagram '{next(iter(levels.values())).name}'",
             allowed="each input has a driver",

@@ -97,14 +97,14 @@ class _Content:
 
     def _add_object(self, value: object) -> None:
         """Digest an object (block, diagram, robot) once: several blocks may share a robot."""
-        known = self._known.get(id(value))
-        if known is None:
+        entry = self._known.get(id(value))
+        if entry is None:
             part = _Content()
             part._known = self._known
             part._add_fields(value)
             # The reference keeps the value alive, so that its id stays unique.
-            known = self._known[id(value)] = (value, part.digest)
-        self._texts.append(f"object {known[1]}")
+            entry = self._known[id(value)] = (value, part.digest)
+        self._texts.append(f"object {entry[1]}")
 
     def _add_fields(self, value: object) -> None:
         if isinstance(value, UserFunction):

@@ -36,8 +36,8 @@ def entry_names(diagram: Diagram, shapes: Mapping[str, Shape]) -> Mapping[str, t
     for path, names in declared:
         if shapes.get(path) == (len(names),):
             names_of.setdefault(groups.representative(path), set()).add(names)
-    named = {path: names_of.get(groups.representative(path), set()) for path in shapes}
-    return {path: next(iter(rows)) for path, rows in named.items() if len(rows) == 1}
+    names_by_path = {path: names_of.get(groups.representative(path), set()) for path in shapes}
+    return {path: next(iter(rows)) for path, rows in names_by_path.items() if len(rows) == 1}
 
 
 def _may_declare_names(block: Block) -> bool:

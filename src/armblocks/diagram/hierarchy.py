@@ -50,8 +50,8 @@ def _logged_views(diagram: Diagram, path: str = "") -> Iterator[tuple[str, View]
         if diagram.commented.get(ref.block) == "out":
             continue
         block_path = joined(path, ref.block)
-        named = diagram.signal_names.get(ref)
-        title = joined(path, named) if named else f"{block_path}/{ref.port}"
+        signal_name = diagram.signal_names.get(ref)
+        title = joined(path, signal_name) if signal_name else f"{block_path}/{ref.port}"
         yield block_path, View(kind=ViewKind.TRACES, signals=(ref.port,), title=title)
     for name, block in diagram.blocks.items():
         if isinstance(block, DiagramBlock) and name not in diagram.commented:

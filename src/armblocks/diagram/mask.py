@@ -209,10 +209,10 @@ def values_of(mask: Sequence[Parameter], values: Mapping[str, object], where: st
 
     Raises ``UnknownNameError`` for a name that is not in the mask, ``InputError`` for an invalid value.
     """
-    known = [rule.name for rule in mask]
+    parameter_names = [rule.name for rule in mask]
     for name in values:
-        if name not in known:
-            raise UnknownNameError("mask parameter", name, known, where=where)
+        if name not in parameter_names:
+            raise UnknownNameError("mask parameter", name, parameter_names, where=where)
     return {
         rule.name: rule.check(values.get(rule.name, cast("object", rule.default)), f"{where}.{rule.name}")
         for rule in mask

@@ -47,10 +47,10 @@ def dependent_parameters(diagram: Diagram, path: str, symbol: SX | None = None) 
 
     Raises ``UnknownNameError`` for a path that is not a mask parameter.
     """
-    known = mask_parameters(diagram)
-    if path not in known:
-        raise UnknownNameError("mask parameter", path, known, where=f"diagram '{diagram.name}'")
-    level, rule = known[path]
+    parameters = mask_parameters(diagram)
+    if path not in parameters:
+        raise UnknownNameError("mask parameter", path, parameters, where=f"diagram '{diagram.name}'")
+    level, rule = parameters[path]
     dependents = DependentParameters()
     value = as_symbols(level.mask_values[rule.name])
     perturbed = (
@@ -66,10 +66,10 @@ def added_parameter(diagram: Diagram, path: str) -> AddedParameter:
     Raises ``UnknownNameError`` for a path that is not a mask parameter, ``InputError`` for a parameter that
     is not a number or on which a structural parameter depends.
     """
-    known = mask_parameters(diagram)
-    if path not in known:
-        raise UnknownNameError("mask parameter", path, known, where=f"diagram '{diagram.name}'")
-    level, rule = known[path]
+    parameters = mask_parameters(diagram)
+    if path not in parameters:
+        raise UnknownNameError("mask parameter", path, parameters, where=f"diagram '{diagram.name}'")
+    level, rule = parameters[path]
     value = level.mask_values[rule.name]
     nominal = as_symbols(value)
     if nominal is None or isinstance(value, bool):
@@ -102,8 +102,8 @@ def with_mask_parameters(system: HybridSystem, diagram: Diagram, names: Iterable
 
     Raises as :func:`added_parameter`.
     """
-    known = mask_parameters(diagram)
-    added = [name for name in names if name in known and name not in system.parameters.ranges]
+    parameters = mask_parameters(diagram)
+    added = [name for name in names if name in parameters and name not in system.parameters.ranges]
     if not added:
         return system
     return with_added_parameters(system, tuple(added_parameter(diagram, name) for name in added))

@@ -23,12 +23,12 @@ def check_block_name(name: str, where: str, noun: str = "block") -> None:
 def check_printable(name: str, where: str, noun: str, allowed: str, *, without: str = "") -> None:
     """Raise ``DiagramError`` for a name that is blank or too long, or has a control character or one of
     ``without``."""
-    shown = repr(name if len(name) <= 60 else name[:57] + "...")
+    text = repr(name if len(name) <= 60 else name[:57] + "...")
     if not name.strip():
         raise DiagramError(f"a {noun} has an empty name", where=where, allowed=allowed, fix="name it")
     if len(name) > MAX_NAME_LENGTH:
         raise DiagramError(
-            f"the {noun} name {shown} has {len(name)} characters",
+            f"the {noun} name {text} has {len(name)} characters",
             where=where,
             allowed=allowed,
             fix="shorten it",
@@ -37,7 +37,7 @@ def check_printable(name: str, where: str, noun: str, allowed: str, *, without: 
         # Category C: control characters, and invisible marks that change the text direction.
         if character in without or unicodedata.category(character).startswith("C"):
             raise DiagramError(
-                f"the {noun} name {shown} contains {character!r}",
+                f"the {noun} name {text} contains {character!r}",
                 where=where,
                 allowed=allowed,
                 fix="rename it",

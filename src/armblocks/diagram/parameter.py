@@ -149,9 +149,9 @@ def kind_of(default: object, rules: dict[str, Any]) -> ParameterKind:
 
 
 def _invalid_value(rule: Parameter, value: Any, where: str) -> InputError:
-    shown = repr(value)
-    shown = shown if len(shown) <= 80 else shown[:77] + "..."
-    return InputError(f"the value is {shown}", where=where, allowed=rule.describe(), fix=f"give {rule.doc}")
+    text = repr(value)
+    text = text if len(text) <= 80 else text[:77] + "..."
+    return InputError(f"the value is {text}", where=where, allowed=rule.describe(), fix=f"give {rule.doc}")
 
 
 def _check_bounds(rule: Parameter, values: np.ndarray[Any, Any], value: object, where: str) -> None:

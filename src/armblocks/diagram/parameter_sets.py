@@ -38,8 +38,8 @@ def settable_parameter(diagram: Diagram, path: str) -> tuple[Parameter, Value]:
     """
     name, _, parameter = path.rpartition(".")
     if not name:
-        known = [*diagram.mask_values, *(f"{block}.…" for block in diagram.blocks)]
-        rule = _rule(diagram.mask, path, known, f"diagram '{diagram.name}'")
+        valid_paths = [*diagram.mask_values, *(f"{block}.…" for block in diagram.blocks)]
+        rule = _rule(diagram.mask, path, valid_paths, f"diagram '{diagram.name}'")
         return rule, diagram.mask_values[parameter]
     outside, level, inner = found_block(diagram, name)
     block = level.block(inner)

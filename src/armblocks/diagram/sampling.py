@@ -202,8 +202,8 @@ def _nearest_sources(
                 continue
             before = len(reach[entry])
             # One block per clock is enough for the message and limits the size of the sets.
-            known = {source for _, source in reach[entry]}
-            reach[entry].update(pair for pair in reach[name] if pair[1] not in known)
+            known_sources = {source for _, source in reach[entry]}
+            reach[entry].update(pair for pair in reach[name] if pair[1] not in known_sources)
             if len(reach[entry]) > before:
                 queue.append(entry)
     return reach

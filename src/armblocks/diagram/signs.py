@@ -164,10 +164,10 @@ def _roots(roots: object, letter: str) -> str:
 
 def times(gain: object, text: str) -> str:
     """A gain before an expression; a gain of 1 is omitted."""
-    shown = value_text(gain)
-    if shown == "1":
+    gain_text = value_text(gain)
+    if gain_text == "1":
         return text
-    return shown if text == "1" else f"{shown} {text}"
+    return gain_text if text == "1" else f"{gain_text} {text}"
 
 
 def ratio_of_roots(zeros: object, poles: object, gain: object, letter: str) -> Fraction:

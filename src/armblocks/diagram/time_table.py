@@ -81,8 +81,8 @@ class TimeTable:
         return np.array(self.rows, dtype=dtype)
 
     def __reduce__(self) -> tuple[object, ...]:
-        chosen = (self.units, self.time, self.columns, self.shown, self.fault)
-        return TimeTable, (np.asarray(self.rows), self.names, self.source, *chosen)
+        properties = (self.units, self.time, self.columns, self.shown, self.fault)
+        return TimeTable, (np.asarray(self.rows), self.names, self.source, *properties)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, TimeTable):

@@ -174,8 +174,10 @@ def _updated(model: Model, symbols: Symbols, flow: Tracing, loops: Implicit) -> 
         )
     if remaining:
         # These are the equations between ticks, possibly with other cuts. Their solution is known.
-        known = loops.solved([flow.value(_same_quantity(model.flow, value)) for value in tick.unknowns])
-        solution = substitute(solution, cuts[remaining], known[remaining])
+        loop_solution = loops.solved(
+            [flow.value(_same_quantity(model.flow, value)) for value in tick.unknowns]
+        )
+        solution = substitute(solution, cuts[remaining], loop_solution[remaining])
     return substituted(updated, cuts, solution), substituted(products, cuts, solution)
 
 

@@ -44,8 +44,8 @@ class UserFunction:
     @property
     def arguments(self) -> tuple[str, ...]:
         """The arguments without default, in order."""
-        listed = inspect.signature(self.function).parameters.values()
-        return tuple(entry.name for entry in listed if entry.default is inspect.Parameter.empty)
+        parameters = inspect.signature(self.function).parameters.values()
+        return tuple(entry.name for entry in parameters if entry.default is inspect.Parameter.empty)
 
     @property
     def source(self) -> str:

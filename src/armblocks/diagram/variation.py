@@ -96,8 +96,8 @@ def _with_values(diagram: Diagram, path: str, values: Mapping[str, object]) -> D
     if not path:
         for parameter in values:
             if parameter not in diagram.mask_values:
-                known = [*diagram.mask_values, *(f"{name}.…" for name in diagram.blocks)]
-                raise UnknownNameError("parameter", parameter, known, where=f"diagram '{diagram.name}'")
+                valid_paths = [*diagram.mask_values, *(f"{name}.…" for name in diagram.blocks)]
+                raise UnknownNameError("parameter", parameter, valid_paths, where=f"diagram '{diagram.name}'")
         return _with_location("", lambda: diagram.with_mask_values(values))
     outside, diagram, name = found_block(diagram, path)
     block = diagram.block(name)

@@ -70,8 +70,8 @@ def diagram_picture(
     contents = _SignalContents.of(diagram)
     clocks = Rates.of(diagram) if rates else Rates()
     if sheet not in contents.levels:
-        known = [path for path in contents.levels if path]
-        raise UnknownNameError("sheet", sheet, known, where=f"diagram '{diagram.name}'")
+        sheet_paths = [path for path in contents.levels if path]
+        raise UnknownNameError("sheet", sheet, sheet_paths, where=f"diagram '{diagram.name}'")
     level = contents.levels[sheet]
     path = f"{sheet}/" if sheet else ""
     placed_boxes = boxes(level)
@@ -333,14 +333,14 @@ def _port_names_above_and_below(box: Box) -> tuple[list[Mark], FaceArea]:
     marks: list[Mark] = []
     top, bottom = box.y, box.y + box.height
     for ports, labels in zip((box.inputs, box.outputs), block_faces.port_labels(box.block)):
-        named = [(port, label) for port, label in zip(ports, labels) if label]
-        above = any(port.y == box.y for port, _ in named)
-        for port, label in named:
+        labelled_ports = [(port, label) for port, label in zip(ports, labels) if label]
+        above = any(port.y == box.y for port, _ in labelled_ports)
+        for port, label in labelled_ports:
             y = box.y + PORT_TEXT + 3 if above else box.y + box.height - 5
             marks.append(Text(port.x, y, label, PORT_TEXT, Tone.MUTED, "middle"))
-        if named and above:
+        if labelled_ports and above:
             top += PORT_TEXT_HEIGHT
-        elif named:
+        elif labelled_ports:
             bottom -= PORT_TEXT_HEIGHT
     return marks, FaceArea(box.x, top, box.width, bottom - top)
 
@@ -428,5 +428,9 @@ def _text_alternative(diagram: Diagram) -> str:
     def connection_text(wire: Connection) -> str:
         return f"{wire.source} to {wire.target}"
 
-    listed = "; ".join(connection_text(wire) for wire in diagram.connections)
-    return f"{len(diagram.blocks)} blocks. Wires: {listed}." if listed else f"{len(diagram.blocks)} blocks."
+    connection_list = "; ".join(connection_text(wire) for wire in diagram.connections)
+    return (
+        f"{len(diagram.blocks)} blocks. Wires: {connection_list}."
+        if connection_list
+        else f"{len(diagram.blocks)} blocks."
+    )

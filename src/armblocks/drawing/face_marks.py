@@ -91,11 +91,11 @@ def _wrapped_lines(text: str, width: float) -> list[str]:
     parts = [part for word in text.split() for part in _hyphen_parts(word)]
     lines = [""]
     for part in parts:
-        joined = lines[-1] + ("" if lines[-1].endswith("-") else " ") + part if lines[-1] else part
-        if lines[-1] and text_width(joined, _TITLE_SIZE) > width:
+        line = lines[-1] + ("" if lines[-1].endswith("-") else " ") + part if lines[-1] else part
+        if lines[-1] and text_width(line, _TITLE_SIZE) > width:
             lines.append(part)
         else:
-            lines[-1] = joined
+            lines[-1] = line
     return lines
 
 

@@ -100,11 +100,11 @@ def mask_text(diagram: Diagram) -> tuple[str, ...]:
     """The lines on the face of a masked subsystem: its name, broken between words if it is long."""
     lines = [""]
     for word in diagram.name.replace("_", " ").split():
-        joined = f"{lines[-1]} {word}".strip()
-        if lines[-1] and text_width(joined, _MASK_SIZE) > _MASK_LINE_WIDTH:
+        line = f"{lines[-1]} {word}".strip()
+        if lines[-1] and text_width(line, _MASK_SIZE) > _MASK_LINE_WIDTH:
             lines.append(word)
         else:
-            lines[-1] = joined
+            lines[-1] = line
     return tuple(lines)
 
 

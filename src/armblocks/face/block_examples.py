@@ -113,13 +113,13 @@ class _ExampleBuilder:
         if x_axis is not None and y_axis is not None:
             self._builder.add("XY graph", XYGraph(), self._source(x_axis), self._source(y_axis))
             return
-        shown = [self._source(signal) for signal in self._example.shown]
-        if not shown and not self._block.views():
+        sources = [self._source(signal) for signal in self._example.shown]
+        if not sources and not self._block.views():
             outputs = [PortRef(self._name, port.name) for port in self._block.output_ports()]
-            shown = [*self._drivers.values(), *outputs]
-        shown = list(dict.fromkeys(shown))
-        if shown:
-            self._builder.add("scope", Scope(inputs=len(shown)), *shown)
+            sources = [*self._drivers.values(), *outputs]
+        sources = list(dict.fromkeys(sources))
+        if sources:
+            self._builder.add("scope", Scope(inputs=len(sources)), *sources)
 
     def _source(self, signal: Driver) -> PortRef:
         """The output port of a driver; adds its block if necessary."""

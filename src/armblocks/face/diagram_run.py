@@ -108,10 +108,10 @@ class DiagramRun:
                 for name in dependent_parameters(self.diagram, path).structural
             ]
             why = f": '{dependents[0]}', which depends on it, is not tunable" if dependents else ""
-            shown = ", ".join(f"'{path}'" for path in values)
+            path_list = ", ".join(f"'{path}'" for path in values)
             names = [name for name, _, _ in tunable_parameters(self.diagram)]
             raise InputError(
-                f"parameter {shown} cannot take this value during a run{why}",
+                f"parameter {path_list} cannot take this value during a run{why}",
                 where=self.diagram.name,
                 allowed=f"tunable parameters, with unchanged shape: {', '.join(names)}",
                 fix="end the run, change the diagram and begin another run",

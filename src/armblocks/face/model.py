@@ -126,13 +126,13 @@ def compile_diagram(diagram: Diagram | str | PathLike[str]) -> CompiledDiagram:
     """The compiled form of a diagram, cached for the lifetime of the diagram object."""
     if not isinstance(diagram, Diagram):
         return CompiledDiagram(load_diagram(diagram))
-    known = _compiled.get(id(diagram))
-    if known is None:
+    entry = _compiled.get(id(diagram))
+    if entry is None:
         # Cached by identity, because comparing by content would take longer than a run. The entry is removed
         # with the diagram, and therefore refers to a copy of it.
-        _compiled[id(diagram)] = known = CompiledDiagram(dataclasses.replace(diagram))
+        _compiled[id(diagram)] = entry = CompiledDiagram(dataclasses.replace(diagram))
         weakref.finalize(diagram, _compiled.pop, id(diagram), None)
-    return known
+    return entry
 
 
 def state_at(diagram: Diagram | CompiledDiagram, point: OperatingPoint) -> RunState:

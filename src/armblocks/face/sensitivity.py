@@ -56,8 +56,8 @@ class SensitivityResult:
                 return stacked.reshape(*stacked.shape[:-1], *slot.shape)
             if parameter == slot.name or parameter in slot.elements:
                 return self.run[sensitivity_name(path, parameter if slot.size > 1 else slot.name)]
-        known = [*self.parameters, *(element for slot in self.slots for element in slot.elements)]
-        raise UnknownNameError("parameter", parameter, dict.fromkeys(known), where=self.run.name)
+        valid_names = [*self.parameters, *(element for slot in self.slots for element in slot.elements)]
+        raise UnknownNameError("parameter", parameter, dict.fromkeys(valid_names), where=self.run.name)
 
     def __repr__(self) -> str:
         head = f"<SensitivityResult {self.run.name}: {self.time.size} samples>"
@@ -107,13 +107,13 @@ def sensitivity(
         )
     for name in names:
         if name not in system.parameters.ranges:
-            known = [*mask_parameters(resolved), *system.parameters.names]
-            raise UnknownNameError("tunable parameter", name, known, where=system.name)
+            parameter_names = [*mask_parameters(resolved), *system.parameters.names]
+            raise UnknownNameError("tunable parameter", name, parameter_names, where=system.name)
     paths = [system.aliases.get(name, name) for name in output_names]
     for path in paths:
         if path not in system.signals_layout.ranges:
-            known = [*system.signals_layout.names, *system.aliases]
-            raise UnknownNameError("signal", path, known, where=system.name)
+            parameter_names = [*system.signals_layout.names, *system.aliases]
+            raise UnknownNameError("signal", path, parameter_names, where=system.name)
     augmented = sensitivity_system(system, names, paths)
     options = with_settings(resolved.settings, settings)
     compiled = compile_system(augmented)

@@ -59,8 +59,8 @@ def check_settings(settings: Mapping[str, object], call: Callable[..., object]) 
     """Raise ``UnknownNameError`` for a keyword argument that ``call`` does not have."""
     for name in settings:
         if name not in _NAMES:
-            known = [entry for entry in inspect.signature(call).parameters if entry != name]
-            raise UnknownNameError("argument", name, known, where=call.__name__)
+            argument_names = [entry for entry in inspect.signature(call).parameters if entry != name]
+            raise UnknownNameError("argument", name, argument_names, where=call.__name__)
 
 
 def with_settings(options: SimulationOptions, settings: RunSettings) -> SimulationOptions:

@@ -193,8 +193,8 @@ def _state_or_parameter(system: HybridSystem, name: str) -> tuple[Signature, str
     try:
         return system.states, _slot_name(system.states, name, "state", system)
     except UnknownNameError:
-        known = (*system.states.names, *system.parameters.names)
+        valid_names = (*system.states.names, *system.parameters.names)
     try:
         return system.parameters, _slot_name(system.parameters, name, "parameter", system)
     except UnknownNameError:
-        raise UnknownNameError("state or parameter", name, known, where=system.name) from None
+        raise UnknownNameError("state or parameter", name, valid_names, where=system.name) from None

@@ -76,10 +76,10 @@ class ButcherTableau:
         sums |= {f"dense row {j} at the step's end": (end[j], w) for j, w in enumerate(self.weights)}
         if self.error is not None:
             sums["error"] = (sum(self.error), 0.0)
-        for name, (found, expected) in sums.items():
-            if abs(found - expected) > CONSISTENCY * max(1.0, abs(expected)):
+        for name, (actual, expected) in sums.items():
+            if abs(actual - expected) > CONSISTENCY * max(1.0, abs(expected)):
                 raise InputError(
-                    f"{name} adds up to {found!r}",
+                    f"{name} adds up to {actual!r}",
                     where=f"integrator {self.name}",
                     allowed=f"{expected!r}",
                     fix="check the coefficients against their source",

@@ -125,9 +125,9 @@ class DelayHistory:
             # first readable row the signal has the value of that row, because the signal or its derivative
             # may jump between them.
             excess = select(before, 0.0, instant - self.time(reals, i))
-            known = self.derivative(reals, i, line)
-            known = select(is_derivative(known), known, 0.0)
-            value.value = fma(known, excess, self.value(reals, i, line))
+            row_derivative = self.derivative(reals, i, line)
+            row_derivative = select(is_derivative(row_derivative), row_derivative, 0.0)
+            value.value = fma(row_derivative, excess, self.value(reals, i, line))
             derivative.value = self.derivative(reals, i, line)
         with r.otherwise():
             centre = i + 1 - self.middle(reals, i).to_integer()
@@ -160,9 +160,9 @@ class DelayHistory:
         rate: Real | float = 0.0
         for place, (row, u, parts) in enumerate(zip(rows, values, bases)):
             of_value, of_derivative, rate_of_value, rate_of_derivative = parts
-            known = self.derivative(reals, row, line)
+            row_derivative = self.derivative(reals, row, line)
             of_parabola = parabola_derivative(values[0], values[2], place)
-            du = select(is_derivative(known), H * known, of_parabola)
+            du = select(is_derivative(row_derivative), H * row_derivative, of_parabola)
             total = fma(of_value, u, fma(of_derivative, du, total))
             rate = fma(rate_of_value, u, fma(rate_of_derivative, du, rate))
         value.value = centre + total
@@ -226,15 +226,15 @@ class DelayHistory:
         H = 0.5 * (self.time(reals, end) - self.time(reals, start))
         rtol, atol = (reals[place] for place in (Scalar.RTOL, Scalar.ATOL))
         value, derivative = r.real(0.0), r.real(0.0)
-        found = r.boolean(False)
+        deviates = r.boolean(False)
         for line in r.each(self.count):
             self.quintic(reals, s, H, line, (start, centre, end), value, derivative)
             exact = self.value(reals, rows, line)
             deviation = abs(value.value - exact)
             tolerance = factor * fma(abs(exact), rtol, atol)
             exceeded = deviation > tolerance
-            found.value = found.value | exceeded
-        return found.value
+            deviates.value = deviates.value | exceeded
+        return deviates.value
 
     # Jumps of signals.
 
@@ -272,10 +272,10 @@ class DelayHistory:
             if not line.fixed:
                 continue
             last = self.last_rows(counts)[k]
-            known = last >= 0
-            row = select(known, last, 0)
+            is_known = last >= 0
+            row = select(is_known, last, 0)
             arrival = self.time(reals, row) + reals[self.workspace.taus + k]
-            next_arrival = select(known & (arrival < next_arrival), arrival, next_arrival)
+            next_arrival = select(is_known & (arrival < next_arrival), arrival, next_arrival)
         return next_arrival
 
     # Memory.

@@ -90,9 +90,9 @@ class Delays:
         t, x = self.point.memory, f.vector(f.workspace.new_x)
         with r.loop() as subintervals:
             a, b = begin.value, end.value
-            length, known = b - a, f.counts[Count.HISTORY_ROWS]
+            length, rows_before = b - a, f.counts[Count.HISTORY_ROWS]
             # After the maximum number, the rest of the step is one subinterval.
-            last = known >= max_rows
+            last = rows_before >= max_rows
             b = select(last, new_time, b)
             for part, mark in ((0.5, 1.0), (1.0, 0.0)):
                 self._point(part, a, b, time, new_time, h)
@@ -102,15 +102,15 @@ class Delays:
             for part in (0.25, 0.75):
                 self._point(part, a, b, time, new_time, h)
                 place = r.constant(2.0 * part - 1.0)
-                found = r.call(history.deviates, t, x, f.reals, f.counts, f.p, place, factor.value)
-                deviates = found if deviates is None else deviates | found
+                part_deviates = r.call(history.deviates, t, x, f.reals, f.counts, f.p, place, factor.value)
+                deviates = part_deviates if deviates is None else deviates | part_deviates
             assert deviates is not None
             divisible = length > b * 2.0**-48
             with r.when(deviates & divisible):
-                f.counts[Count.HISTORY_ROWS] = known
+                f.counts[Count.HISTORY_ROWS] = rows_before
                 end.value = fma(0.5, length, a)
                 subintervals.again()
-            factor.value = factor.value * select(known >= half_rows, 1.1, 1.0)
+            factor.value = factor.value * select(rows_before >= half_rows, 1.1, 1.0)
             begin.value = b
             reached = fma(2.0, length, b)
             end.value = minimum(reached, new_time)

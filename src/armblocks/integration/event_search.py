@@ -58,8 +58,8 @@ class EventSearch:
                 divisible = h > 2.0 * self.crossing_length(time)
                 self.records.extra_stages_once(time, h)
                 with r.part() as checked:
-                    with r.part() as found:
-                        self._search_windows(time, h, low, high, found)
+                    with r.part() as bracketed:
+                        self._search_windows(time, h, low, high, bracketed)
                         search.leave_unless(divisible & r.call(self.functions.any_returned_to_zero, f.reals))
                         reason.value = NO_SIGN
                         checked.leave()
@@ -77,14 +77,14 @@ class EventSearch:
             self._store_signs_before(before.value, time)
             self.event_located.value = 1
             # An event that coincides with a tick or breakpoint gets the time of the tick or breakpoint.
-            known, new_time = f.end.value, f.new_time.value
-            f.new_time.value = select(new_time * SAME_ABOVE >= known, known, new_time)
+            end_time, new_time = f.end.value, f.new_time.value
+            f.new_time.value = select(new_time * SAME_ABOVE >= end_time, end_time, new_time)
 
     def _search_windows(
-        self, time: Real, h: Real, low: RealVariable, high: RealVariable, found: Part
+        self, time: Real, h: Real, low: RealVariable, high: RealVariable, bracketed: Part
     ) -> None:
-        """Search the windows of a step. Where a guard fires, leave ``found``; ``low`` and ``high`` bracket
-        it."""
+        """Search the windows of a step. Where a guard fires, leave ``bracketed``; ``low`` and
+        ``high`` bracket the time."""
         f, r, workspace = self.frame, self.frame.r, self.frame.workspace
         end = f.new_time.value
         limit = r.real(end)
@@ -111,7 +111,7 @@ class EventSearch:
             divisible = middle_inside & (length.value > shortest)
             high.value = middle
             with r.unless(self.count_fired_at(middle, time, h) == 0):
-                found.leave_unless(divisible)
+                bracketed.leave_unless(divisible)
                 limit.value = middle
                 length.value = middle - a
                 window.again()
@@ -130,7 +130,7 @@ class EventSearch:
                 window.again()
             with r.unless(count.value == 0):
                 low.value = middle
-                found.leave()
+                bracketed.leave()
             r.call(self.functions.store_derivatives, f.reals, half)
             r.call(self.functions.store_signs, f.reals, r.constant_boolean(False))
             f.copy(workspace.guards, workspace.guards_before, self.guards)
@@ -171,8 +171,8 @@ class EventSearch:
         self.events.evaluation.solve(t, self.y)
         functions.evaluate(r, t, self.y, f.reals, f.p)
         early = instant - time < NEAR_START * h
-        found = r.call(functions.unreliable_location, f.reals)
-        reason.value = select(early & (found == 0), NEAR_ZERO, found)
+        location_reason = r.call(functions.unreliable_location, f.reals)
+        reason.value = select(early & (location_reason == 0), NEAR_ZERO, location_reason)
 
     def _step_to_event(self, instant: Real, no_sign: Boolean, time: Real, h: Real, attempt: Part) -> None:
         """Take a step to an unreliable event location and evaluate the guards at its end.

@@ -100,15 +100,15 @@ class GuardFunctions:
             fired[guard] = select(active, fired[guard], 0.0)
             total.value = total.value - (~active).count()
         for i in r.each(len(self.modes)):
-            found = contradictions[i] != 0.0
-            total.value = total.value + found.count()
+            inconsistent = contradictions[i] != 0.0
+            total.value = total.value + inconsistent.count()
         return total.value
 
     def _unreliable_location(self, r: Routine, reals: Reals) -> Integer:
         """The reason why the event location of a marked guard is unreliable, or 0: the guard had no sign at
         the start of the step, or was near zero there. The values in ``guards`` are those at the end of the
         step."""
-        workspace, found = self.workspace, r.integer(0)
+        workspace, worst_reason = self.workspace, r.integer(0)
         for i in r.each(self.count):
             fired, old_sign, value_at_start, value_at_end = (
                 reals.after(place)[i]
@@ -121,43 +121,43 @@ class GuardFunctions:
             )
             near = abs(value_at_start) <= NEAR_ZERO_FRACTION * abs(value_at_end)
             reason = select(old_sign == 0.0, r.constant_integer(NO_SIGN), near.count())
-            worse = (fired != 0.0) & (reason > found.value)
-            found.value = select(worse, reason, found.value)
-        return found.value
+            worse = (fired != 0.0) & (reason > worst_reason.value)
+            worst_reason.value = select(worse, reason, worst_reason.value)
+        return worst_reason.value
 
     def _any_returned_to_zero(self, r: Routine, reals: Reals) -> Boolean:
         """Whether a guard without a sign at the start of the step has a sign now and is zero at the end."""
-        workspace, found = self.workspace, r.boolean(False)
+        workspace, any_returned = self.workspace, r.boolean(False)
         for i in r.each(self.count):
             old_sign, new_sign, value = (
                 reals.after(place)[i]
                 for place in (workspace.signs_at_start, workspace.signs, workspace.guards)
             )
-            found.value = found.value | ((old_sign == 0.0) & (new_sign != 0.0) & (value == 0.0))
-        return found.value
+            any_returned.value = any_returned.value | ((old_sign == 0.0) & (new_sign != 0.0) & (value == 0.0))
+        return any_returned.value
 
     def _any_fired(self, r: Routine, reals: Reals, locating: Boolean) -> Boolean:
         """Whether a selected guard is marked; clears the marks of all other guards. With ``locating``, the
         guards that only locate mode changes are selected, else all others. Guards of derivatives are always
         selected."""
-        found, fired = r.boolean(False), reals.after(self.workspace.fired)
+        any_fired, fired = r.boolean(False), reals.after(self.workspace.fired)
         locates = r.integers("guard.locates", self.locating_guards)
         for i in r.each(self.count):
             selected = _equal(locates[i] != 0, locating)
             if self.tangents is not None:
                 selected = selected | (r.constant_integer(0) + i >= self.tangents[2])
             fired[i] = select(selected, fired[i], 0.0)
-            found.value = found.value | (fired[i] != 0.0)
-        return found.value
+            any_fired.value = any_fired.value | (fired[i] != 0.0)
+        return any_fired.value
 
     def _any_inconsistent(self, r: Routine, reals: Reals, follows: Boolean) -> Boolean:
         """Whether a following mode is inconsistent (``follows``), or whether a stateful mode is."""
-        found, contradictions = r.boolean(False), reals.after(self.workspace.contradictions)
+        any_inconsistent, contradictions = r.boolean(False), reals.after(self.workspace.contradictions)
         followers = r.integers("mode.follows", self.followers)
         for i in r.each(len(self.modes)):
             selected = _equal(followers[i] != 0, follows)
-            found.value = found.value | (selected & (contradictions[i] != 0.0))
-        return found.value
+            any_inconsistent.value = any_inconsistent.value | (selected & (contradictions[i] != 0.0))
+        return any_inconsistent.value
 
     def _restrict_mode_changes(self, r: Routine, reals: Reals, follows: Boolean, only_first: Boolean) -> None:
         """Keep in ``new_z`` the values of the reset for inconsistent modes of one kind, for all or only for

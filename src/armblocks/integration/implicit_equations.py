@@ -91,10 +91,10 @@ class _Newton:
 
     def undefined(self) -> Boolean:
         """Whether an entry of the Jacobian is NaN, as for ``hypot(u, w)`` at the origin."""
-        found = self.r.boolean(False)
+        any_nan = self.r.boolean(False)
         for i in self.r.range(0, self.n * self.n):
-            found.value = found.value | ~self.jacobian[i].ordered
-        return found.value
+            any_nan.value = any_nan.value | ~self.jacobian[i].ordered
+        return any_nan.value
 
     def square(self, vector: Reals) -> Real:
         """Sum of the squares of a vector."""

@@ -100,10 +100,10 @@ class Method(ABC):
         """Whether every element of the vectors is finite. ``0 v`` is NaN where v is infinite or NaN."""
         total = self.r.real(0.0)
         for i in self.r.each(self.n):
-            found = total.value
+            subtotal = total.value
             for vector in vectors:
-                found = fma(vector[i], 0.0, found)
-            total.value = found
+                subtotal = fma(vector[i], 0.0, subtotal)
+            total.value = subtotal
         return total.value == 0.0
 
     def weighted(self, weights: Row) -> Callable[[Index], Real]:
@@ -183,9 +183,9 @@ class Method(ABC):
         """``sum_i element(i)^2``."""
         total = self.r.real(0.0)
         for i in self.r.each(self.n):
-            found = total.value
+            subtotal = total.value
             value = element(i)
-            total.value = fma(value, value, found)
+            total.value = fma(value, value, subtotal)
         return total.value
 
     def mean_square(self, element: Callable[[Index], Real]) -> Real:

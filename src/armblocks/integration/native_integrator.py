@@ -415,8 +415,8 @@ class Integration:
     def inconsistent_modes(self) -> list[int]:
         """The indices in ``z`` of the inconsistent modes."""
         workspace, modes = self.integrator.workspace, self.integrator.sizes.modes
-        found = self.reals[workspace.contradictions : workspace.contradictions + len(modes)]
-        return [place for place, inconsistent in zip(modes, found) if inconsistent]
+        contradictions = self.reals[workspace.contradictions : workspace.contradictions + len(modes)]
+        return [place for place, inconsistent in zip(modes, contradictions) if inconsistent]
 
     @property
     def time(self) -> float:

@@ -80,11 +80,11 @@ class RosenbrockTableau:
         checks |= {f"dense row {j} at the step's end": (ends[j], w) for j, w in enumerate(self.weights)}
         if self.error is not None:
             checks["error"] = (float(np.array(self.error) @ sums), 0.0)
-        for name, (found, expected) in checks.items():
+        for name, (actual, expected) in checks.items():
             # The coefficients are published with 15 or 16 digits and are multiplied by numbers of up to 300.
-            if abs(found - expected) > 100 * CONSISTENCY * max(1.0, abs(expected)):
+            if abs(actual - expected) > 100 * CONSISTENCY * max(1.0, abs(expected)):
                 raise InputError(
-                    f"{name} adds up to {found!r}",
+                    f"{name} adds up to {actual!r}",
                     where=f"integrator {self.name}",
                     allowed=f"{expected!r}",
                     fix="check the coefficients against their source",
@@ -202,8 +202,10 @@ def _inverse(gamma: Sequence[Sequence[float]]) -> list[list[Fraction]]:
     rows: list[list[Fraction]] = []
     for i, row in enumerate(gamma):
         exact = [Fraction(entry) for entry in row]
-        found = [-sum((exact[k] * rows[k][j] for k in range(j, i)), Fraction(0)) / exact[i] for j in range(i)]
-        rows.append([*found, 1 / exact[i]])
+        entries = [
+            -sum((exact[k] * rows[k][j] for k in range(j, i)), Fraction(0)) / exact[i] for j in range(i)
+        ]
+        rows.append([*entries, 1 / exact[i]])
     return rows
 
 

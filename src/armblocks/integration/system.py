@@ -270,11 +270,11 @@ class CompiledSystem:
 
     def integrator(self, tableau: Tableau) -> NativeIntegrator:
         """The native loop that integrates this system with a method; created once for each method."""
-        found = self._integrators.get(id(tableau))
-        if found is None:
+        integrator = self._integrators.get(id(tableau))
+        if integrator is None:
             # The integrator keeps its tableau alive, so no other tableau can get the same identity.
             if not tableau.needs_jacobian:
-                found = NativeIntegrator(self.sizes, self._digests, self.tape, tableau)
+                integrator = NativeIntegrator(self.sizes, self._digests, self.tape, tableau)
             else:
                 jacobian = self._flow_jacobian
                 digests = {**self._digests, "flow_jacobian": jacobian.digest}
@@ -282,9 +282,9 @@ class CompiledSystem:
                 def tape(function: str) -> Tape:
                     return jacobian.tape() if function == "flow_jacobian" else self.tape(function)
 
-                found = NativeIntegrator(self.sizes, digests, tape, tableau, jacobian.pattern)
-            self._integrators[id(tableau)] = found
-        return found
+                integrator = NativeIntegrator(self.sizes, digests, tape, tableau, jacobian.pattern)
+            self._integrators[id(tableau)] = integrator
+        return integrator
 
 
 def _functions(system: HybridSystem) -> dict[str, TracedFunction]:

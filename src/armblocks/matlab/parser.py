@@ -105,10 +105,10 @@ class Parser:
     def unexpected(self, expected: str = "") -> ArmblocksError:
         """The error at a token that does not fit here."""
         token = self.token
-        shown = {Kind.ROW: "the end of the line", Kind.EOF: "the end"}.get(token.kind, f"'{token.text[:40]}'")
+        text = {Kind.ROW: "the end of the line", Kind.EOF: "the end"}.get(token.kind, f"'{token.text[:40]}'")
         if not expected and token.kind in (Kind.NUMBER, Kind.NAME, Kind.STRING):
             expected = "an operator"
-        message = f"{shown} is not allowed here" + (f", expected {expected}" if expected else "")
+        message = f"{text} is not allowed here" + (f", expected {expected}" if expected else "")
         if token.kind is Kind.END and token.text == "\n":
             text_kind = "statement" if self.source.is_file else "formula"
             message = f"the {text_kind} ends where {expected or 'something else'} is expected"

@@ -162,12 +162,12 @@ def _joints(motion: Motion) -> Picture:
         for unit in units:
             torque, shown = ("Joint torque", "N m") if unit == "rad" else ("Joint force", "N")
             panels.append(_joint_panel(motion, torque, unit, shown, motion.tau, "torque"))
-    named = ", ".join(panel.quantity.lower() for panel in panels)
+    quantity_names = ", ".join(panel.quantity.lower() for panel in panels)
     return time_chart(
         motion.time,
         panels,
         title=f"Joints of {robot.name} over time",
-        description=f"Line charts of {named} over {axis_number(float(motion.time[-1]))} s.",
+        description=f"Line charts of {quantity_names} over {axis_number(float(motion.time[-1]))} s.",
     )
 
 

@@ -80,10 +80,12 @@ def moving_arms(diagram: Diagram, result: SimulationResult) -> tuple[MovingArm, 
         if robot is not None and path is not None and result[path].shape[1:] == (robot.n,):
             groups.setdefault((robot, path), []).append(name)
     arms: list[MovingArm] = []
-    shown = {robot for (robot, _), names in groups.items() if any(_has_robot_view(diagram, n) for n in names)}
+    robots_with_views = {
+        robot for (robot, _), names in groups.items() if any(_has_robot_view(diagram, n) for n in names)
+    }
     for (robot, path), names in groups.items():
         # A controller computes torques for several q of one arm; the drawn arm is the simulated one.
-        if robot in shown and not any(_has_robot_view(diagram, n) for n in names):
+        if robot in robots_with_views and not any(_has_robot_view(diagram, n) for n in names):
             continue
         arms.append(_moving_arm(robot, path, _sources_first(diagram, names), result))
     return tuple(arms)

@@ -70,9 +70,9 @@ def report_page(contents: ReportContents) -> str:
     if displays:
         sections.append(("displays", "Displays", displays))
     for key, heading in (("graphs", "XY graphs"), ("scopes", "Scopes"), ("spectra", "Spectra")):
-        chosen = [figure for figure in contents.figures if figure.section == key]
-        if chosen:
-            sections.append((key, heading, _figure_list(chosen)))
+        section_figures = [figure for figure in contents.figures if figure.section == key]
+        if section_figures:
+            sections.append((key, heading, _figure_list(section_figures)))
     sections.append(("diagram", "Diagram", _diagram(contents)))
     sections.append(("run", "Run", _run(contents)))
     links = "".join(f'<li><a href="#{key}">{heading}</a></li>' for key, heading, _ in sections)
@@ -99,8 +99,8 @@ def _lead(contents: ReportContents) -> str:
     robots = sorted({motion.robot.name for motion in contents.motions})
     arm = f", robot {escape(', '.join(robots))}" if robots else ""
     about = contents.diagram.description
-    shown = f"{escape(about[:1].upper() + about[1:])}. " if about else ""
-    return f"{shown}Simulation of {end} s, {count} blocks{arm}."
+    description = f"{escape(about[:1].upper() + about[1:])}. " if about else ""
+    return f"{description}Simulation of {end} s, {count} blocks{arm}."
 
 
 def _facts(contents: ReportContents) -> str:
@@ -173,10 +173,12 @@ def _figure(figure: Figure) -> str:
 
 
 def _figure_list(figures: Iterable[Figure]) -> str:
-    listed = list(figures)
-    figures_html = "".join(_figure(figure) for figure in listed)
+    figure_list = list(figures)
+    figures_html = "".join(_figure(figure) for figure in figure_list)
     return (
-        f'<div class="pair">{figures_html}</div>' if all(figure.narrow for figure in listed) else figures_html
+        f'<div class="pair">{figures_html}</div>'
+        if all(figure.narrow for figure in figure_list)
+        else figures_html
     )
 
 
@@ -268,7 +270,7 @@ def _run(contents: ReportContents) -> str:
         )
     figures = [name for name in contents.files if name.startswith("figures/")]
     names = [name for name in contents.files if name not in figures]
-    listed = ", ".join(f"<code>{escape(name)}</code>" for name in names)
+    name_list = ", ".join(f"<code>{escape(name)}</code>" for name in names)
     if figures:
-        listed += f", and {len(figures)} figures in <code>figures/</code>"
-    return text + f'<h3>Files in the same folder</h3><p class="files">{listed}</p>'
+        name_list += f", and {len(figures)} figures in <code>figures/</code>"
+    return text + f'<h3>Files in the same folder</h3><p class="files">{name_list}</p>'

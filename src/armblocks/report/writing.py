@@ -141,11 +141,11 @@ def _figures(diagram: Diagram, result: SimulationResult, arm_motions: Sequence[M
         figures += motion_figures(motion, prefix)
     figures += view_figures(diagram, result)
     counts: dict[str, int] = {}
-    named: list[Figure] = []
+    named_figures: list[Figure] = []
     for figure in figures:  # different block names may give the same file name
         count = counts[figure.name] = counts.get(figure.name, 0) + 1
-        named.append(figure if count == 1 else replace(figure, name=f"{figure.name}-{count}"))
-    return named
+        named_figures.append(figure if count == 1 else replace(figure, name=f"{figure.name}-{count}"))
+    return named_figures
 
 
 def _encoding(figure: Figure, kind: str) -> Callable[[], bytes]:

@@ -363,8 +363,8 @@ class _FunctionText:
         kind = Kind.ADDRESS if isinstance(operands[0], Local | Table) else operands[0].kind
         texts = [self._operand(operand) for operand in operands]
         if operation is Operation.SELECT:
-            chosen = self._typed(operands[1])
-            return f"select {self._type(kind)} {texts[0]}, {chosen} {texts[1]}, {chosen} {texts[2]}"
+            second = self._typed(operands[1])
+            return f"select {self._type(kind)} {texts[0]}, {second} {texts[1]}, {second} {texts[2]}"
         if operation is Operation.ANY:
             return self._any(texts[0])
         if operation is Operation.SPREAD:

@@ -85,13 +85,13 @@ def ended_by_block(system: CompiledSystem, run: Integration) -> str | Simulation
 
 def warnings_of_blocks(system: CompiledSystem, run: Integration) -> list[str]:
     """The messages of assertions with the action ``warn``."""
-    found: list[str] = []
+    messages: list[str] = []
     for guard, action in enumerate(system.guard_actions):
         fired = run.last_fired(guard)
         if action == "warn" and (fired > -np.inf or run.positive_guards([guard])):
             when = f"last from {fired:.9g} s on" if fired > -np.inf else "from the start on"
-            found.append(f"assertion '{system.guard_names[guard]}' did not hold, {when}")
-    return found
+            messages.append(f"assertion '{system.guard_names[guard]}' did not hold, {when}")
+    return messages
 
 
 def integration_failure(system: CompiledSystem, run: Integration, p: Array) -> SimulationError:
@@ -171,9 +171,9 @@ def _inconsistent_blocks(system: CompiledSystem, run: Integration) -> list[str]:
 
 def _listed(blocks: list[str]) -> str:
     """The first three block names as text, with the number of further blocks."""
-    shown = ", ".join(f"'{block}'" for block in blocks[:3])
+    block_list = ", ".join(f"'{block}'" for block in blocks[:3])
     more = f" and {len(blocks) - 3} more" if len(blocks) > 3 else ""
-    return f"{'block' if len(blocks) == 1 else 'the blocks'} {shown}{more}"
+    return f"{'block' if len(blocks) == 1 else 'the blocks'} {block_list}{more}"
 
 
 def _unique(names: Iterable[str]) -> list[str]:

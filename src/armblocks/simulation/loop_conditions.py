@@ -27,12 +27,16 @@ def warnings_of_loops(system: CompiledSystem, parts: Sequence[Rows]) -> list[str
     """A warning for each linear loop with a condition number above ``MAX_CONDITION``, with the worst time."""
     worst = [(0.0, 0.0)] * len(system.loops)
     for rows in parts if system.loops else ():
-        chosen = np.unique(np.linspace(0, rows.time.size - 1, CHECKED_SAMPLES).astype(np.intp))
-        t, x, z, w = (part[chosen] for part in (rows.time, rows.states, rows.discrete, rows.algebraic))
+        sample_indices = np.unique(np.linspace(0, rows.time.size - 1, CHECKED_SAMPLES).astype(np.intp))
+        t, x, z, w = (
+            part[sample_indices] for part in (rows.time, rows.states, rows.discrete, rows.algebraic)
+        )
         for loop, matrices in enumerate(system.loop_matrices(t, x, z, w, rows.p)):
             conditions = loop_conditions(matrices)
             place = int(np.argmax(conditions))
-            worst[loop] = max(worst[loop], (float(conditions[place]), float(rows.time[chosen][place])))
+            worst[loop] = max(
+                worst[loop], (float(conditions[place]), float(rows.time[sample_indices][place]))
+            )
     return [
         f"the loop of {_listed(names)} has the condition number {condition:.2g} at {time:.9g} s, so that its "
         f"signals have about {max(0.0, 16.0 - np.log10(condition)):.0f} correct digits"
@@ -49,7 +53,7 @@ def loop_conditions(matrices: Array) -> Array:
     (Bauer, *Numer. Math.* 5 (1963) 73-87).
     """
     n = matrices.shape[-1]
-    found = np.zeros(len(matrices))
+    numbers = np.zeros(len(matrices))
     for k in range(len(matrices)):
         matrix: Array = matrices[k]
         try:
@@ -62,10 +66,10 @@ def loop_conditions(matrices: Array) -> Array:
             product = growth @ vector
             vector = np.sqrt(vector / vector.max() * product / product.max())
         bound = float(np.max(growth @ vector / vector))
-        found[k] = bound if np.isfinite(bound) else 0.0
-    return found
+        numbers[k] = bound if np.isfinite(bound) else 0.0
+    return numbers
 
 
 def _listed(names: Sequence[str]) -> str:
-    shown = ", ".join(f"'{name}'" for name in names[:MAX_NAMES])
-    return shown if len(names) <= MAX_NAMES else f"{shown} and {len(names) - MAX_NAMES} more signals"
+    name_list = ", ".join(f"'{name}'" for name in names[:MAX_NAMES])
+    return name_list if len(names) <= MAX_NAMES else f"{name_list} and {len(names) - MAX_NAMES} more signals"

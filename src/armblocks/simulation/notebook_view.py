@@ -81,25 +81,25 @@ def _panel(time: Array, values: Array, slot: Slot) -> str:
     drawn = _drawn_components(columns)
     angle = slot.unit == "rad" or slot.unit.startswith("rad/")
     unit = slot.unit.replace("rad", "deg", 1) if angle else slot.unit
-    shown = columns[:, drawn] * (180.0 / np.pi if angle else 1.0)
-    low, high = (float(shown.min()), float(shown.max())) if shown.size else (0.0, 0.0)
+    drawn_values = columns[:, drawn] * (180.0 / np.pi if angle else 1.0)
+    low, high = (float(drawn_values.min()), float(drawn_values.max())) if drawn_values.size else (0.0, 0.0)
     details = " · ".join(part for part in (unit, "×".join(map(str, slot.shape))) if part)
     if len(drawn) < slot.size:
         details += f" · {len(drawn)} of {slot.size} drawn"
     title = slot.title or slot.name
     label = f"{title}{f' in {unit}' if unit else ''}: from {_tick(low)} to {_tick(high)}"
     caption = f"<figcaption>{escape(title)} <span>{escape(details)}</span>{_legend(slot, drawn)}</figcaption>"
-    return f"<figure>{caption}{_svg(time, shown, low, high, label)}</figure>"
+    return f"<figure>{caption}{_svg(time, drawn_values, low, high, label)}</figure>"
 
 
-def _legend(slot: Slot, drawn: list[int]) -> str:
+def _legend(slot: Slot, drawn_columns: list[int]) -> str:
     """The name or index of each component in the colour of its trace; nothing for a scalar."""
     if not slot.shape:
         return ""
     names = slot.entry_names
     labels = (
         f'<i style="color:{TRACES[k % len(TRACES)]}">{escape(names[component])}</i>'
-        for k, component in enumerate(drawn)
+        for k, component in enumerate(drawn_columns)
     )
     return f" <b>{' '.join(labels)}</b>"
 
@@ -157,11 +157,11 @@ def _envelope(time: Array, values: Array, intervals: int = 110) -> tuple[Array, 
         return time, values
     edges = np.searchsorted(time, np.linspace(float(time[0]), float(time[-1]), intervals + 1)).tolist()
     edges[-1] = time.size
-    drawn = {0, time.size - 1}
+    drawn_samples = {0, time.size - 1}
     for a, b in itertools.pairwise(edges):
         if a < b:
-            drawn |= {a + int(np.argmin(values[a:b])), a + int(np.argmax(values[a:b]))}
-    places = np.array(sorted(drawn))
+            drawn_samples |= {a + int(np.argmin(values[a:b])), a + int(np.argmax(values[a:b]))}
+    places = np.array(sorted(drawn_samples))
     return time[places], values[places]
 
 

@@ -225,24 +225,24 @@ def _number(
 
 def _choose_method(system: CompiledSystem, options: SimulationOptions) -> tuple[Tableau | None, str]:
     automatic = options.solver.casefold() == "auto"
-    named = None if automatic else find_tableau(options.solver)
+    tableau = None if automatic else find_tableau(options.solver)
     if system.states.size == 0 and system.sizes.hybrid:
         # A step without states goes from instant to instant and evaluates the guards.
         return EULER, "none needed: the system has no continuous states, only ticks and events"
     if system.states.size == 0:
         return None, "none needed: the system has no states, each sample is evaluated directly"
-    if named is None and options.step is not None:
+    if tableau is None and options.step is not None:
         return RK4, "a step was given, so a fixed-step method of order 4"
-    if named is None:
+    if tableau is None:
         return DEFAULT, f"auto: {DEFAULT.title}, explicit, because no stiffness was detected"
-    if named.adaptive and options.step is not None:
+    if tableau.adaptive and options.step is not None:
         raise InputError(
-            f"solver {named.name} chooses its own steps, and step is {options.step:g} s",
+            f"solver {tableau.name} chooses its own steps, and step is {options.step:g} s",
             where=system.name,
             allowed=f"step with a fixed-step solver: {', '.join(t.name for t in TABLEAUX if not t.adaptive)}",
             fix="use max_step to bound the steps, or solver='rk4' ('ros5' for a stiff system)",
         )
-    return named, f"requested: {named.title}"
+    return tableau, f"requested: {tableau.title}"
 
 
 def _sample_time(
@@ -268,18 +268,18 @@ def _sample_time(
     return sample_time
 
 
-def parameter_vector(system: CompiledSystem, given: Mapping[str, ArrayLike] | ArrayLike | None) -> Array:
-    """The flat parameters ``(np,)``: the system's values, replaced by those in ``given``.
+def parameter_vector(system: CompiledSystem, values: Mapping[str, ArrayLike] | ArrayLike | None) -> Array:
+    """The flat parameters ``(np,)``: the system's values, replaced by those in ``values``.
 
-    ``given`` is a mapping from ``block.parameter`` to a value of its shape (a scalar sets all entries), or
+    ``values`` is a mapping from ``block.parameter`` to a value of its shape (a scalar sets all entries), or
     the whole flat vector. Raises ``UnknownNameError`` and ``InputError``.
     """
-    if given is None:
+    if values is None:
         return system.parameter_values
     layout = system.parameters
-    if isinstance(given, Mapping):
-        return changed_parameters(system, system.parameter_values, given)
-    p = np.array(given, dtype=np.float64)
+    if isinstance(values, Mapping):
+        return changed_parameters(system, system.parameter_values, values)
+    p = np.array(values, dtype=np.float64)
     if p.shape != (layout.size,):
         raise InputError(
             f"the parameter vector has shape {p.shape}",
@@ -291,7 +291,7 @@ def parameter_vector(system: CompiledSystem, given: Mapping[str, ArrayLike] | Ar
     return _require_finite(system, p, ~np.isfinite(p) & np.isfinite(system.parameter_values))
 
 
-def changed_parameters(system: CompiledSystem, p: Array, given: Mapping[str, ArrayLike]) -> Array:
+def changed_parameters(system: CompiledSystem, p: Array, values: Mapping[str, ArrayLike]) -> Array:
     """A copy of the flat parameters ``(np,)`` with new values for some, by ``block.parameter``.
 
     Infinite values are accepted, because limits may be infinite; each block checks its own parameters.
@@ -299,7 +299,7 @@ def changed_parameters(system: CompiledSystem, p: Array, given: Mapping[str, Arr
     Raises ``UnknownNameError`` and ``InputError``.
     """
     layout, p = system.parameters, p.copy()
-    for name, value in given.items():
+    for name, value in values.items():
         if name not in layout.ranges:
             raise UnknownNameError("parameter", name, layout.names, where=system.name)
         slot = layout[name]

@@ -150,9 +150,9 @@ class RunData:
         slots: list[Slot] = []
         places: list[Array] = []
         for name, path in names.items():
-            known = self.resolve(path)
-            slots.append(dataclasses.replace(self.signals_layout[known], name=name))
-            places.append(self.signals[self.signals_layout.ranges[known]])
+            signal_name = self.resolve(path)
+            slots.append(dataclasses.replace(self.signals_layout[signal_name], name=name))
+            places.append(self.signals[self.signals_layout.ranges[signal_name]])
         return dataclasses.replace(
             self,
             time=self.time[rows],
@@ -166,9 +166,9 @@ class RunData:
     def _selected_jumps(self, slots: list[Slot], paths: Iterable[str], time: Array) -> Jumps:
         """The jumps of some signals between the first and the last of some samples."""
         jumps, ranges = self.jumps, [self.signals_layout.ranges[self.resolve(path)] for path in paths]
-        chosen = np.array([k for part in ranges for k in range(part.start, part.stop)], dtype=np.intp)
+        indices = np.array([k for part in ranges for k in range(part.start, part.stop)], dtype=np.intp)
         begin, end = (float(time[0]), float(time[-1])) if time.size else (0.0, 0.0)
-        return Jumps(Signature(tuple(slots)), {}, lambda: jumps.table.selected(chosen, begin, end))
+        return Jumps(Signature(tuple(slots)), {}, lambda: jumps.table.selected(indices, begin, end))
 
     def columns(self) -> tuple[str, ...]:
         """A name for each scalar of ``signals``: ``clock/y``, ``rne/tau[link2]``, ``fkine/T[0,3]``.

@@ -66,8 +66,8 @@ class View:
         return np.concatenate(parts, axis=1) if parts else np.empty((0, 0))
 
     def _flush(self) -> None:
-        joined = np.concatenate(self._pending, axis=1)
-        self._selected.append(self._extremes(joined) if len(self._pending) > 1 else joined)
+        rows = np.concatenate(self._pending, axis=1)
+        self._selected.append(self._extremes(rows) if len(self._pending) > 1 else rows)
         self._pending, self._rows_in_interval = [], 0
         if sum(part.shape[1] for part in self._selected) > MAX_VIEW_ROWS:
             # More rows than expected, because of jumps: double the intervals.
@@ -115,8 +115,8 @@ class RunLog:
         self._wait()
         self.rows += time.size
         self.samples += samples
-        chosen = signals if self._all else signals[self._indices]
-        self._writing = self._thread.submit(self._file.append, time.copy(), chosen)
+        logged_signals = signals if self._all else signals[self._indices]
+        self._writing = self._thread.submit(self._file.append, time.copy(), logged_signals)
         self._view.append(np.concatenate([time[np.newaxis], states.T, signals]))
 
     def view(self, signals: int) -> tuple[Array, Array, Array]:

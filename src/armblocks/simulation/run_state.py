@@ -133,9 +133,9 @@ def check_state(system: CompiledSystem, state: RunState) -> None:
     for layout, names, values in zip(layouts, state.names, (state.states, state.discrete, state.algebraic)):
         other = sorted(set(layout.names) ^ set(names))
         if other or layout.names != names or values.shape != (layout.size,):
-            named = f"'{other[0]}' is only in one of them" if other else "their variables differ"
+            difference = f"'{other[0]}' is only in one of them" if other else "their variables differ"
             raise InputError(
-                f"the state of '{state.name}' at {state.time:g} s belongs to another system: {named}",
+                f"the state of '{state.name}' at {state.time:g} s belongs to another system: {difference}",
                 where=system.name,
                 allowed="a state of the same diagram",
                 fix="start a new run, or load the diagram that the state belongs to",

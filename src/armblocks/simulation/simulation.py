@@ -169,20 +169,20 @@ class Simulation:
         while part.status is Status.PAUSED and left >= 1:
             if part.integration is not None and part.other_method_faster:
                 part.integration = self._method.change(part.integration)
-            started, taken = perf_counter(), part.steps_taken
+            started, steps_taken = perf_counter(), part.steps_taken
             chunk = int(min(self._chunk_of(part), left))
             if self._calls is None:
                 part.advance(chunk, pause, self._recording.consumer)
             else:
                 self._calls.advance(part, chunk, pause, self._recording.consumer)
             now = perf_counter()
-            taken = part.steps_taken - taken
-            left -= taken
-            if taken < chunk and not part.other_method_faster:
+            steps_taken = part.steps_taken - steps_taken
+            left -= steps_taken
+            if steps_taken < chunk and not part.other_method_faster:
                 break  # the pause or the end is reached
             # At most twice as many steps as before, so that the time of a chunk grows gradually.
             growth = min(2.0, min(CHUNK_SECONDS, budget) / max(now - started, 1e-6))
-            self._chunk = max(100, int(taken * growth))
+            self._chunk = max(100, int(steps_taken * growth))
             if now >= deadline:
                 break
 
@@ -199,7 +199,8 @@ class Simulation:
         self._add_message(ended)
 
     def _chunk_of(self, part: RunPart) -> int:
-        """Number of steps of the next chunk; with a window, at most about as many as fill half of it."""
+        """Number of steps of the next chunk. With a window, the samples of these steps fill about half of the
+        window."""
         if part.window is None:
             return self._chunk
         recorded = max(1, part.recorded - part.first)
@@ -396,7 +397,7 @@ class Simulation:
 
 
 def _missing_jumps(integrations: Sequence[Integration]) -> str:
-    """A remark for the user if a run had too many jumps to record all of them."""
+    """A message if a run had too many jumps to record all of them."""
     for run in integrations:
         if run.jumps.end is not None:
             return (

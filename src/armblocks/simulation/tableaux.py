@@ -38,7 +38,7 @@ def find_tableau(name: str, where: str = "") -> Tableau:
 
     Raises ``UnknownNameError`` with the nearest name.
     """
-    found = _BY_NAME.get(name.casefold())
-    if found is None:
+    tableau = _BY_NAME.get(name.casefold())
+    if tableau is None:
         raise UnknownNameError("solver", name, ["auto", *_BY_NAME], where=where)
-    return found
+    return tableau

@@ -66,8 +66,8 @@ def run_widget(
             fix="add a Scope, an XY Graph or a Robot Plot",
         )
     key, run, frame = _record(views, result)
-    shown = {"key": key, "run": run, "scopes": scopes, "arm": arm}
-    return _widget(f"Run of {diagram.name}", height, shown, frame)
+    content = {"key": key, "run": run, "scopes": scopes, "arm": arm}
+    return _widget(f"Run of {diagram.name}", height, content, frame)
 
 
 def robot_widget(robot: Arm | Robot, q: ArrayLike | None = None, *, height: int = HEIGHT) -> AnyWidget:
@@ -77,8 +77,8 @@ def robot_widget(robot: Arm | Robot, q: ArrayLike | None = None, *, height: int 
     installed.
     """
     described_robot = robot.robot if isinstance(robot, Arm) else robot
-    shown = {"key": described_robot.name, "run": None, "scopes": False, "arm": _arm("", described_robot, q)}
-    return _widget(f"Robot {described_robot.name}", height, shown, b"")
+    content = {"key": described_robot.name, "run": None, "scopes": False, "arm": _arm("", described_robot, q)}
+    return _widget(f"Robot {described_robot.name}", height, content, b"")
 
 
 def _arm(path: str, robot: Robot, q: ArrayLike | None = None) -> dict[str, Any]:
@@ -128,8 +128,8 @@ def _record(views: Sequence[tuple[str, View]], result: SimulationResult) -> tupl
     return key, run, sample_frame(key, 0, result.time, signals)
 
 
-def _widget(title: str, height: int, shown: dict[str, Any], frame: bytes) -> AnyWidget:
-    return _widget_class()(title=title, height=height, _shown=shown, _frame=frame, _page=_page())
+def _widget(title: str, height: int, content: dict[str, Any], frame: bytes) -> AnyWidget:
+    return _widget_class()(title=title, height=height, _shown=content, _frame=frame, _page=_page())
 
 
 @cache

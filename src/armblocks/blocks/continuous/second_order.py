@@ -40,7 +40,7 @@ class SecondOrderIntegrator(Block):
     sign: ClassVar[FaceSign] = Fraction("1", "s²")
     output_rates: ClassVar[Mapping[str, str]] = {"x": "dx"}
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A mass on a spring: the acceleration is -4 x, so it oscillates at 2 rad/s.",
+        shows="A mass on a spring: the acceleration is -4 x, so the mass oscillates at 2 rad/s.",
         parameters={"initial": 1.0},
         inputs={"u": driver("Gain", gain=-4.0).by(u="x")},
         shown=("x", "dx"),

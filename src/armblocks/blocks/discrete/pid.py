@@ -132,8 +132,9 @@ class DiscretePID(SampledPidBlock):
 class DiscretePID2DOF(SampledPidBlock):
     """Sampled PID with two degrees of freedom: P acts on b r - u, I on r - u, D on c r - u.
 
-    With set-point weights b, c < 1 the response to a step of r is softer; the response to disturbances is
-    unchanged. Rules, forms, limits, reset and tracking are those of the Discrete PID Controller.
+    Set-point weights b, c < 1 reduce the control action and the overshoot after a step of r; the response to
+    disturbances is unchanged. Rules, forms, limits, reset and tracking are those of the Discrete PID
+    Controller.
     """
 
     title: ClassVar[str] = "Discrete PID Controller (2DOF)"

@@ -96,7 +96,7 @@ class Manipulability(Block):
     title: ClassVar[str] = "manipulability"
     sign: ClassVar[FaceSign] = Words("√|J Jᵀ|")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="An arm with two links stretches: the measure falls towards 0 near the stretched singularity.",
+        shows="An arm with two links stretches: the measure falls to 0 where the arm is straight.",
         inputs={"q": driver("JTraj", q0=(0.0, 1.5), qf=(0.5, 0.0), tmax=8.0).named("motion")},
     )
 

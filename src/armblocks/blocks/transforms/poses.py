@@ -212,7 +212,7 @@ class Tr2Delta(Block):
 
     ``world`` is the formula of the toolbox up to release 9: d = p2 - p1 and r = 1/2 (n1 x n2 + o1 x o2 + a1 x
     a2), where n, o, a are the axes of T1 and T2 in their reference frame. Both are accurate for small
-    rotations only. vex is half the difference of the opposite entries.
+    rotations only. vex gives the vector of the skew-symmetric part of a matrix.
     """
 
     title: ClassVar[str] = "tr2delta"

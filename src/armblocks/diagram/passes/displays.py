@@ -18,14 +18,14 @@ from armblocks.diagram.port import View
 
 def resolve_displays(net: Netlist) -> Netlist:
     """The netlist with all views, and without displays of buses."""
-    shown = {path: block for path, block in net.remaining().items() if block.views()}
-    with_bus = {path for path, block in shown.items() if _shows_bus(net, path, block)}
+    blocks_with_views = {path: block for path, block in net.remaining().items() if block.views()}
+    with_bus = {path for path, block in blocks_with_views.items() if _shows_bus(net, path, block)}
     views = tuple(
         (path, _expanded(net, path, view) if path in with_bus else view)
-        for path, block in sorted(shown.items())
+        for path, block in sorted(blocks_with_views.items())
         for view in block.views()
     )
-    removed: dict[str, Replacements] = {path: {} for path in shown if path in with_bus}
+    removed: dict[str, Replacements] = {path: {} for path in blocks_with_views if path in with_bus}
     return dataclasses.replace(net.with_replaced(removed), views=views)
 
 

@@ -63,9 +63,9 @@ def spectrum_chart(
     label = _label(units.pop() if len(units) == 1 else "", decibels, density)
     picture.extend(area.frame(x_label="Frequency, Hz", y_label=label))
     for index, (frequency, values) in enumerate(lines):
-        shown = frequency >= low
+        is_shown = frequency >= low
         positions = area.points(
-            frequency[shown], np.where(np.isfinite(values[shown]), values[shown], span[0] - 1e3)
+            frequency[is_shown], np.where(np.isfinite(values[is_shown]), values[is_shown], span[0] - 1e3)
         )
         x_scale, y_scale = thin_out(positions[:, 0], positions[:, 1], round(box[2] - box[0]))
         points = clip_line(np.column_stack([x_scale, y_scale]), area.box)
@@ -90,8 +90,8 @@ def _range(values: _Array, decibels: bool) -> tuple[float, float]:
 
 def _label(unit: str, decibels: bool, density: bool) -> str:
     square = f"({unit})²" if " " in unit or "/" in unit else f"{unit}²"
-    shown = (f"{square}/Hz" if unit else "1/Hz") if density else unit
+    density_unit = (f"{square}/Hz" if unit else "1/Hz") if density else unit
     quantity = "Power density" if density else "Amplitude"
     if decibels:
-        return f"{quantity}, dB" + (f" of 1 {shown}" if unit else "")
-    return f"{quantity}, {shown}" if shown else quantity
+        return f"{quantity}, dB" + (f" of 1 {density_unit}" if unit else "")
+    return f"{quantity}, {density_unit}" if density_unit else quantity

@@ -93,8 +93,8 @@ def _end_time(time: _Array) -> float:
 
 def _value_range(panel: Panel) -> tuple[float, float]:
     values = np.concatenate([trace.values for trace in panel.traces]) if panel.traces else np.zeros(1)
-    shown = [bound for trace in panel.traces for bound in _drawn_limits(trace)]
-    return padded_range(np.concatenate([values, np.array(shown)]), 0.08)
+    limits = [bound for trace in panel.traces for bound in _drawn_limits(trace)]
+    return padded_range(np.concatenate([values, np.array(limits)]), 0.08)
 
 
 def _drawn_limits(trace: Trace) -> list[float]:

@@ -453,9 +453,9 @@ class OpenFiles(ABC, Generic[OpenedT]):
             for open_file in self:
                 if open_file.path is None or open_file.saving.locked():
                     continue
-                path, known, old_state = open_file.path, open_file.on_disk, open_file.disk
-                disk, fingerprint = await asyncio.to_thread(self.folder.compared, path, known)
-                if open_file.on_disk is not known or open_file.path != path:
+                path, old_fingerprint, old_state = open_file.path, open_file.on_disk, open_file.disk
+                disk, fingerprint = await asyncio.to_thread(self.folder.compared, path, old_fingerprint)
+                if open_file.on_disk is not old_fingerprint or open_file.path != path:
                     continue  # it has been saved since
                 open_file.disk, open_file.on_disk = disk, fingerprint
                 if disk != old_state:

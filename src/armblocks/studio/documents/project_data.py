@@ -71,14 +71,14 @@ class ProjectData(DataFiles):
             path = self.folder.path(reference.file, TABLE_SUFFIXES, folder)
         except ArmblocksError as error:
             return _unreadable(error, reference, reference.file, "")
-        shown = self.shown(path)
+        shown_path = self.shown(path)
         try:
             strict = is_strict(path)
-            table = table_of(self.columns(path), shown, reference.time, reference.columns, strict=strict)
+            table = table_of(self.columns(path), shown_path, reference.time, reference.columns, strict=strict)
         except ArmblocksError as error:
-            fault = FormatError(error.what, where=shown, allowed=error.allowed, fix=error.fix)
-            return _unreadable(fault, reference, str(path), shown)
-        return dataclasses.replace(table, source=str(path), shown=shown)
+            fault = FormatError(error.what, where=shown_path, allowed=error.allowed, fix=error.fix)
+            return _unreadable(fault, reference, str(path), shown_path)
+        return dataclasses.replace(table, source=str(path), shown=shown_path)
 
     # -- functions -------------------------------------------------------------------------------------------
 
@@ -89,31 +89,33 @@ class ProjectData(DataFiles):
     def function(self, reference: str, folder: Path | None) -> UserFunction:
         """The function of a file of the project. Raises ``ArmblocksError`` if the file does not define it."""
         path, outline, source = self._outline(reference, folder)
-        shown = self.shown(path)
+        shown_path = self.shown(path)
         fault = FormatError(
-            f"the code of {shown} has not been run",
-            where=shown,
+            f"the code of {shown_path} has not been run",
+            where=shown_path,
             allowed="functions of trusted files, in a run",
             fix="run the model",
         )
-        if self._runs_code and (shown, digest_of(source)) not in self.trusted:
-            fault = _untrusted(shown)
+        if self._runs_code and (shown_path, digest_of(source)) not in self.trusted:
+            fault = _untrusted(shown_path)
         elif self._runs_code:
             try:
-                return UserFunction(run_source(source, path, shown, outline.name))
+                return UserFunction(run_source(source, path, shown_path, outline.name))
             except FormatError as error:
                 fault = error
         name = outline.name
-        return UserFunction(UnloadedFunction(f"{path}:{name}", f"{shown}:{name}", outline.arguments, fault))
+        return UserFunction(
+            UnloadedFunction(f"{path}:{name}", f"{shown_path}:{name}", outline.arguments, fault)
+        )
 
     def _outline(self, reference: str, folder: Path | None) -> tuple[Path, FunctionOutline, bytes]:
         file, name = split_reference(reference)
         path = self.folder.path(file, SOURCE_SUFFIXES, folder)
         source = self.source(path)
-        known = functions_of(source, self.shown(path))
-        if name not in known:
-            raise UnknownNameError("function", name, known, where=self.shown(path))
-        return path, known[name], source
+        functions = functions_of(source, self.shown(path))
+        if name not in functions:
+            raise UnknownNameError("function", name, functions, where=self.shown(path))
+        return path, functions[name], source
 
     def shown(self, path: Path) -> str:
         """The path of a file from the project folder."""
@@ -153,14 +155,14 @@ class ProjectData(DataFiles):
             path, outline, source = self._outline(value.shown, None)
         except ArmblocksError as error:
             return error
-        shown = self.shown(path)
+        shown_path = self.shown(path)
         if outline.arguments != value.arguments:
             return FormatError(
-                f"{shown} has changed: the arguments of {outline.name} are different",
-                where=shown,
+                f"{shown_path} has changed: the arguments of {outline.name} are different",
+                where=shown_path,
                 fix="open the block and load the function again",
             )
-        return None if (shown, digest_of(source)) in self.trusted else _untrusted(shown)
+        return None if (shown_path, digest_of(source)) in self.trusted else _untrusted(shown_path)
 
 
 def files_of(diagram: Diagram) -> Iterator[tuple[str, TimeTable | UserFunction]]:
@@ -193,15 +195,15 @@ def has_functions(diagram: Diagram) -> bool:
     return any(isinstance(value, UserFunction) for _, value in files_of(diagram))
 
 
-def _unreadable(fault: ArmblocksError, reference: TableReference, source: str, shown: str) -> TimeTable:
+def _unreadable(fault: ArmblocksError, reference: TableReference, source: str, shown_path: str) -> TimeTable:
     table = TimeTable.unread(fault, source, time=reference.time, columns=reference.columns)
-    return dataclasses.replace(table, shown=shown)
+    return dataclasses.replace(table, shown=shown_path)
 
 
-def _untrusted(shown: str) -> FormatError:
+def _untrusted(shown_path: str) -> FormatError:
     return FormatError(
-        f"the code of {shown} is not trusted in its present form",
-        where=shown,
+        f"the code of {shown_path} is not trusted in its present form",
+        where=shown_path,
         allowed="Python code that you have read and trusted",
         fix="open the block, read the code, and trust it",
     )

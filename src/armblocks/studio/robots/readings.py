@@ -68,10 +68,10 @@ def singularity(J: NDArray[np.float64], joints: Sequence[str], length: float) ->
         return ""
     degree = "Singular" if ratio < SINGULAR_RATIO else "Close to singular"
     null_motion = np.abs(right[len(values) - 1])
-    named = [joint for joint, part in zip(joints, null_motion) if part > _NAMED_FRACTION * null_motion.max()]
-    if len(named) == 1:
-        return f"{degree}: {named[0]} moves without motion of the tool."
-    words = f"{', '.join(named[:-1])} and {named[-1]} can move together without motion of the tool"
+    moving = [joint for joint, part in zip(joints, null_motion) if part > _NAMED_FRACTION * null_motion.max()]
+    if len(moving) == 1:
+        return f"{degree}: {moving[0]} moves without motion of the tool."
+    words = f"{', '.join(moving[:-1])} and {moving[-1]} can move together without motion of the tool"
     if len(joints) < 6:
         return f"{degree}: {words}."
     return f"{degree}: {words}; the tool cannot {_direction(left[:, len(values) - 1])}."

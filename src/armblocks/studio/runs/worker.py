@@ -198,8 +198,8 @@ class _Run:
                 case "control", "back":
                     self._go_back(history, self.count - 1)
                 case "rewind", _:
-                    sent = int(np.searchsorted(self.times, float(command["time"]), "right"))
-                    self._go_back(history, int(self.numbers[sent - 1]) if sent else 0)
+                    sample_count = int(np.searchsorted(self.times, float(command["time"]), "right"))
+                    self._go_back(history, int(self.numbers[sample_count - 1]) if sample_count else 0)
                 case "speed", _:
                     self.pace.speed = command["speed"]
                     self.pace.count_from(self.time)
@@ -227,9 +227,9 @@ class _Run:
         """Return to at most ``recorded`` samples; tuned values apply from there on."""
         history.return_to_sample(max(recorded, 1))
         self.count, self.time = history.recorded, history.run.time
-        sent = int(np.searchsorted(self.numbers, self.count, "right"))
-        self.times, self.numbers = self.times[:sent], self.numbers[:sent]
-        self._notify(run_messages.RunRewound(run=self.key, time=self.time, count=sent))
+        sample_count = int(np.searchsorted(self.numbers, self.count, "right"))
+        self.times, self.numbers = self.times[:sample_count], self.numbers[:sample_count]
+        self._notify(run_messages.RunRewound(run=self.key, time=self.time, count=sample_count))
         self._set_state("paused")
 
     def _return_to_shown_time(self, history: RunHistory) -> None:

@@ -24,13 +24,13 @@ def check(diagram: Diagram) -> tuple[list[Finding], dict[str, WireKind]]:
     if unconnected := list(open_inputs(levels)):
         # Shapes and loops can be checked only when every input has a driver.
         return [_open_input(ref.block, ref.port) for ref in unconnected], {}
-    known = [joined(path, name) for path, level in levels.items() for name in level.blocks]
+    block_paths = [joined(path, name) for path, level in levels.items() for name in level.blocks]
     try:
         wires = _wires(diagram)
         check_diagram(diagram)
         check_parameter_sets(diagram)
     except ArmblocksError as error:
-        return _findings(error, known, _origins(diagram)), {}
+        return _findings(error, block_paths, _origins(diagram)), {}
     return [], wires
 
 
@@ -53,13 +53,13 @@ def _wires(diagram: Diagram) -> dict[str, WireKind]:
         for name, outputs in shapes.items()
         for port, shape in outputs.items()
     }
-    named = {str(ref): kind for ref, kind in kinds.items()}
+    kinds_by_port = {str(ref): kind for ref, kind in kinds.items()}
     for port, content in form.contents.items():
         if isinstance(content, Bus):
-            named[str(port)] = WireKind(shape=[], unit="", bus=True)
+            kinds_by_port[str(port)] = WireKind(shape=[], unit="", bus=True)
         elif content in kinds:
-            named[str(port)] = kinds[content]
-    return named
+            kinds_by_port[str(port)] = kinds[content]
+    return kinds_by_port
 
 
 def _origins(diagram: Diagram) -> Mapping[str, str]:
@@ -81,6 +81,6 @@ def _findings(error: ArmblocksError, known: Collection[str], origins: Mapping[st
         blocks = [ref.rpartition("/")[0] for ref in error.loop]
     elif isinstance(error, DiagramError):
         blocks = _QUOTED.findall(f"{error.where} {error.what}")
-    shown = dict.fromkeys(origins.get(name, name) for name in blocks)
-    marked = [name for name in shown if name in known] or [""]
+    shown_blocks = dict.fromkeys(origins.get(name, name) for name in blocks)
+    marked = [name for name in shown_blocks if name in known] or [""]
     return [Finding(severity="error", block=name, port="", what=error.what, fix=error.fix) for name in marked]

@@ -43,19 +43,19 @@ def clipped(
     folder: Path | None = None,
 ) -> str:
     """Return some blocks of a sheet, the wires between them and some notes, as the text of a diagram file."""
-    chosen = {name: diagram.block(name) for name in names}
+    copied_blocks = {name: diagram.block(name) for name in names}
     part = Diagram(
         name=diagram.name,
-        blocks=chosen,
+        blocks=copied_blocks,
         connections=tuple(
             wire
             for wire in diagram.connections
-            if wire.source.block in chosen and wire.target.block in chosen
+            if wire.source.block in copied_blocks and wire.target.block in copied_blocks
         ),
-        layout={name: place for name, place in diagram.layout.items() if name in chosen},
+        layout={name: place for name, place in diagram.layout.items() if name in copied_blocks},
         bends=diagram.bends,
         notes={name: note for name, note in diagram.notes.items() if name in notes},
-        logged=tuple(ref for ref in diagram.logged if ref.block in chosen),
+        logged=tuple(ref for ref in diagram.logged if ref.block in copied_blocks),
         commented=diagram.commented,
         signal_names=diagram.signal_names,
         mask=diagram.mask,
@@ -136,6 +136,6 @@ def leaves_horizontally(wire: Connection, diagram: Diagram) -> bool:
 
 def _with_known_names(block: Block, diagram: Diagram) -> Block:
     """Replace the formulas of a block that contain undeclared names by their values."""
-    known = set(diagram.mask_values)
-    foreign = [name for name, text in block.formulas if not formula_names(text) <= known]
+    parameter_names = set(diagram.mask_values)
+    foreign = [name for name, text in block.formulas if not formula_names(text) <= parameter_names]
     return block.with_parameters(**{name: block.parameter_value(name) for name in foreign})

@@ -55,15 +55,15 @@ class DataRequests:
         return await asyncio.to_thread(self._files_with, suffixes)
 
     def _files_with(self, suffixes: tuple[str, ...]) -> list[data_messages.DataFile]:
-        found: list[data_messages.DataFile] = []
+        files: list[data_messages.DataFile] = []
         for path in self._folder.files(suffixes):
             try:
-                found.append(
+                files.append(
                     data_messages.DataFile(path=path, size=self._folder.path(path, suffixes).stat().st_size)
                 )
             except (ArmblocksError, OSError):  # a link that leads outside, or a file that was removed
                 continue
-        return found
+        return files
 
     async def _preview(
         self, _: StudioClient, request: data_messages.PreviewTable
@@ -124,10 +124,10 @@ class DataRequests:
             ]
         except FormatError as error:
             fault = Fault(what=error.what, where=error.where, allowed=error.allowed, fix=error.fix)
-        shown, hidden = _INVISIBLE.subn(lambda match: f"\\u{ord(match[0]):04x}", text)
+        visible_text, hidden = _INVISIBLE.subn(lambda match: f"\\u{ord(match[0]):04x}", text)
         digest = digest_of(source)
         return data_messages.FunctionSource(
-            text=shown,
+            text=visible_text,
             digest=digest,
             trusted=(self._data.shown(path), digest) in self._data.trusted,
             hidden=hidden,
@@ -137,15 +137,15 @@ class DataRequests:
 
     async def _trust(self, _: StudioClient, request: data_messages.TrustSource) -> None:
         path = self._folder.path(request.file, SOURCE_SUFFIXES)
-        shown = self._data.shown(path)
+        shown_path = self._data.shown(path)
         if request.trusted and digest_of(self._data.source(path)) != request.digest:
             raise InputError(
                 "the file has changed since it was shown",
-                where=shown,
+                where=shown_path,
                 allowed="the content that was shown",
                 fix="load it again, read it, and then trust it",
             )
-        self._data.trusted.set(shown, request.digest, trusted=request.trusted)
+        self._data.trusted.set(shown_path, request.digest, trusted=request.trusted)
         self._recheck()
 
 
@@ -162,6 +162,6 @@ def _has_content(path: Path, data: bytes) -> bool:
         return False
 
 
-def _with_relative_path(error: ArmblocksError, shown: str) -> FormatError:
+def _with_relative_path(error: ArmblocksError, shown_path: str) -> FormatError:
     """The error with the path in the project instead of the absolute path."""
-    return FormatError(error.what, where=shown, allowed=error.allowed, fix=error.fix)
+    return FormatError(error.what, where=shown_path, allowed=error.allowed, fix=error.fix)

@@ -33,9 +33,9 @@ class DiagramKind(FileKind[Diagram, Document]):
 
     def shipped(self, name: str) -> Diagram:
         """A shipped example."""
-        known = formats.list_examples()
-        if name not in known:
-            raise UnknownNameError("example", name, known)
+        example_names = formats.list_examples()
+        if name not in example_names:
+            raise UnknownNameError("example", name, example_names)
         return placed(formats.load_diagram(name, BLOCKS))
 
     def edited(self, value: Diagram, version: int = 0) -> Document:

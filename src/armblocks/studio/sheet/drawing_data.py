@@ -138,14 +138,14 @@ def _default(kind: type[Block]) -> Block:
 
 def _sheet_block(name: str, block: Block, diagram: Diagram) -> SheetBlock:
     place = diagram.layout[name]
-    shown = drawn_blocks(diagram)[name]
+    shown_block = drawn_blocks(diagram)[name]
     at_origin = dataclasses.replace(place, x=0.0, y=0.0)
     comment = cast("Literal['out', 'through', '']", diagram.commented.get(name, ""))
-    drawn = _drawn(shown, at_origin, sum_sides(diagram).get(name), comment)
+    drawn_block = _drawn(shown_block, at_origin, sum_sides(diagram).get(name), comment)
     changes: dict[str, Any] = {"name": name, "place": Place(**dataclasses.asdict(place))}
-    if shown is not block or _names_files(type(block)):
+    if shown_block is not block or _names_files(type(block)):
         changes["parameters"] = _parameters(block)  # equal tables may come from different files
-    return drawn.model_copy(update=changes)
+    return drawn_block.model_copy(update=changes)
 
 
 @lru_cache(maxsize=1024)
@@ -201,22 +201,22 @@ def _face(box: Box, comment: str = "") -> str:
 
 def _sheet_ports(box: Box, labels: tuple[str, ...], *, inputs: bool) -> list[SheetPort]:
     ports = box.block.input_ports() if inputs else box.block.output_ports()
-    drawn = {port.name: port for port in (box.inputs if inputs else box.outputs)}
-    shown = labels if len(labels) == len(ports) else ("",) * len(ports)
+    drawn_ports = {port.name: port for port in (box.inputs if inputs else box.outputs)}
+    shown_labels = labels if len(labels) == len(ports) else ("",) * len(ports)
     if face_size(box.block)[0] is Outline.CIRCLE:
-        shown = ("",) * len(ports)
+        shown_labels = ("",) * len(ports)
     return [
         SheetPort(
             name=port.name,
             doc=port.doc,
             label=label,
             unit=port.unit,
-            x=drawn[port.name].x,
-            y=drawn[port.name].y,
-            dx=drawn[port.name].dx,
-            dy=drawn[port.name].dy,
+            x=drawn_ports[port.name].x,
+            y=drawn_ports[port.name].y,
+            dx=drawn_ports[port.name].dx,
+            dy=drawn_ports[port.name].dy,
         )
-        for port, label in zip(ports, shown)
+        for port, label in zip(ports, shown_labels)
     ]
 
 

@@ -376,10 +376,10 @@ def _rename(edit: Rename, diagram: Diagram, _: EditContext) -> Diagram:
 def _name_signal(edit: NameSignal, diagram: Diagram, _: EditContext) -> Diagram:
     ref = _port(edit.port)
     _check_port(ref, diagram, output=True)
-    named = {other: name for other, name in diagram.signal_names.items() if other != ref}
+    other_names = {other: name for other, name in diagram.signal_names.items() if other != ref}
     if edit.name.strip():
-        named[ref] = edit.name.strip()
-    return dataclasses.replace(diagram, signal_names=named)
+        other_names[ref] = edit.name.strip()
+    return dataclasses.replace(diagram, signal_names=other_names)
 
 
 @EDITS.on(GroundPorts, lambda edit: "ground and terminate ports")
@@ -392,12 +392,12 @@ _COMMENTED = {"out": "comment out", "through": "comment through", "": "uncomment
 
 @EDITS.on(CommentBlocks, lambda edit: f"{_COMMENTED[edit.comment]} {_name_list(edit.blocks)}")
 def _comment(edit: CommentBlocks, diagram: Diagram, _: EditContext) -> Diagram:
-    chosen = {_checked_block(name, diagram) for name in edit.blocks}
-    commented = {name: comment for name, comment in diagram.commented.items() if name not in chosen}
+    block_names = {_checked_block(name, diagram) for name in edit.blocks}
+    commented = {name: comment for name, comment in diagram.commented.items() if name not in block_names}
     if edit.comment:
-        for name in sorted(chosen):
+        for name in sorted(block_names):
             check_comment(name, diagram.blocks[name], edit.comment)
-        commented |= dict.fromkeys(chosen, edit.comment)
+        commented |= dict.fromkeys(block_names, edit.comment)
     return dataclasses.replace(diagram, commented=commented)
 
 

@@ -34,8 +34,10 @@ def inside(diagram: Diagram, path: Sequence[str]) -> Diagram:
     for name in path:
         block = diagram.blocks.get(name)
         if not isinstance(block, DiagramBlock):
-            known = [key for key, other in diagram.blocks.items() if isinstance(other, DiagramBlock)]
-            raise UnknownNameError("subsystem", name, known, where=f"diagram '{diagram.name}'")
+            subsystem_names = [
+                key for key, other in diagram.blocks.items() if isinstance(other, DiagramBlock)
+            ]
+            raise UnknownNameError("subsystem", name, subsystem_names, where=f"diagram '{diagram.name}'")
         diagram = block.diagram
     return diagram
 
@@ -120,8 +122,8 @@ def with_robot(diagram: Diagram, robot: Robot) -> Diagram:
             if inner is not block.diagram:
                 changed[name] = dataclasses.replace(block, diagram=inner)
             continue
-        known = getattr(block, "robot", None)
-        if isinstance(known, Robot) and _same_file(known, robot) and known != robot:
+        present_robot = getattr(block, "robot", None)
+        if isinstance(present_robot, Robot) and _same_file(present_robot, robot) and present_robot != robot:
             with contextlib.suppress(ArmblocksError):
                 changed[name] = dataclasses.replace(block, robot=robot)  # pyright: ignore[reportCallIssue]
     for name, block in changed.items():

@@ -43,18 +43,18 @@ def find(diagram: Diagram, text: str) -> list[FoundBlock]:
             rank = max(rank, word_rank)
             matches += [match] if match else []
         if words and rank < _NO_MATCH:
-            found = FoundBlock(
+            result = FoundBlock(
                 inside=list(path), name=name, title=block.title, match=", ".join(dict.fromkeys(matches))
             )
-            ranked.append((rank, len(path), found))
+            ranked.append((rank, len(path), result))
     for bookmark in bookmarks_of(diagram) if words else ():
         rank = max(_name_rank(bookmark.name, word) for word in words)
         if rank < _NO_MATCH:
             part, inside = bookmark.part, bookmark.inside
-            found = FoundBlock(inside=inside, name=bookmark.name, title="", match="", part=part)
-            ranked.append((rank, len(inside), found))
+            result = FoundBlock(inside=inside, name=bookmark.name, title="", match="", part=part)
+            ranked.append((rank, len(inside), result))
     ranked.sort(key=lambda entry: entry[:2])
-    return [found for _, _, found in ranked[:MAX_RESULTS]]
+    return [result for _, _, result in ranked[:MAX_RESULTS]]
 
 
 _NO_MATCH = 9

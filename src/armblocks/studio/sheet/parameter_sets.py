@@ -89,8 +89,8 @@ def without_parameter(edit: RemoveSetParameter, diagram: Diagram, _context: obje
         for name, entries in diagram.parameter_sets.items()
     }
     if sets == diagram.parameter_sets:
-        known = sorted({path for entries in diagram.parameter_sets.values() for path in entries})
-        raise UnknownNameError("parameter of sets", edit.path, known, where=f"diagram '{diagram.name}'")
+        all_paths = sorted({path for entries in diagram.parameter_sets.values() for path in entries})
+        raise UnknownNameError("parameter of sets", edit.path, all_paths, where=f"diagram '{diagram.name}'")
     return dataclasses.replace(diagram, parameter_sets=sets)
 
 

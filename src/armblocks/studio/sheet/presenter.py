@@ -78,14 +78,14 @@ class DiagramPresenter(Presenter[OpenDocument]):
     def content(self, open_file: OpenDocument, place: Place) -> DiagramContent:
         """Return the sheet at a path."""
         diagram = open_file.document.diagram
-        shown, linked = inside(diagram, place), linked_part(diagram, place)
-        drawn = sheet(shown, self._lines.for_sheet(open_file.key, place).route(shown))
+        shown_sheet, linked = inside(diagram, place), linked_part(diagram, place)
+        drawn_sheet = sheet(shown_sheet, self._lines.for_sheet(open_file.key, place).route(shown_sheet))
         if linked:
             link = inside(diagram, linked).link
-            drawn = drawn.model_copy(update={"linked": list(linked), "link": link})
+            drawn_sheet = drawn_sheet.model_copy(update={"linked": list(linked), "link": link})
         return DiagramContent(
             inside=list(place),
-            sheet=drawn,
+            sheet=drawn_sheet,
             settings=dataclasses.asdict(diagram.settings),
             run=self._runs.run_key(open_file.key),
             outer_comment=outer_comment(diagram, place),

@@ -107,11 +107,11 @@ class SheetQueries:
         return setting_faults(self._sheet(request.document).settings, request.values)
 
     async def _typed_value(self, _: StudioClient, request: sheet_messages.TypedValue) -> Any:
-        known, scope = BLOCKS[request.type].parameters(), dict[str, Value]()
+        parameters, scope = BLOCKS[request.type].parameters(), dict[str, Value]()
         if request.document:
             level = self._sheet(request.document, request.inside)
-            known, scope = level.block(request.block).own_parameters(), dict(level.mask_values)
-        rules = {rule.name: rule for rule in known}
+            parameters, scope = level.block(request.block).own_parameters(), dict(level.mask_values)
+        rules = {rule.name: rule for rule in parameters}
         if request.parameter not in rules:
             raise UnknownNameError(f"parameter of {request.type}", request.parameter, rules)
         rule = rules[request.parameter]

@@ -28,8 +28,8 @@ def table_preview(file: ColumnFile, shown: str, time: str, columns: Sequence[str
     except ArmblocksError as error:
         fault = Fault(what=error.what, where=error.where, allowed=error.allowed, fix=error.fix)
     key = time or time_column(file)
-    chosen = list(table.names) if table is not None else list(columns)
-    known = {column.name: column for column in file.columns}
+    chosen_names = list(table.names) if table is not None else list(columns)
+    columns_by_name = {column.name: column for column in file.columns}
     times, curves, spacing = _curves(table)
     return TablePreview(
         columns=[
@@ -37,13 +37,23 @@ def table_preview(file: ColumnFile, shown: str, time: str, columns: Sequence[str
             for c in file.columns[:MAX_COLUMNS]
         ],
         time=key,
-        chosen=chosen,
-        rows=_rows([known[name] for name in [key, *chosen[:MAX_SHOWN_COLUMNS]] if name in known]),
+        chosen=chosen_names,
+        rows=_rows(
+            [
+                columns_by_name[name]
+                for name in [key, *chosen_names[:MAX_SHOWN_COLUMNS]]
+                if name in columns_by_name
+            ]
+        ),
         count=0 if table is None else table.shape[0],
         spacing=spacing,
         times=times,
         curves=curves,
-        notes=[*file.notes, *time_notes(file, key), *unit_notes(known[c] for c in chosen if c in known)],
+        notes=[
+            *file.notes,
+            *time_notes(file, key),
+            *unit_notes(columns_by_name[c] for c in chosen_names if c in columns_by_name),
+        ],
         fault=fault,
     )
 
@@ -68,11 +78,11 @@ def _curves(table: TimeTable | None) -> tuple[list[float], list[list[float]], tu
     rows = np.asarray(table)
     steps = np.diff(rows[:, 0])
     group = max(1, -(-2 * len(rows) // MAX_POINTS))
-    shown = rows[:, 1 : 1 + MAX_SHOWN_COLUMNS]
+    shown_rows = rows[:, 1 : 1 + MAX_SHOWN_COLUMNS]
     times: list[float] = []
-    curves: list[list[float]] = [[] for _ in range(shown.shape[1])]
+    curves: list[list[float]] = [[] for _ in range(shown_rows.shape[1])]
     for start in range(0, len(rows), group):
-        part = shown[start : start + group]
+        part = shown_rows[start : start + group]
         times += (
             [float(rows[start, 0])] if len(part) == 1 else rows[[start, start + len(part) - 1], 0].tolist()
         )

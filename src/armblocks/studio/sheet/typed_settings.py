@@ -20,10 +20,10 @@ def with_settings(options: SimulationOptions, values: Mapping[str, SettingValue]
 
     Raises ``UnknownNameError`` or ``InputError`` for a setting that a run does not allow.
     """
-    known = [field.name for field in dataclasses.fields(SimulationOptions)]
+    setting_names = [field.name for field in dataclasses.fields(SimulationOptions)]
     for name in values:
-        if name not in known:
-            raise UnknownNameError("setting", name, known)
+        if name not in setting_names:
+            raise UnknownNameError("setting", name, setting_names)
     parsed: dict[str, Any] = {name: _parsed(name, value) for name, value in values.items()}
     changed = dataclasses.replace(options, **parsed)
     check_options(changed, "the settings")
