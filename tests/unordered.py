@@ -17,6 +17,6 @@ def matched(actual: Any, expected: Any, tolerance: float = 1e-8) -> bool:
     left, right = (np.ravel(np.asarray(values, dtype=np.complex128)) for values in (actual, expected))
     if left.size != right.size:
         return False
-    apart = np.abs(left[:, None] - right[None, :])
-    rows, columns = linear_sum_assignment(apart)
-    return bool((apart[rows, columns] <= tolerance * np.maximum(1.0, np.abs(right[columns]))).all())
+    distances = np.abs(left[:, None] - right[None, :])
+    rows, columns = linear_sum_assignment(distances)
+    return bool((distances[rows, columns] <= tolerance * np.maximum(1.0, np.abs(right[columns]))).all())

@@ -88,10 +88,11 @@ def test_native_code_agrees_with_the_interpreter(diagram: Diagram) -> None:
     compiled = compile_system(system)
     times, p = np.linspace(0.0, 5.0, 101), system.parameter_values
     modes = np.random.default_rng(5).integers(0, 2, system.discrete.size).astype(float)
-    none = np.zeros((101, 0))
-    native = compiled.evaluate_signals(times, none, np.tile(modes, (101, 1)), none, p)
+    no_states = np.zeros((101, 0))
+    native = compiled.evaluate_signals(times, no_states, np.tile(modes, (101, 1)), no_states, p)
     interpreted = np.array([system.signals(t, (), modes, (), p)[0] for t in times]).T
-    # same operations; multiply-adds may be fused, and elementary functions differ by an ulp or two
+    # The operations are the same. Multiply-adds may be fused, and elementary functions differ by up to two
+    # units in the last place.
     assert native == pytest.approx(interpreted, rel=1e-11, abs=1e-12)
 
 

@@ -108,9 +108,9 @@ def test_integrals_are_exact_across_every_point_of_sources_and_curves(
     method: str, settings: dict[str, Any]
 ) -> None:
     builder = ab.DiagramBuilder("long", settings=ab.SimulationOptions(stop_time=4.0, sample_time=0.05))
-    course = builder.add("course", FromTable(times=X, values=np.column_stack([Y, 2 * Y]), method=method))
+    table = builder.add("course", FromTable(times=X, values=np.column_stack([Y, 2 * Y]), method=method))
     curve = LookupTable1D(positions=X, table=Y, method=method)
-    builder.add("sum", Integrator(initial=(0.0, 0.0)), course)
+    builder.add("sum", Integrator(initial=(0.0, 0.0)), table)
     builder.add("area", Integrator(), builder.add("curve", curve, builder.add("time", Clock())))
     result = ab.simulate(builder.build(), **settings)
     fine = np.unique(np.concatenate([X, result.time]))  # between these times the signal is linear or constant
@@ -147,12 +147,12 @@ def test_positions_of_a_long_table_are_checked_when_changed() -> None:
 def operations_of_large_tables(n: int) -> int:
     """Number of instructions of the signals of a diagram with two tables of n points and one of 100 x 100."""
     builder = ab.DiagramBuilder("large", settings=ab.SimulationOptions(stop_time=1.0))
-    course = builder.add("course", FromTable(times=np.linspace(0, 1, n), values=np.arange(n) / n))
+    table = builder.add("course", FromTable(times=np.linspace(0, 1, n), values=np.arange(n) / n))
     curve = LookupTable1D(positions=np.arange(n) / n, table=np.sin(np.arange(n) / n), zero_crossing=False)
-    builder.add("curve", curve, course)
+    builder.add("curve", curve, table)
     rows = np.linspace(0, 1, 100)
     surface = LookupTable2D(positions1=rows, positions2=rows, table=np.outer(rows, rows))
-    builder.add("surface", surface, course, course)
+    builder.add("surface", surface, table, table)
     return trace_diagram(builder.build()).signals.casadi_function().n_instructions()
 
 

@@ -137,8 +137,8 @@ def test_angle_and_axis_agree_with_scipy() -> None:
         recovered = evaluate(T2AngleAxis(), T)
         assert recovered["angle"] == pytest.approx(angle, abs=1e-15)
         assert recovered["axis"] == pytest.approx(unit, abs=1e-7 if angle < 1e-6 else 1e-14)
-    nothing = evaluate(T2AngleAxis(), np.eye(4))
-    assert (float(nothing["angle"]), nothing["axis"].tolist()) == (0.0, [0, 0, 0])
+    result = evaluate(T2AngleAxis(), np.eye(4))
+    assert (float(result["angle"]), result["axis"].tolist()) == (0.0, [0, 0, 0])
 
 
 def test_products_and_inverses_of_poses_are_those_of_matrices() -> None:

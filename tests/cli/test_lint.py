@@ -54,8 +54,8 @@ def test_findings_are_printed_in_the_order_of_lines_with_rule_remedy_and_code(
 
 def test_joints_that_move_no_mass_are_found(tmp_path: Path) -> None:
     file = tmp_path / "arm.urdf"
-    none = re.sub(r"<inertial>.*</inertial>", "", CLEAN)
-    file.write_text(none, encoding="utf-8")
+    without_inertia = re.sub(r"<inertial>.*</inertial>", "", CLEAN)
+    file.write_text(without_inertia, encoding="utf-8")
     (finding,) = lint_robot(file)
     assert finding.what == "no link that moves has a mass or an inertia: joint torques are zero"
     tail = """<link name="tip"/>

@@ -135,8 +135,8 @@ def test_a_kernel_with_several_outputs_and_matrices_agrees_with_numpy() -> None:
     inputs = signature(("t", ()), ("A", (2, 3)), ("none", (0,)))
     outputs = signature(("B", (3, 2)), ("s", ()), ("empty", (0,)), ("stack", (2, 1, 3)))
 
-    def equations(t: SX, A: SX, none: SX) -> list[SX]:
-        return [A.T * t, casadi.sum1(casadi.sum1(A).T), none, A + t]
+    def equations(t: SX, A: SX, empty: SX) -> list[SX]:
+        return [A.T * t, casadi.sum1(casadi.sum1(A).T), empty, A + t]
 
     kernel = compile_function(TracedFunction.trace("several", inputs, outputs, equations))
     A = np.arange(6.0).reshape(2, 3)

@@ -37,15 +37,17 @@ def test_only_a_product_that_is_used_once_without_rounding_is_fused() -> None:
     builder = TapeBuilder([4])
     a, b, c, d = (builder.input(0, index) for index in range(4))
     product = builder.add(Opcode.MULTIPLY, a, b)
-    once = builder.build([[builder.add(Opcode.SUBTRACT, c, product)]])
-    assert once.operations == (Operation(Opcode.FNMA, (0, 1, 2)),)
-    rounded = builder.build([[builder.add(Opcode.SUBTRACT, c, product)]], rounded=[product])
-    assert opcodes(rounded) == [Opcode.MULTIPLY, Opcode.SUBTRACT]
-    twice = builder.build([[builder.add(Opcode.ADD, product, c), builder.add(Opcode.SUBTRACT, product, d)]])
-    assert opcodes(twice) == [Opcode.MULTIPLY, Opcode.ADD, Opcode.SUBTRACT]
+    tape = builder.build([[builder.add(Opcode.SUBTRACT, c, product)]])
+    assert tape.operations == (Operation(Opcode.FNMA, (0, 1, 2)),)
+    rounded_tape = builder.build([[builder.add(Opcode.SUBTRACT, c, product)]], rounded=[product])
+    assert opcodes(rounded_tape) == [Opcode.MULTIPLY, Opcode.SUBTRACT]
+    shared_tape = builder.build(
+        [[builder.add(Opcode.ADD, product, c), builder.add(Opcode.SUBTRACT, product, d)]]
+    )
+    assert opcodes(shared_tape) == [Opcode.MULTIPLY, Opcode.ADD, Opcode.SUBTRACT]
     other = builder.add(Opcode.MULTIPLY, c, d)
-    both = builder.build([[builder.add(Opcode.SUBTRACT, product, other)]])
-    assert both.operations == (Operation(Opcode.MULTIPLY, (0, 1)), Operation(Opcode.FNMA, (2, 3, 4)))
+    two_products = builder.build([[builder.add(Opcode.SUBTRACT, product, other)]])
+    assert two_products.operations == (Operation(Opcode.MULTIPLY, (0, 1)), Operation(Opcode.FNMA, (2, 3, 4)))
 
 
 def test_common_subexpressions_are_evaluated_once_in_either_operand_order() -> None:
@@ -84,13 +86,13 @@ def test_simplification_does_not_change_the_bits(opcode: Opcode, x: float, c: fl
         actual = interpret(builder.build([[value, negated]]), [[x]])[0]
         a, b = (c, x) if left else (x, c)
         with np.errstate(all="ignore"):
-            plain = {
+            rounded_result = {
                 Opcode.ADD: np.add,
                 Opcode.SUBTRACT: np.subtract,
                 Opcode.MULTIPLY: np.multiply,
                 Opcode.DIVIDE: np.divide,
             }[opcode](a, b)
-        assert same_bits(actual, np.array([plain, -plain]))
+        assert same_bits(actual, np.array([rounded_result, -rounded_result]))
 
 
 def test_constants_are_folded() -> None:
@@ -134,9 +136,9 @@ def test_the_operation_count_of_a_tape_is_that_of_its_operations() -> None:
     )
     assert "multiply-adds" in str(count)
     assert "1 atan2" in str(count)
-    listed = count.multiplies + count.adds + count.fused_multiply_adds + count.divisions
-    listed += count.square_roots + count.comparisons + count.others + count.function_calls
-    assert listed == len(tape.operations)
+    total = count.multiplies + count.adds + count.fused_multiply_adds + count.divisions
+    total += count.square_roots + count.comparisons + count.others + count.function_calls
+    assert total == len(tape.operations)
     assert str(Tape((), (), (), ()).count) == "nothing"
 
 
@@ -145,12 +147,12 @@ def test_the_interpreter_rounds_a_multiply_add_only_once(numbers: tuple[float, f
     a, b, c = numbers
     with np.errstate(all="ignore"):
         actual = float(multiply_add(*(np.array([number]) for number in numbers))[0])
-        plain = float(np.float64(a) * b + c)
+        rounded_twice = float(np.float64(a) * b + c)
     if not all(map(math.isfinite, numbers)):
         # With an infinite addend the sum is the addend, even where the rounded product would overflow.
-        expected = c if math.isfinite(a) and math.isfinite(b) else plain
+        expected = c if math.isfinite(a) and math.isfinite(b) else rounded_twice
     elif (exact := Fraction(a) * Fraction(b) + Fraction(c)) == 0:
-        expected = plain if 0.0 in numbers else 0.0
+        expected = rounded_twice if 0.0 in numbers else 0.0
     else:
         try:
             expected = float(exact)
@@ -162,13 +164,15 @@ def test_the_interpreter_rounds_a_multiply_add_only_once(numbers: tuple[float, f
 
 def test_the_interpreter_broadcasts_inputs_and_checks_their_sizes() -> None:
     tape = tape_from(mixed())
-    many = interpret(tape, [np.ones((4, 3)), np.arange(3.0)])[0]
-    assert many.shape == (4, 11)
-    assert np.array_equal(many[2], interpret(tape, [np.ones(3), np.arange(3.0)])[0])
+    batch = interpret(tape, [np.ones((4, 3)), np.arange(3.0)])[0]
+    assert batch.shape == (4, 11)
+    assert np.array_equal(batch[2], interpret(tape, [np.ones(3), np.arange(3.0)])[0])
     with pytest.raises(InputError, match=r"inputs of sizes \(3, 2\).*sizes \(3, 3\) on the last axis"):
         interpret(tape, [np.ones(3), np.ones(2)])
-    plain = interpret(tape, [np.full(3, 1 / 3), np.full(3, 1 / 7)], fused=False)[0]
-    np.testing.assert_allclose(plain, interpret(tape, [np.full(3, 1 / 3), np.full(3, 1 / 7)])[0], rtol=1e-14)
+    unfused = interpret(tape, [np.full(3, 1 / 3), np.full(3, 1 / 7)], fused=False)[0]
+    np.testing.assert_allclose(
+        unfused, interpret(tape, [np.full(3, 1 / 3), np.full(3, 1 / 7)])[0], rtol=1e-14
+    )
 
 
 def test_the_absolute_value_of_copysign_ignores_the_sign() -> None:

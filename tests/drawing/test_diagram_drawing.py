@@ -105,8 +105,10 @@ def diagram(request: pytest.FixtureRequest) -> Diagram:
 
 def test_blocks_do_not_overlap(diagram: Diagram) -> None:
     for a, b in itertools.combinations(boxes(diagram).values(), 2):
-        apart = a.x + a.width <= b.x or b.x + b.width <= a.x or a.y + a.height <= b.y or b.y + b.height <= a.y
-        assert apart, (a.name, b.name)
+        disjoint = (
+            a.x + a.width <= b.x or b.x + b.width <= a.x or a.y + a.height <= b.y or b.y + b.height <= a.y
+        )
+        assert disjoint, (a.name, b.name)
 
 
 def test_the_connections_can_be_read_from_the_drawing(diagram: Diagram) -> None:
@@ -280,20 +282,20 @@ def test_ports_of_every_rotated_block_are_on_its_edges(rotation: int, flipped: b
         upright = box_at_placement("b", block, Placement(x=30, y=40, flipped=flipped))
         box = box_at_placement("b", block, Placement(x=30, y=40, flipped=flipped, rotation=rotation))
         assert block_marks(box)
-        for was, spot, way in (
-            *((was, spot, -1) for was, spot in zip(upright.inputs, box.inputs)),
-            *((was, spot, 1) for was, spot in zip(upright.outputs, box.outputs)),
+        for upright_port, port, direction in (
+            *((upright_port, port, -1) for upright_port, port in zip(upright.inputs, box.inputs)),
+            *((upright_port, port, 1) for upright_port, port in zip(upright.outputs, box.outputs)),
         ):
-            dx, dy = was.dx, was.dy
+            dx, dy = upright_port.dx, upright_port.dy
             for _ in range(rotation // 90):
                 dx, dy = -dy, dx
-            assert (spot.dx, spot.dy) == (dx, dy)
+            assert (port.dx, port.dy) == (dx, dy)
             edge = {
-                (-1, 0): spot.x - box.x,
-                (1, 0): box.x + box.width - spot.x,
-                (0, -1): spot.y - box.y,
-                (0, 1): box.y + box.height - spot.y,
-            }[way * dx, way * dy]
+                (-1, 0): port.x - box.x,
+                (1, 0): box.x + box.width - port.x,
+                (0, -1): port.y - box.y,
+                (0, 1): box.y + box.height - port.y,
+            }[direction * dx, direction * dy]
             assert abs(edge) < 1e-9
 
 

@@ -128,7 +128,7 @@ def _check_blocks(line: Sequence[Point], drawing: Drawing) -> None:
     outwards."""
     segments = list(pairwise(line))
     for name, port in _nearby(line, drawing.ports).items():
-        here = (port.x, port.y)
+        position = (port.x, port.y)
         for k, (a, b) in enumerate(segments):
             if (k == 0 and _is_at(port, a) and port.is_output) or (
                 k == len(segments) - 1 and _is_at(port, b) and not port.is_output
@@ -137,7 +137,7 @@ def _check_blocks(line: Sequence[Point], drawing: Drawing) -> None:
                 along = (other[0] - port.x) * port.out[0] + (other[1] - port.y) * port.out[1]
                 if along < NEAR:
                     raise AmbiguousError(f"a line does not leave {name} outwards: {line}")
-            elif _gap((a, b), (here, here)) < NEAR:
+            elif _gap((a, b), (position, position)) < NEAR:
                 raise AmbiguousError(f"a line touches {name}: {line}")
     hull = [(f(p[0] for p in line), f(p[1] for p in line)) for f in (min, max)]
     for name, block in drawing.blocks.items():
@@ -278,7 +278,7 @@ class _Groups:
 
     def members(self) -> list[list[str]]:
         """The groups."""
-        found: dict[str, list[str]] = {}
+        drawn_wires: dict[str, list[str]] = {}
         for name in self._leader:
-            found.setdefault(self._find(name), []).append(name)
-        return list(found.values())
+            drawn_wires.setdefault(self._find(name), []).append(name)
+        return list(drawn_wires.values())

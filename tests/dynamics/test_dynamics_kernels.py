@@ -24,12 +24,12 @@ def test_a_kernel_agrees_with_the_traced_function(robot: Robot, name: str, monke
     kernel = compile_function(traced)
     random = np.random.default_rng(0)
     batch = [random.uniform(-2, 2, (BATCH, *slot.shape)) for slot in traced.inputs]
-    together = np.asarray(kernel(*batch))
+    batch_result = np.asarray(kernel(*batch))
     for k in range(BATCH):
         sample = [values[k] for values in batch]
         expected = evaluate(robot, name, *sample)
         # Other sin, cos and fused sums: a few rounding errors of the largest entry, times the condition of M.
         tolerance = 1e-9 if name.startswith("accel") else 1e-12
         size = max(1.0, float(np.abs(expected).max()))
-        assert_allclose(together[k], expected, rtol=0, atol=tolerance * size)
-        assert_array_equal(np.asarray(kernel(*sample)), together[k])
+        assert_allclose(batch_result[k], expected, rtol=0, atol=tolerance * size)
+        assert_array_equal(np.asarray(kernel(*sample)), batch_result[k])

@@ -175,11 +175,11 @@ def test_payload_equals_a_fixed_link_of_the_same_mass_at_the_tool(robot: Robot):
 
 def test_loaded_functions_without_load_equal_the_unloaded_ones(robot: Robot):
     for q, qd, tau in random_states(robot, 2):
-        nothing = (np.zeros(6), np.zeros(10))
+        no_load = (np.zeros(6), np.zeros(10))
         check_close(
-            evaluate(robot, "rne_loaded", q, qd, tau, *nothing), evaluate(robot, "rne", q, qd, tau), 1e-11
+            evaluate(robot, "rne_loaded", q, qd, tau, *no_load), evaluate(robot, "rne", q, qd, tau), 1e-11
         )
         expected = evaluate(robot, "accel", q, qd, tau)
         condition = np.linalg.cond(evaluate(robot, "inertia", q))
         tolerance = max(1e-10, 1e3 * condition * np.finfo(float).eps)
-        check_close(evaluate(robot, "accel_loaded", q, qd, tau, *nothing), expected, tolerance)
+        check_close(evaluate(robot, "accel_loaded", q, qd, tau, *no_load), expected, tolerance)

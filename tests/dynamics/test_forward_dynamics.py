@@ -80,9 +80,9 @@ def test_a_joint_without_inertia_is_refused_with_its_name(links: tuple[Link, ...
 def test_motor_inertia_or_payload_is_sufficient_for_forward_dynamics():
     driven = Robot(name="driven", links=(Link(name="l", motor=Motor(inertia=1e-3, gear_ratio=10)),))
     assert evaluate(driven, "accel", [0], [0], [1.0]) == pytest.approx([10.0])
-    bare = Robot(name="bare", links=(Link(name="l", joint=Revolute()),), tool=transl(1.0, 0.0, 0.0))
+    massless = Robot(name="bare", links=(Link(name="l", joint=Revolute()),), tool=transl(1.0, 0.0, 0.0))
     payload = (2.0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
-    accel = evaluate(bare, "accel_loaded", [0], [0], [1.0], np.zeros(6), payload)
+    accel = evaluate(massless, "accel_loaded", [0], [0], [1.0], np.zeros(6), payload)
     assert accel == pytest.approx([0.5])
     fixed_tool = Robot(
         name="fixed tool",
@@ -93,9 +93,9 @@ def test_motor_inertia_or_payload_is_sufficient_for_forward_dynamics():
 
 
 def test_a_robot_without_mass_has_no_centre_of_mass():
-    bare = Robot(name="bare", links=(Link(name="l"),))
+    massless = Robot(name="bare", links=(Link(name="l"),))
     with pytest.raises(RobotError, match="robot 'bare': no link has a mass, so there is no centre of mass"):
-        TRACES["centre_of_mass"](bare)
+        TRACES["centre_of_mass"](massless)
 
 
 @pytest.mark.parametrize("name", TRACES)

@@ -113,7 +113,7 @@ def test_linear_solutions_are_kept_when_constants_are_folded() -> None:
     results = casadi.vertcat(casadi.sin(x[0]) * u, x, casadi.cos(u), casadi.vec(casadi.jacobian(x, b)))
     function = casadi.Function("f", [A, b, u], [results])
     numbers = ([2.0, 1.0, 0.5, 3.0], [1.0, 0.7], 0.3)
-    (mixed,) = call_with_constants(function, [SX(numbers[0]), casadi.vertcat(1.0, b[1]), SX(numbers[2])])
-    assert casadi.Function("g", [b], [mixed])(numbers[1]).full() == pytest.approx(
+    (value,) = call_with_constants(function, [SX(numbers[0]), casadi.vertcat(1.0, b[1]), SX(numbers[2])])
+    assert casadi.Function("g", [b], [value])(numbers[1]).full() == pytest.approx(
         function(*numbers).full(), rel=1e-14
     )

@@ -28,8 +28,8 @@ class RandomModel:
         self.random = np.random.default_rng(seed)
         self.settings = SETTINGS[seed % len(SETTINGS)]
         self.in_radian = "radian" in self.settings
-        given = ["", 'limited="true"', 'limited="false"']
-        self.limited = given[1:] if "autolimits" in self.settings else given
+        attribute_texts = ["", 'limited="true"', 'limited="false"']
+        self.limited = attribute_texts[1:] if "autolimits" in self.settings else attribute_texts
         self.bodies = bodies
         self.joints = 0
 

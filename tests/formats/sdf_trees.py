@@ -75,11 +75,11 @@ class Conversion:
         self.base = self.pose()
         parts = [f'<model name="robot">{self.text(np.eye(4), self.base)}']
         for name, link in links.items():
-            here = at[name] @ self.offsets[name]
-            parts.append(f'<link name="{name}">{self.placed(here)}{self.inertial(link, name)}</link>')
-            self.known[name] = here
-            turned = here @ self.pose()
-            parts.append(f'<frame name="f_{name}" attached_to="{name}">{self.text(here, turned)}</frame>')
+            point = at[name] @ self.offsets[name]
+            parts.append(f'<link name="{name}">{self.placed(point)}{self.inertial(link, name)}</link>')
+            self.known[name] = point
+            turned = point @ self.pose()
+            parts.append(f'<frame name="f_{name}" attached_to="{name}">{self.text(point, turned)}</frame>')
             self.known[f"f_{name}"] = turned
         (first,) = (name for name in links if name not in joints)
         parts.append(
@@ -110,12 +110,12 @@ class Conversion:
         return self.text(self.known[name], pose, "" if name == default else f' relative_to="{name}"')
 
     def inertial(self, link: ElementTree.Element, name: str) -> str:
-        found = link.find("inertial")
+        inertial = link.find("inertial")
         mass, moment, centre = 0.0, np.zeros((3, 3)), np.eye(4)
-        if found is not None:
-            mass, centre = float(found.find("mass").get("value")), _origin(found)  # pyright: ignore
+        if inertial is not None:
+            mass, centre = float(inertial.find("mass").get("value")), _origin(inertial)  # pyright: ignore
             for key, (i, j) in MOMENTS.items():
-                moment[i, j] = moment[j, i] = float(found.find("inertia").get(key))  # pyright: ignore
+                moment[i, j] = moment[j, i] = float(inertial.find("inertia").get(key))  # pyright: ignore
         turn = rpy(self.random.uniform(-1, 1, 3))
         moment = turn.T @ moment @ turn
         entries = "".join(f"<{key}>{float(moment[i])!r}</{key}>" for key, i in MOMENTS.items())
@@ -127,20 +127,20 @@ class Conversion:
         parent, child = (joint.find(end).get("link") for end in ("parent", "child"))  # pyright: ignore
         axis = _vector(joint.find("axis"), "xyz", "1 0 0")
         axis /= np.linalg.norm(axis)
-        here = at[child] @ transform(rpy(self.random.uniform(-1, 1, 3)), axis * self.random.normal())
+        pose = at[child] @ transform(rpy(self.random.uniform(-1, 1, 3)), axis * self.random.normal())
         axis = at[child][:3, :3] @ axis  # in the model
         if self.random.random() < 0.3:
             parent, child, axis = child, parent, -axis
         child = f"f_{child}" if self.random.random() < 0.3 else child
         text = f'<joint name="{name}" type="{kind}"><parent>{parent}</parent><child>{child}</child>'
-        text += self.placed(here, default=child)
-        self.known[name] = here
+        text += self.placed(pose, default=child)
+        self.known[name] = pose
         if kind != "fixed":
             frame = str(self.random.choice(list(self.known)))
             expressed = "" if frame == name else f' expressed_in="{frame}"'
             limit, dynamics = joint.find("limit"), joint.find("dynamics")
-            given = self.known[frame][:3, :3].T @ axis
-            text += f"<axis><xyz{expressed}>{numbers(given)}</xyz><limit>"
+            given_axis = self.known[frame][:3, :3].T @ axis
+            text += f"<axis><xyz{expressed}>{numbers(given_axis)}</xyz><limit>"
             text += "".join(f"<{key}>{value}</{key}>" for key, value in limit.attrib.items())  # pyright: ignore
             text += "</limit>"
             if dynamics is not None:

@@ -478,8 +478,21 @@ def test_a_mutated_document_is_read_or_refused_with_a_package_error(data: st.Dat
             if isinstance(node[key], dict | list) and data.draw(st.booleans()):
                 node = node[key]
                 continue
-            junk = [None, True, -1, 1e300, "", "x", [], {}, [1, [2]], "inf", "a/b -> c/d", {"robot": []}]
-            node[key] = data.draw(st.sampled_from(junk))
+            invalid_values = [
+                None,
+                True,
+                -1,
+                1e300,
+                "",
+                "x",
+                [],
+                {},
+                [1, [2]],
+                "inf",
+                "a/b -> c/d",
+                {"robot": []},
+            ]
+            node[key] = data.draw(st.sampled_from(invalid_values))
             break
     try:
         read(json.dumps(document).encode())

@@ -37,13 +37,13 @@ def robot(text: str, **options: FrictionModel) -> Robot:
 # -- the paper ---------------------------------------------------------------------------------------------
 
 
-def with_table_1(bare: Robot) -> Robot:
+def with_table_1(robot: Robot) -> Robot:
     """The joint ranges and speeds of Table 1 of the paper, which its script does not contain."""
     table = [(-185, 185, 105), (-39, 90, 105), (-71, 109, 95), (-270, 270, 300)]
-    for link, (low, high, speed) in zip(bare.links, table, strict=True):
+    for link, (low, high, speed) in zip(robot.links, table, strict=True):
         limits = JointLimits(position=(math.radians(low), math.radians(high)), speed=math.radians(speed))
-        bare = bare.with_link(link.name, joint=replace(link.joint, limits=limits))
-    return bare
+        robot = robot.with_link(link.name, joint=replace(link.joint, limits=limits))
+    return robot
 
 
 def without_limits(full: Robot) -> Robot:

@@ -154,18 +154,20 @@ def test_meshes_are_drawn_and_missing_ones_are_named(workspace: Path) -> None:
         robot = read_urdf(text.encode(), "r.urdf", context)
         return robot, [finding.what for finding in context.findings]
 
-    robot, found = read("package://arm_description/meshes/a.stl")
-    assert found == []
+    robot, findings = read("package://arm_description/meshes/a.stl")
+    assert findings == []
     (body,) = (body for body in robot_bodies(robot) if body.row == 1)
     assert body.mesh.corners[..., 2].min() == pytest.approx(1.0)
     assert body.mesh.corners[..., 2].max() == pytest.approx(1.001)
-    _, found = read("package://other/meshes/a.stl")
-    assert found == ["the mesh 'package://other/meshes/a.stl' is not shown: the package 'other' is not found"]
+    _, findings = read("package://other/meshes/a.stl")
+    assert findings == [
+        "the mesh 'package://other/meshes/a.stl' is not shown: the package 'other' is not found"
+    ]
     (workspace / "arm_description" / "meshes" / "a.stl").write_bytes(b"")
-    _, found = read("package://arm_description/meshes/a.stl")
-    assert found[0].endswith("is not shown: this is not an STL mesh")
-    _, found = read("a.stl", scale="1 1 1 1")
-    assert found == ["it is not shown: the attribute 'scale' has 4 values: '1 1 1 1'"]
+    _, findings = read("package://arm_description/meshes/a.stl")
+    assert findings[0].endswith("is not shown: this is not an STL mesh")
+    _, findings = read("a.stl", scale="1 1 1 1")
+    assert findings == ["it is not shown: the attribute 'scale' has 4 values: '1 1 1 1'"]
 
 
 def test_pipes_are_not_opened(tmp_path: Path) -> None:

@@ -47,8 +47,8 @@ def test_kinematics_and_dynamics_are_those_of_the_robot(robot: Robot) -> None:
     assert_allclose(again.qlim, robot.qlim[order])
     assert_allclose(again.speed_limits, robot.speed_limits[order])
     assert_allclose(again.torque_limits, robot.torque_limits[order])
-    ours = dataclasses.replace(robot, gravity=(0.0, 0.0, -9.81)).nofriction()
-    theirs = again.nofriction()
+    original = dataclasses.replace(robot, gravity=(0.0, 0.0, -9.81)).nofriction()
+    reread = again.nofriction()
     for state in random_states(robot, count=2):
         q, qd, qdd = state
         other = [values[order] for values in state]
@@ -57,10 +57,10 @@ def test_kinematics_and_dynamics_are_those_of_the_robot(robot: Robot) -> None:
             scale = max(1.0, float(np.abs(expected).max(initial=0.0)))
             assert_allclose(actual, expected, rtol=0, atol=1e-12 * scale)
 
-        close(evaluate(theirs, "fkine", other[0]), evaluate(ours, "fkine", q))
-        close(evaluate(theirs, "jacob0", other[0]), evaluate(ours, "jacob0", q)[:, order])
-        close(evaluate(theirs, "inertia", other[0]), evaluate(ours, "inertia", q)[np.ix_(order, order)])
-        close(evaluate(theirs, "rne", *other), evaluate(ours, "rne", q, qd, qdd)[order])
+        close(evaluate(reread, "fkine", other[0]), evaluate(original, "fkine", q))
+        close(evaluate(reread, "jacob0", other[0]), evaluate(original, "jacob0", q)[:, order])
+        close(evaluate(reread, "inertia", other[0]), evaluate(original, "inertia", q)[np.ix_(order, order)])
+        close(evaluate(reread, "rne", *other), evaluate(original, "rne", q, qd, qdd)[order])
 
 
 @pytest.mark.parametrize("robot", RANDOM_ROBOTS, ids=lambda robot: robot.name)

@@ -102,7 +102,7 @@ class Oracle:
         self.state = q, qd, qdd
         self.n = len(names)
         zero = np.zeros(3)
-        none = np.zeros((3, self.n))
+        zeros = np.zeros((3, self.n))
         joints = {self._link(joint, "child"): joint for joint in self.root.findall("joint")}
         self.joints = joints
         self.links: dict[str, Moving] = {}
@@ -110,7 +110,7 @@ class Oracle:
         while len(self.links) < len(elements):
             for name in elements:
                 if name not in joints:
-                    self.links[name] = Moving(np.eye(3), zero, zero, zero, zero, zero, none, none)
+                    self.links[name] = Moving(np.eye(3), zero, zero, zero, zero, zero, zeros, zeros)
                 elif name not in self.links and self._link(joints[name], "parent") in self.links:
                     self.links[name] = self._moved(self.links[self._link(joints[name], "parent")], name)
         self.elements = elements

@@ -331,8 +331,8 @@ def arrays(draw: random.Random, kind: str, depth: int) -> str:
         return {"n": number, "v": row, "m": f"[1 2 {number};{row};0 1 -1]"}[kind]
     a, b = arrays(draw, kind, depth - 1), arrays(draw, kind, depth - 1)
     n, m = arrays(draw, "n", depth - 1), arrays(draw, "m", depth - 1)
-    same = [f"({a}) {draw.choice(['+', '-', '.*'])} {b}", f"({n}) * ({a})", f"-({a})", f"({a}) + {n}"]
-    same += [f"max({a}, {b})", f"({a}) < ({b})", f"~({a})", f"mod({a}, 3)", f"if({a}, {a}, {b})"]
+    same_shape = [f"({a}) {draw.choice(['+', '-', '.*'])} {b}", f"({n}) * ({a})", f"-({a})", f"({a}) + {n}"]
+    same_shape += [f"max({a}, {b})", f"({a}) < ({b})", f"~({a})", f"mod({a}, 3)", f"if({a}, {a}, {b})"]
     v = arrays(draw, "v", depth - 1)
     own = {
         "n": [f"sum({v})", f"({v})(2)", f"({m})(2, 3)", f"norm({v})", f"dot({v}, {v})", f"numel({m})"],
@@ -345,7 +345,7 @@ def arrays(draw: random.Random, kind: str, depth: int) -> str:
         "m": [f"({m})^2", f"({m}).^2'"],
     }
     own += choices[kind]
-    return draw.choice([*same, *own, *own])
+    return draw.choice([*same_shape, *own, *own])
 
 
 def test_arrays_of_numbers_and_of_symbols_agree() -> None:

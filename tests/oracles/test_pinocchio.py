@@ -60,8 +60,8 @@ def test_agrees_with_pinocchio(robot: Robot):
 
     for q, qd, qdd in random_states(robot):
         state = [np.empty(robot.n) for _ in range(3)]
-        for ours, theirs in zip((q, qd, qdd), state):
-            theirs[indices] = ours
+        for argument, other_argument in zip((q, qd, qdd), state):
+            other_argument[indices] = argument
         close(evaluate(smooth, "rne", q, qd, qdd), pin.rnea(model, data, *state)[indices])
         M = np.array(pin.crba(model, data, state[0]))
         close(evaluate(robot, "inertia", q), M[np.ix_(indices, indices)])

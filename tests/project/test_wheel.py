@@ -79,12 +79,12 @@ def test_the_reference_has_every_public_name(wheel: Path) -> None:
     described = {line.split()[0] for line in lines if " py:" in line}
     missing: list[str] = []
     for name in ab.__all__:
-        thing = getattr(ab, name)
-        if inspect.ismodule(thing):
+        public = getattr(ab, name)
+        if inspect.ismodule(public):
             continue  # each block has a page; errors are below
         required = [f"armblocks.{name}"]
-        if inspect.isclass(thing) and not issubclass(thing, Enum):
-            required += [f"armblocks.{name}.{member}" for member in public_members(thing)]
+        if inspect.isclass(public) and not issubclass(public, Enum):
+            required += [f"armblocks.{name}.{member}" for member in public_members(public)]
         missing += [path for path in required if path not in described]
     for name, kind in inspect.getmembers_static(ab.errors, inspect.isclass):
         if issubclass(kind, ValueError | Warning) and f"armblocks.errors.{name}" not in described:

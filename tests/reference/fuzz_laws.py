@@ -377,11 +377,11 @@ def rows_beyond(actual: np.ndarray, expected: np.ndarray, tolerance: float) -> n
 
 def converges(case: Case) -> Iterator[str]:
     """A run at the default tolerances is close to one at tight tolerances, except at shifted event times."""
-    loose = case.signals(case.diagram, rtol=1e-6, atol=1e-9)
+    loose_run = case.signals(case.diagram, rtol=1e-6, atol=1e-9)
     for name, values in case.run.items():
-        deviating = rows_beyond(loose[name], values, 2e-3)
+        deviating = rows_beyond(loose_run[name], values, 2e-3)
         if deviating.sum() > max(2, len(deviating) // 10):
-            expect_well_posed(case, loose)
+            expect_well_posed(case, loose_run)
             row = int(np.argmax(deviating))
             yield f"'{name}' differs in {deviating.sum()} rows between tolerances, first at row {row}"
 

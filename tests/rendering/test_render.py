@@ -25,10 +25,10 @@ def camera() -> Camera:
 def test_framed_points_fill_the_panel_up_to_its_margin() -> None:
     points = np.random.default_rng(5).normal(size=(100, 3))
     view = Camera.framing(points, 300, 200, margin=12)
-    x, y, nearness = view.project(points)
+    x, y, inverse_depth = view.project(points)
     assert x.min() >= 12 - 1e-9 and x.max() <= 288 + 1e-9 and y.min() >= 12 - 1e-9 and y.max() <= 188 + 1e-9
     assert np.ptp(x) == pytest.approx(276) or np.ptp(y) == pytest.approx(176)
-    assert (nearness > 0).all()
+    assert (inverse_depth > 0).all()
 
 
 def test_the_z_axis_points_up_in_the_picture() -> None:
@@ -39,8 +39,8 @@ def test_the_z_axis_points_up_in_the_picture() -> None:
 def test_a_ball_covers_a_disc() -> None:
     view = camera()
     ball = render([triangles(Sphere(radius=0.5))], view, WIDTH, HEIGHT, 2.0)
-    x, _, nearness = view.project(np.array([(0.0, 0.0, 0.0)]))
-    radius = 0.5 * view.scale * float(nearness[0]) * 2.0
+    x, _, inverse_depth = view.project(np.array([(0.0, 0.0, 0.0)]))
+    radius = 0.5 * view.scale * float(inverse_depth[0]) * 2.0
     covered = float((ball.pixels[..., 3] / 255).sum())
     # The facets of the outline reduce the area by 1 %; perspective adds less.
     assert covered == pytest.approx(math.pi * radius**2, rel=0.03)
@@ -56,8 +56,8 @@ def test_the_nearer_body_hides_the_farther_one() -> None:
         picture = render(order, view, WIDTH, HEIGHT, 1.0)
         middle = picture.pixels[100 - picture.top, 100 - picture.left].astype(int)
         assert middle[0] > middle[2] + 60  # orange, not graphite
-        assert picture.nearness_at(np.array([100.0]), np.array([100.0]))[0] > 0
-        assert picture.nearness_at(np.array([1.0, -50.0]), np.array([1.0, 1e4])).tolist() == [0.0, 0.0]
+        assert picture.inverse_depth_at(np.array([100.0]), np.array([100.0]))[0] > 0
+        assert picture.inverse_depth_at(np.array([1.0, -50.0]), np.array([1.0, 1e4])).tolist() == [0.0, 0.0]
 
 
 def test_rendering_is_repeatable() -> None:

@@ -217,13 +217,13 @@ def test_a_run_of_one_instant_has_a_report(tmp_path: Path) -> None:
 
 
 def test_an_exceeded_limit_is_described_and_highlighted(tmp_path: Path, puma560: Robot) -> None:
-    tight = puma560.with_link(
+    limited_robot = puma560.with_link(
         "link1", joint=dataclasses.replace(puma560.links[0].joint, limits=JointLimits(position=(-0.1, 0.2)))
     )
     builder = DiagramBuilder("tight", settings=SimulationOptions(stop_time=1.0, sample_time=0.02))
     plan = builder.add("plan", JTraj(q0=(0.0,) * 6, qf=(0.5,) * 6, tmax=1.0))
-    builder.add("plot", RobotPlot(robot=tight), plan["q"])
-    builder.add("rne", Rne(robot=tight), plan["q"], plan["qd"], plan["qdd"])
+    builder.add("plot", RobotPlot(robot=limited_robot), plan["q"])
+    builder.add("rne", Rne(robot=limited_robot), plan["q"], plan["qd"], plan["qdd"])
     diagram = builder.build()
     with pytest.warns(LimitWarning, match="joint 'link1' leaves its range"):
         result = ab.simulate(diagram)

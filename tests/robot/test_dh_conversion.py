@@ -83,8 +83,8 @@ def test_the_same_rows_in_the_other_convention_are_another_arm() -> None:
 def test_robots_that_are_not_a_chain_of_dh_rows_are_refused() -> None:
     robot = load_robot("puma560")
     tree = replace(robot, links=(*robot.links, standard_dh("finger", parent="link2")))
-    loose = replace(robot, links=(*robot.links, Link(name="plate", parent=robot.links[-1].name)))
-    for other in (tree, loose):
+    branched = replace(robot, links=(*robot.links, Link(name="plate", parent=robot.links[-1].name)))
+    for other in (tree, branched):
         with pytest.raises(RobotError, match="not a single chain of D-H rows"):
             converted(other, MODIFIED)
     first = reread(robot, MODIFIED).links[0]

@@ -340,9 +340,11 @@ def test_fields_of_structures_are_read_by_their_offsets() -> None:
         with r.when(numbers.value.is_null):
             numbers.value = structure.pointer(0)
         second = numbers.value.after(8)
-        same = second == numbers.value.reals.after(1).start
-        choice = select(same & (numbers.value <= second), numbers.value, r.null)
-        out[3] = (same & (choice != second) & ~choice.is_null).count() + structure.integers.after(1)[0]
+        same_address = second == numbers.value.reals.after(1).start
+        choice = select(same_address & (numbers.value <= second), numbers.value, r.null)
+        out[3] = (same_address & (choice != second) & ~choice.is_null).count() + structure.integers.after(1)[
+            0
+        ]
         total = r.real(0.0)
         for i in r.range(0, room[1]):
             total.value = total.value + choice.reals[i]

@@ -174,10 +174,10 @@ def test_the_times_of_a_million_ticks_have_no_accumulated_rounding_error() -> No
     ],
 )
 def test_common_ticks_of_two_clocks_coincide_despite_rounding(
-    clocks: list[tuple[float, float]], stop: float, together: int
+    clocks: list[tuple[float, float]], stop: float, common_ticks: int
 ) -> None:
     result = run(tick_recorder(clocks), stop, stop)
-    assert result["all/count"][-1] == together
+    assert result["all/count"][-1] == common_ticks
     for k, (period, offset) in enumerate(clocks):
         count = np.floor((stop - offset) / period + 1e-9) + 1
         assert result[f"clock{k}/count"][-1] == count

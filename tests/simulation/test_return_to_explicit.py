@@ -78,9 +78,12 @@ def test_an_interrupted_run_returns_at_the_same_step(cuts: list[float], tmp_path
         state = RunState.load(tmp_path / "state")
     rest = run("auto", STOP, state)
     assert "exactly as the previous run" in rest.run.reason
-    same = np.isin(whole.time, rest.time)
-    assert same.sum() > 50
-    assert rest.signals[:, np.isin(rest.time, whole.time)].tobytes() == whole.signals[:, same].tobytes()
+    common_samples = np.isin(whole.time, rest.time)
+    assert common_samples.sum() > 50
+    assert (
+        rest.signals[:, np.isin(rest.time, whole.time)].tobytes()
+        == whole.signals[:, common_samples].tobytes()
+    )
 
 
 def test_a_repeatedly_stiff_system_changes_the_method_only_a_few_times() -> None:

@@ -74,10 +74,10 @@ def test_an_interrupted_run_equals_an_uninterrupted_one_bit_for_bit(
         rest = simulate(system, options(4.0), initial_state=state)
         assert "exactly as the previous run" in rest.run.reason
         assert rest.time[0] == cuts[-1]
-        same = np.isin(rest.time, whole.time)
-        assert same.sum() >= 14
+        common_samples = np.isin(rest.time, whole.time)
+        assert common_samples.sum() >= 14
         later = np.isin(whole.time, rest.time)
-        assert rest.signals[:, same].tobytes() == whole.signals[:, later].tobytes()
+        assert rest.signals[:, common_samples].tobytes() == whole.signals[:, later].tobytes()
         assert rest.final_state is not None and whole.final_state is not None
         assert rest.final_state.states.tobytes() == whole.final_state.states.tobytes()
 

@@ -250,9 +250,9 @@ def test_runs_repeat_bit_for_bit() -> None:
 
 def test_sample_times_have_no_accumulated_rounding_error() -> None:
     """After a million samples of 0.1 s the time is 1e5 s up to one rounding error."""
-    still = compile_system(scalar("still", lambda t, x, p: SX(0) * x, 1.0))
+    constant_system = compile_system(scalar("still", lambda t, x, p: SX(0) * x, 1.0))
     options = SimulationOptions(stop_time=1e5, solver="euler", step=0.1, sample_time=0.1)
-    result = simulate(still, options)
+    result = simulate(constant_system, options)
     assert result.time.size == 1_000_001
     assert result.time[-1] == 1e5
     assert result.time[654_321] == 654_321 * 0.1

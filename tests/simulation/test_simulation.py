@@ -97,13 +97,13 @@ def test_streamed_samples_equal_the_recorded_samples(name: str) -> None:
     count, times, signals = 0, [], []
     while not run.finished:
         run.advance(run.time + 0.17)
-        fresh = run.samples(count)
-        assert fresh.begin == count and fresh.end == run.recorded
-        count = fresh.end
+        new_samples = run.samples(count)
+        assert new_samples.begin == count and new_samples.end == run.recorded
+        count = new_samples.end
         for path in run.compiled.signals_layout.names:
-            assert fresh[path].shape[0] == fresh.time.size
-        times.append(fresh.time)
-        signals.append(fresh.signals)
+            assert new_samples[path].shape[0] == new_samples.time.size
+        times.append(new_samples.time)
+        signals.append(new_samples.signals)
     result = run.result()
     assert np.concatenate(times).tobytes() == result.time.tobytes()
     assert np.concatenate(signals, axis=1).tobytes() == result.signals.tobytes()
@@ -169,11 +169,11 @@ def test_signals_without_states_depend_on_a_changed_parameter() -> None:
     assert run.time == 2.0
     run.set({name: 5.0})
     run.advance()
-    mixed, before = run.result(), simulate(system, options())
+    changed_run, before = run.result(), simulate(system, options())
     after = simulate(system, options(), parameters={name: 5.0})
-    early = mixed.time <= 2.0
-    np.testing.assert_array_equal(mixed.signals[:, early], before.signals[:, early])
-    np.testing.assert_array_equal(mixed.signals[:, ~early], after.signals[:, ~early])
+    early = changed_run.time <= 2.0
+    np.testing.assert_array_equal(changed_run.signals[:, early], before.signals[:, early])
+    np.testing.assert_array_equal(changed_run.signals[:, ~early], after.signals[:, ~early])
 
 
 def test_a_parameter_change_after_the_end_is_refused() -> None:

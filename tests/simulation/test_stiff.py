@@ -176,8 +176,8 @@ def test_auto_changes_to_the_stiff_method_and_reports_it() -> None:
 
 def test_auto_stays_explicit_if_stability_does_not_limit_the_steps() -> None:
     """Here ``max_step`` limits the steps: many steps, none at the limit of stability."""
-    quiet = compile_system(scalar("quiet", lambda t, x, p: ca.cos(t) - x, 0.0))
-    result = simulate(quiet, SimulationOptions(stop_time=100.0, max_step=0.01))
+    nonstiff = compile_system(scalar("quiet", lambda t, x, p: ca.cos(t) - x, 0.0))
+    result = simulate(nonstiff, SimulationOptions(stop_time=100.0, max_step=0.01))
     assert result.run.steps >= 10_000
     assert result.run.solver == "rk45"
     assert "no stiffness was detected" in result.run.reason
@@ -203,9 +203,12 @@ def test_an_interrupted_automatic_run_gives_the_same_bits(cuts: list[float], tmp
     if cuts[-1] > 0.03:
         assert rest.run.solver == "rodas5p"
         assert "because the previous run detected stiffness" in rest.run.reason
-    same = np.isin(whole.time, rest.time)
-    assert same.sum() > 700
-    assert rest.signals[:, np.isin(rest.time, whole.time)].tobytes() == whole.signals[:, same].tobytes()
+    common_samples = np.isin(whole.time, rest.time)
+    assert common_samples.sum() > 700
+    assert (
+        rest.signals[:, np.isin(rest.time, whole.time)].tobytes()
+        == whole.signals[:, common_samples].tobytes()
+    )
 
 
 def test_pauses_between_steps_do_not_move_the_change_of_the_method() -> None:

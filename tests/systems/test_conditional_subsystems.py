@@ -157,13 +157,13 @@ def test_a_sampled_enable_signal_takes_effect_at_the_same_tick(
         states_when_enabling=when,
     )
     result = ab.simulate(diagram, stop_time=3.0, sample_time=0.1, **settings)
-    x, y, was, expected = 2.0, 0.0, None, []
+    x, y, previous, expected = 2.0, 0.0, None, []
     for enable in result["pulses"]:
         if enable:
-            if when == "reset" and was == 0.0:
+            if when == "reset" and previous == 0.0:
                 x = 2.0
             y, x = x, x + 0.1 * 10.0
-        was = enable
+        previous = enable
         expected.append(y)
     assert set(result["pulses"].tolist()) == {0.0, 1.0}
     np.testing.assert_allclose(result["sub/y"], expected, atol=1e-12)
@@ -180,15 +180,15 @@ def test_a_continuous_enable_signal_resets_sampled_blocks_between_ticks(settings
         states_when_enabling="reset",
     )
     result = ab.simulate(diagram, stop_time=5.0, sample_time=0.1, **settings)
-    x, y, was, expected = 2.0, 0.0, None, []
+    x, y, previous, expected = 2.0, 0.0, None, []
     for k in range(len(result.time)):
         t = 0.1 * k
         enable = math.sin(math.pi * (t - 1.05)) > 0
         if enable:
-            if was is False:
+            if previous is False:
                 x = 2.0
             y, x = x, x + 1.0
-        was = enable
+        previous = enable
         expected.append(y)
     # the output of the counter changes at the tick; between enabling and the tick it has the old value
     np.testing.assert_allclose(result["sub/y"], expected, atol=1e-12)
@@ -305,11 +305,11 @@ def test_a_sampled_trigger_takes_effect_at_the_same_tick(settings: dict[str, obj
     after = builder.add("after", Gain(gain=1.0), builder["sub"]["last"])
     builder.add("sampled", ZeroOrderHold(sample_time=0.1), after)
     result = ab.simulate(builder.build(), stop_time=3.0, sample_time=0.1, **settings)
-    last, memory, was, expected = 0.0, 0.0, None, []
+    last, memory, previous, expected = 0.0, 0.0, None, []
     for enable, t in zip(result["pulses"], result["tick"]):
-        if enable and was == 0.0:
+        if enable and previous == 0.0:
             last, memory = memory, t
-        was = enable
+        previous = enable
         expected.append(last)
     np.testing.assert_array_equal(result["sub/last"], expected)
     np.testing.assert_array_equal(result["sampled"], expected)  # not one tick later
@@ -385,12 +385,12 @@ def test_a_sampled_reset_takes_effect_before_the_update_of_the_same_tick(setting
         lambda builder: builder.add("ten", Constant(value=10.0)),
     )
     result = ab.simulate(diagram, stop_time=3.0, sample_time=0.1, **settings)
-    x, was, expected = 2.0, None, []
+    x, previous, expected = 2.0, None, []
     for reset in result["pulses"]:
-        if reset and was == 0.0:
+        if reset and previous == 0.0:
             x = 2.0
         expected.append(x)
-        x, was = x + 1.0, reset
+        x, previous = x + 1.0, reset
     np.testing.assert_allclose(result["sub/y"], expected, atol=1e-12)
 
 

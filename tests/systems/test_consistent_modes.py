@@ -378,8 +378,8 @@ def test_a_switch_is_correct_when_its_control_rests_on_the_threshold() -> None:
     builder.add("switch", Switch(threshold=0.0, criterion=">"), one, control, two)
     result = ab.simulate(builder.build(), stop_time=20.0, sample_time=0.05)
     u = result["control/y"]
-    sure = np.abs(u) > 1e-12
-    np.testing.assert_array_equal(result["switch/y"][sure], np.where(u > 0.0, 1.0, 2.0)[sure])
+    nonzero = np.abs(u) > 1e-12
+    np.testing.assert_array_equal(result["switch/y"][nonzero], np.where(u > 0.0, 1.0, 2.0)[nonzero])
 
 
 def test_blocks_with_memory_do_not_react_to_inconsistent_signals() -> None:
@@ -458,18 +458,18 @@ def test_a_rising_edge_after_a_falling_one_in_the_same_step_is_detected(
     builder.add("sampled", ZeroOrderHold(sample_time=0.3), total)
     result = ab.simulate(builder.build(), stop_time=4.0, sample_time=0.01, **settings)  # pyright: ignore
     since = np.mod(result.time, 1.0 / frequency)
-    apart = np.minimum(since, 1.0 / frequency - since) > 1e-9
-    np.testing.assert_allclose(result["total/y"][apart], since[apart], atol=1e-9)
+    away_from_edges = np.minimum(since, 1.0 / frequency - since) > 1e-9
+    np.testing.assert_allclose(result["total/y"][away_from_edges], since[away_from_edges], atol=1e-9)
 
 
 def test_a_comparison_at_a_corner_of_its_input_is_sampled_correctly() -> None:
     """At 0.25 s and 1.25 s the input touches 1 at a corner, where a tick samples the comparison."""
     builder = DiagramBuilder("touch")
-    course = builder.add(
+    values = builder.add(
         "course", RepeatingSequence(times=(0.0, 0.25, 0.5, 1.0), values=(-1.0, 1.0, 0.5, -1.0))
     )
     one = builder.add("one", SignalGenerator(waveform="square", frequency=0.2, amplitude=-1.0))
-    below = builder.add("below", RelationalOperator(relation="<="), course, one)
+    below = builder.add("below", RelationalOperator(relation="<="), values, one)
     builder.add("held", ZeroOrderHold(sample_time=0.125), below)
     result = ab.simulate(builder.build(), stop_time=2.0, sample_time=0.0625, rtol=1e-9)
     np.testing.assert_array_equal(result["below/y"], 1.0)

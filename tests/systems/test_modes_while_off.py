@@ -194,8 +194,8 @@ def test_a_hysteresis_after_a_rate_limiter_uses_only_consistent_outputs(
     result = ab.simulate(builder.build(), stop_time=2.5, sample_time=0.1, **settings)
     y = np.clip(result.time - 1.0, 0.0, 1.0)
     np.testing.assert_allclose(result["sub/gap/y"], np.maximum(y - 0.5, 0.0), atol=1e-9)
-    apart = np.abs(y - 0.5) > 1e-6
-    np.testing.assert_array_equal(result["sub/switch/y"][apart], (y > 0.5)[apart])
+    away_from_limit = np.abs(y - 0.5) > 1e-6
+    np.testing.assert_array_equal(result["sub/switch/y"][away_from_limit], (y > 0.5)[away_from_limit])
 
 
 @pytest.mark.parametrize("settings", RUNS)

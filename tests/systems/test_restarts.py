@@ -116,8 +116,10 @@ def _contents() -> Diagram:
         # Disabled at the start, where the consistent mode differs from the initial one.
         b.add(f"enabled {name}", EnabledSubsystem(diagram=_around(hysteresis)), x, above)
     b.add("both", EnabledTriggeredSubsystem(diagram=_around(Gain())), x, v, above)
-    loose = b.add("second play", Backlash(width=0.2, initial=-1.0), b.add("play", Backlash(initial=1.0), x))
-    b.add("hit play", HitCrossing(offset=-0.05), loose)
+    second_play = b.add(
+        "second play", Backlash(width=0.2, initial=-1.0), b.add("play", Backlash(initial=1.0), x)
+    )
+    b.add("hit play", HitCrossing(offset=-0.05), second_play)
     b.add("hit relay", HitCrossing(offset=0.5), b.add("relay", Relay(on_point=0.15, off_point=-0.1), x))
     limited = b.add("limited", RateLimiterContinuous(rising=1.0, falling=-1.0), v)
     b.add("hit limited", HitCrossing(offset=0.1), limited)
@@ -152,10 +154,10 @@ def test_a_subsystem_continues_after_a_reset_as_at_the_start_of_a_run(kind: str,
     changes = 0
     for name in result.names:
         if name.startswith("sub/") and not name.endswith("/last"):
-            course = np.asarray(result[name], dtype=np.float64).reshape(PERIODS, SAMPLES)[:, :compared]
-            later = np.broadcast_to(course[0], course.shape)
-            np.testing.assert_allclose(course, later, rtol=0.0, atol=1e-6, err_msg=name)
-            changes += np.ptp(course) > 0.0
+            periods = np.asarray(result[name], dtype=np.float64).reshape(PERIODS, SAMPLES)[:, :compared]
+            first_period = np.broadcast_to(periods[0], periods.shape)
+            np.testing.assert_allclose(periods, first_period, rtol=0.0, atol=1e-6, err_msg=name)
+            changes += np.ptp(periods) > 0.0
     assert changes > 40
 
 

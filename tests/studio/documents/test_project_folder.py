@@ -41,9 +41,9 @@ def test_a_file_written_by_another_program_is_detected(folder: ProjectFolder) ->
     assert folder.compared("a.json", known) == ("same", known)
     path = folder.root / "a.json"
     os.utime(path, ns=(0, 0))
-    disk, touched = folder.compared("a.json", known)
+    disk, fingerprint = folder.compared("a.json", known)
     assert disk == "same"
-    assert touched != known
+    assert fingerprint != known
     (folder.root / "b.json").write_bytes(b"two")
     os.utime(folder.root / "b.json", ns=(known.modified, known.modified))
     (folder.root / "b.json").rename(path)  # of the same size and time
@@ -79,14 +79,17 @@ def test_a_folder_that_cannot_be_created_raises_an_error(folder: ProjectFolder) 
 
 
 def test_partly_written_files_of_a_killed_save_are_removed(folder: ProjectFolder) -> None:
-    old, fresh = folder.root / "arms" / ".a.json.0123456789ab.tmp", folder.root / ".b.json.0123456789ab.tmp"
-    mine = folder.root / ".notes.tmp"
-    for path in (old, fresh, mine):
+    old, new_file = (
+        folder.root / "arms" / ".a.json.0123456789ab.tmp",
+        folder.root / ".b.json.0123456789ab.tmp",
+    )
+    other_file = folder.root / ".notes.tmp"
+    for path in (old, new_file, other_file):
         path.write_bytes(b"")
     os.utime(old, (0, 0))
-    os.utime(mine, (0, 0))
+    os.utime(other_file, (0, 0))
     folder.remove_stray_files(["arms/a.json", "../elsewhere.json"])
-    assert [path.exists() for path in (old, fresh, mine)] == [False, True, True]
+    assert [path.exists() for path in (old, new_file, other_file)] == [False, True, True]
 
 
 @pytest.mark.parametrize(

@@ -195,9 +195,9 @@ def test_a_file_newer_than_the_journal_is_kept_beside_the_recovered_file(disk: D
         await documents.save(open_file, "a.json", overwrite=False)
         documents.perform(open_file, change("2", add("mine")))
         after_crash = disk.as_after_a_crash(tmp_path / "second")
-        theirs = after_crash.project.path("a.json")
-        theirs.write_bytes(theirs.read_bytes().replace(b'"gain"', b'"other"'))
-        newer = theirs.read_bytes()
+        other_path = after_crash.project.path("a.json")
+        other_path.write_bytes(other_path.read_bytes().replace(b'"gain"', b'"other"'))
+        newer = other_path.read_bytes()
         after = after_crash.documents()
         (recovery,) = after.recoverable.descriptions()
         assert (recovery.path, recovery.disk, recovery.edits) == ("a.json", "changed", 1)
@@ -205,7 +205,7 @@ def test_a_file_newer_than_the_journal_is_kept_beside_the_recovered_file(disk: D
         assert recovered is not None
         assert recovered.path is not None
         assert recovered.path.startswith("a recovered 20")
-        assert theirs.read_bytes() == newer
+        assert other_path.read_bytes() == newer
         assert sorted(recovered.document.diagram.blocks) == ["gain", "mine"]
         assert not recovered.document.dirty
         assert after.recoverable.descriptions() == []

@@ -129,15 +129,15 @@ def test_robot_edits_survive_a_killed_server_and_a_reload(crash: Crash) -> None:
 
 def test_a_new_page_after_the_crash_offers_the_unsaved_diagram(crash: Crash) -> None:
     folder = crash.studio.folder
-    fresh = crash.drawing.context.new_page()
-    fresh.goto(crash.studio.address)
-    offer = fresh.get_by_role("group", name="lost.json")
+    new_page = crash.drawing.context.new_page()
+    new_page.goto(crash.studio.address)
+    offer = new_page.get_by_role("group", name="lost.json")
     expect(offer).to_contain_text(re.compile("1 edit from .* to .*; 2 blocks"))
     expect(offer).to_contain_text("the file is newer")
     offer.get_by_role("button", name="Keep both").click()
     expect(offer).to_be_hidden()
-    expect(fresh.locator(".title")).to_have_text(re.compile("^lost recovered 20"))
+    expect(new_page.locator(".title")).to_have_text(re.compile("^lost recovered 20"))
     assert (folder / "lost.json").read_bytes() == crash.overwritten
     (recovered,) = folder.glob("lost recovered *.json")
     assert names(recovered) == ["Constant", "Gain"]
-    fresh.close()
+    new_page.close()

@@ -150,12 +150,12 @@ def test_a_robot_widget_shows_the_given_configuration(notebook: Page) -> None:
 def test_widgets_that_cannot_be_shown_raise_errors_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     builder = ab.DiagramBuilder("bare")
     builder.add("sink", ab.blocks.Terminator(), builder.add("one", ab.blocks.Constant()))
-    bare = builder.build()
-    result = ab.simulate(bare, stop_time=1.0)
+    diagram_without_views = builder.build()
+    result = ab.simulate(diagram_without_views, stop_time=1.0)
     with pytest.raises(InputError, match=r"diagram 'bare' has nothing to show here"):
-        ab.run_widget(bare, result)
+        ab.run_widget(diagram_without_views, result)
     with pytest.raises(InputError, match=r"show is 'arms'.*'scopes', 'robot', or None"):
-        ab.run_widget(bare, result, show="arms")
+        ab.run_widget(diagram_without_views, result, show="arms")
     with pytest.raises(InputError, match="5 joint coordinates were given"):
         ab.robot_widget(ab.load_robot("puma560"), [0.0] * 5)
     from armblocks.studio import notebook

@@ -18,11 +18,11 @@ from conftest import Studio
 PRINTED = Path(__file__).parents[2] / "formats" / "kr180_as_printed.m"
 DROP = """([name, content]) => {
     const bytes = Uint8Array.from(atob(content), (letter) => letter.charCodeAt(0))
-    const brought = new DataTransfer()
-    brought.items.add(new File([bytes], name))
+    const data = new DataTransfer()
+    data.items.add(new File([bytes], name))
     for (const kind of ['dragenter', 'drop'])
         document.body.dispatchEvent(
-            new DragEvent(kind, { bubbles: true, cancelable: true, dataTransfer: brought })
+            new DragEvent(kind, { bubbles: true, cancelable: true, dataTransfer: data })
         )
 }"""
 

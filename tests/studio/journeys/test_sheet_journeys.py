@@ -46,9 +46,9 @@ AS_RGB = """(colour) => {
     const probe = document.createElement('i')
     probe.style.color = colour
     document.body.append(probe)
-    const found = getComputedStyle(probe).color
+    const rgb = getComputedStyle(probe).color
     probe.remove()
-    return found
+    return rgb
 }"""
 
 
@@ -73,8 +73,8 @@ def test_a_user_drawn_route_follows_its_block_and_can_be_reset(sheet: Page) -> N
     expect(line).to_have_attribute("d", routed or "")
     edge(sheet, wire).locator(".segment").nth(2).click(force=True)
     accent = sheet.evaluate("getComputedStyle(document.documentElement).getPropertyValue('--accent')")
-    shown = f"getComputedStyle(document.querySelector('{SELECTED_LINE}')).stroke"
-    assert sheet.evaluate(shown) == sheet.evaluate(AS_RGB, accent.strip())
+    stroke = f"getComputedStyle(document.querySelector('{SELECTED_LINE}')).stroke"
+    assert sheet.evaluate(stroke) == sheet.evaluate(AS_RGB, accent.strip())
     sheet.get_by_role("button", name="Reset the route").click()
     expect(line).to_have_attribute("d", before or "")
 
@@ -457,13 +457,13 @@ def test_the_value_axis_of_a_scope_is_zoomed_panned_and_reset(sheet: Page) -> No
     expect(sheet.get_by_role("dialog")).to_be_hidden()
     axis = sheet.locator(".chart .values-axis").first
     title = sheet.locator(".chart figcaption b").first.inner_text()
-    shown_whole = sheet.get_by_role("button", name=f"Show all values of {title}")
-    expect(shown_whole).to_have_count(0)
+    show_all = sheet.get_by_role("button", name=f"Show all values of {title}")
+    expect(show_all).to_have_count(0)
     whole = picture(sheet, title)
     x, y = middle(axis)
     sheet.mouse.move(x, y)
     sheet.mouse.wheel(0, -100)
-    expect(shown_whole).to_be_visible()
+    expect(show_all).to_be_visible()
     zoomed = picture(sheet, title)
     sheet.mouse.move(x, y)
     sheet.mouse.down()
@@ -474,14 +474,14 @@ def test_the_value_axis_of_a_scope_is_zoomed_panned_and_reset(sheet: Page) -> No
     expect(
         sheet.get_by_role("button", name="Show the whole run")
     ).to_be_disabled()  # the time axis is unchanged
-    shown_whole.click()
-    expect(shown_whole).to_have_count(0)
+    show_all.click()
+    expect(show_all).to_have_count(0)
     assert picture(sheet, title) == whole
     sheet.mouse.move(x, y)
     sheet.mouse.wheel(0, 100)
-    expect(shown_whole).to_be_visible()
+    expect(show_all).to_be_visible()
     axis.dblclick()
-    expect(shown_whole).to_have_count(0)
+    expect(show_all).to_have_count(0)
 
 
 DROPS = """async () => {
@@ -489,17 +489,17 @@ DROPS = """async () => {
     const entries = [...document.querySelectorAll('.palette .kind')]
     const sheet = document.querySelector('.canvas')
     const box = document.querySelector('.react-flow__pane').getBoundingClientRect()
-    const fire = (target, kind, dataTransfer, x, y) =>
+    const dispatch = (target, kind, dataTransfer, x, y) =>
         target.dispatchEvent(
             new DragEvent(kind, { bubbles: true, cancelable: true, dataTransfer, clientX: x, clientY: y })
         )
     entries.forEach((entry, k) => {
-        const brought = new DataTransfer()
+        const data = new DataTransfer()
         const [x, y] = [box.x + 10 + ((k % 20) / 21) * box.width, box.y + 10 + (k / 280) * box.height]
-        fire(entry, 'dragstart', brought, 0, 0)
-        fire(sheet, 'dragover', brought, x, y)
-        fire(sheet, 'drop', brought, x, y)
-        fire(entry, 'dragend', brought, x, y)
+        dispatch(entry, 'dragstart', data, 0, 0)
+        dispatch(sheet, 'dragover', data, x, y)
+        dispatch(sheet, 'drop', data, x, y)
+        dispatch(entry, 'dragend', data, x, y)
     })
     return entries.map((entry) => entry.dataset.type)
 }"""
@@ -507,28 +507,28 @@ OPENINGS = """async () => {
     // Each block is opened by a double click; the labels of its dialog are read, and the dialog is closed.
     // Nothing waits for a painted frame: painting each dialog in software takes longer than creating it.
     // Overlays are siblings of the page's root element, so that few elements are searched after each change.
-    const over = (selector) => {
+    const inOverlay = (selector) => {
         for (const part of document.body.children) {
-            const found = part.id === 'root' ? null : part.querySelector(selector)
-            if (found) return found
+            const element = part.id === 'root' ? null : part.querySelector(selector)
+            if (element) return element
         }
         return null
     }
     const path = document.getElementsByClassName('breadcrumbs')
-    const until = (found) =>
+    const until = (search) =>
         new Promise((resolve) => {
-            const look = (_, watch) => {
-                const value = found()
+            const check = (_, observer) => {
+                const value = search()
                 if (!value) return false
-                watch.disconnect()
+                observer.disconnect()
                 resolve(value)
                 return true
             }
-            const watch = new MutationObserver(look)
-            if (!look([], watch)) watch.observe(document, { subtree: true, childList: true })
+            const observer = new MutationObserver(check)
+            if (!check([], observer)) observer.observe(document, { subtree: true, childList: true })
         })
     const dialog = (name) => {
-        const shown = over('[role=dialog]')
+        const shown = inOverlay('[role=dialog]')
         return shown?.querySelector('h2')?.textContent.startsWith(name) ? shown : null
     }
     const firstWords = (element) => document.createTreeWalker(element, NodeFilter.SHOW_TEXT).nextNode().data
@@ -545,7 +545,7 @@ OPENINGS = """async () => {
         }
         labels[name] = [...shown.querySelectorAll('label')].map(firstWords)
         ;[...shown.querySelectorAll('button')].find((button) => button.textContent === 'Cancel').click()
-        await until(() => !over('[role=dialog]'))
+        await until(() => !inOverlay('[role=dialog]'))
     }
     return labels
 }"""

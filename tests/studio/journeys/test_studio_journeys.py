@@ -139,8 +139,8 @@ def test_a_diagram_is_built_with_the_keyboard_alone_and_undone_completely(page: 
     page.keyboard.press("Control+f")
     find = page.get_by_role("textbox", name="Find")
     find.fill("Scope")
-    here = page.get_by_role("listbox", name="Found").get_by_role("group").first  # other tabs follow
-    expect(here.get_by_role("option")).to_have_count(1)
+    group = page.get_by_role("listbox", name="Found").get_by_role("group").first  # other tabs follow
+    expect(group.get_by_role("option")).to_have_count(1)
     find.press("Enter")
     expect(find).to_be_hidden()
     expect(block(page, "Scope")).to_be_focused()

@@ -269,9 +269,9 @@ def test_singularities_are_described_in_words() -> None:
     assert wrist.singular.startswith(f"Singular: {names[3]} and {names[5]} can move together")
     assert readings(puma, [0.1, 0.4, -0.3, 0.5, 0.7, 0.2], [0.0] * 6, [0.0] * 6).singular == ""
     assert singularity(np.zeros((6, 2)), ["a", "b"], 1.0) == "Singular: no joint moves the tool."
-    lone = np.zeros((6, 2))
-    lone[0, 0] = 1.0
-    assert singularity(lone, ["a", "b"], 1.0) == "Singular: b moves without motion of the tool."
+    values = np.zeros((6, 2))
+    values[0, 0] = 1.0
+    assert singularity(values, ["a", "b"], 1.0) == "Singular: b moves without motion of the tool."
     square = np.diag([1.0, 1.0, 1.0, 1.0, 1.0, 0.01])
     assert singularity(square, list("abcdef"), 1.0).startswith("Close to singular: f moves")
     fast = readings(puma, [9.0] * 6, [100.0] * 6, [0.0] * 6)

@@ -86,8 +86,8 @@ def test_the_tables_of_the_paper_can_be_typed_in() -> None:
     ):
         robot = typed(robot, "", column, text)
     assert robot == replace(expected, links=robot.links)
-    for mine, theirs in zip(robot.links, expected.links):
-        assert mine == theirs
+    for mine, expected_link in zip(robot.links, expected.links):
+        assert mine == expected_link
 
 
 @pytest.mark.parametrize("name", LAW_NAMES)
@@ -119,8 +119,8 @@ def test_cells_without_a_value_can_be_emptied() -> None:
     assert typed(robot, "", "friction_model", "release-6").friction_model is FrictionModel.RELEASE_6
     assert typed(robot, "", "tool_z", "0.2").tool.translation == (0.0, 0.0, 0.2)
     assert typed(robot, "", "gravity_z", "-1.62").gravity == (0.0, 0.0, -1.62)
-    bare = replace(robot, links=tuple(replace(link, motor=None) for link in robot.links))
-    motor = typed(bare, name, "Jm", "2e-4").link(name).motor
+    without_motors = replace(robot, links=tuple(replace(link, motor=None) for link in robot.links))
+    motor = typed(without_motors, name, "Jm", "2e-4").link(name).motor
     assert motor is not None
     assert (motor.inertia, motor.gear_ratio) == (2e-4, 1.0)
     alone = typed(KIND.new(), "link1", "highest", "90").link("link1")
@@ -208,8 +208,8 @@ def test_non_physical_values_are_marked_at_their_cells() -> None:
         bad = typed(robot, "link2", "Tc-", "0.1")
     findings_shown = robot_content(bad).findings
     assert [(f.link, f.columns) for f in findings_shown if "Friction" in f.what] == [("link2", ["Tc-"])]
-    bare = replace(KIND.new(), links=(standard_dh("link1", a=1.0),))
-    assert "The last joint has no inertia" in robot_content(bare).findings[0].what
+    one_link = replace(KIND.new(), links=(standard_dh("link1", a=1.0),))
+    assert "The last joint has no inertia" in robot_content(one_link).findings[0].what
 
 
 def test_every_column_is_sent_to_the_page() -> None:

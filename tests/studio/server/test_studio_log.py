@@ -52,14 +52,14 @@ def test_the_terminal_shows_no_key_after_the_login_and_no_file_content(tmp_path:
 
 
 def _abort(address: str, headers: dict[str, str]) -> None:
-    """End a connection abruptly, as a killed browser does, while replies are due."""
+    """End a connection abruptly, as a killed browser does, while replies are pending."""
     opening = {"kind": "open_shipped", "document_kind": "diagram", "name": "kr180model"}
-    with connect(address, additional_headers=headers, max_size=None) as page:
+    with connect(address, additional_headers=headers, max_size=None) as client:
         for number in range(20):
-            page.send(json.dumps({"number": number, "request": opening}))
-        page.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-        page.socket.shutdown(socket.SHUT_RD)
-        page.socket.close()
+            client.send(json.dumps({"number": number, "request": opening}))
+        client.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        client.socket.shutdown(socket.SHUT_RD)
+        client.socket.close()
 
 
 def _output_after_the_login(studio: Studio) -> tuple[str, tuple[str, ...]]:
@@ -77,17 +77,17 @@ def _output_after_the_login(studio: Studio) -> tuple[str, tuple[str, ...]]:
     address = studio.address.replace("http", "ws") + "ws"
     for _ in range(3):
         _abort(address, headers)
-    with connect(address, additional_headers=headers, max_size=None) as page:
+    with connect(address, additional_headers=headers, max_size=None) as client:
         for number, path in enumerate(("bad.json", "script.m", CONTENT + ".json")):
-            page.send(json.dumps({"number": number, "request": {"kind": "open", "path": path}}))
-            while (message := json.loads(page.recv(timeout=60)))["kind"] != "reply":
+            client.send(json.dumps({"number": number, "request": {"kind": "open", "path": path}}))
+            while (message := json.loads(client.recv(timeout=60)))["kind"] != "reply":
                 pass
             assert message["fault"]["what"]
-        page.send(json.dumps({"number": 9, "request": {"kind": CONTENT}}))
-        page.send(CONTENT)
+        client.send(json.dumps({"number": 9, "request": {"kind": CONTENT}}))
+        client.send(CONTENT)
         with pytest.raises(ConnectionClosed):
             while True:
-                page.recv(timeout=60)
+                client.recv(timeout=60)
     assert studio.process.stdout is not None
     output = studio.process.stdout
     studio.process.terminate()

@@ -71,11 +71,13 @@ COMPATIBLE: list[tuple[DiagramEdit, DiagramEdit]] = [
 ]
 
 
-@pytest.mark.parametrize(("theirs", "mine"), CONFLICTING)
-def test_an_edit_that_conflicts_with_another_page_is_refused(theirs: DiagramEdit, mine: DiagramEdit) -> None:
+@pytest.mark.parametrize(("other_edit", "own_edit"), CONFLICTING)
+def test_an_edit_that_conflicts_with_another_page_is_refused(
+    other_edit: DiagramEdit, own_edit: DiagramEdit
+) -> None:
     document = drawing()
     base = document.version
-    document.perform(change("other", base, theirs))
+    document.perform(change("other", base, other_edit))
     before = document.diagram
     with pytest.raises(
         InputError,
@@ -83,19 +85,19 @@ def test_an_edit_that_conflicts_with_another_page_is_refused(theirs: DiagramEdit
         r"an edit of the version that this page showed"
         r".*look at the present version, and repeat the edit if you still want it",
     ):
-        document.perform(change("me", base, mine))
+        document.perform(change("me", base, own_edit))
     assert document.diagram is before
-    document.perform(change("me", document.version, mine))  # accepted after seeing the change
+    document.perform(change("me", document.version, own_edit))  # accepted after seeing the change
 
 
-@pytest.mark.parametrize(("theirs", "mine"), COMPATIBLE)
-def test_edits_of_different_aspects_are_both_applied(theirs: DiagramEdit, mine: DiagramEdit) -> None:
+@pytest.mark.parametrize(("other_edit", "own_edit"), COMPATIBLE)
+def test_edits_of_different_aspects_are_both_applied(other_edit: DiagramEdit, own_edit: DiagramEdit) -> None:
     document, other_order = drawing(), drawing()
     base = document.version
-    document.perform(change("other", base, theirs))
-    document.perform(change("me", base, mine))
-    other_order.perform(change("me", base, mine))
-    other_order.perform(change("other", base, theirs))
+    document.perform(change("other", base, other_edit))
+    document.perform(change("me", base, own_edit))
+    other_order.perform(change("me", base, own_edit))
+    other_order.perform(change("other", base, other_edit))
     assert document.diagram == other_order.diagram
 
 
@@ -196,11 +198,11 @@ def test_random_edits_of_two_pages_overwrite_no_unseen_change_and_converge(seed:
         except ArmblocksError:
             assert document.diagram is before
             continue
-        touched = changed_aspects(before, document.diagram)
-        for version, author, theirs in applied:
+        aspects = changed_aspects(before, document.diagram)
+        for version, author, other_aspects in applied:
             if author != page.name and version > page.version:
-                assert not clash(touched, theirs), "an edit that the page had not seen was overwritten"
-        applied.append((document.version, page.name, touched))
+                assert not clash(aspects, other_aspects), "an edit that the page had not seen was overwritten"
+        applied.append((document.version, page.name, aspects))
         changed = changed_lines(lines.route(before), lines.route(document.diagram))
         for listener in pages:
             listener.pending.append((document.version, sheet_change(before, document.diagram, changed)))

@@ -149,8 +149,8 @@ def test_edits_of_different_bookmarks_do_not_conflict(document: Document) -> Non
 
 def test_the_search_finds_bookmarks_by_name(document: Document) -> None:
     add(document, "motor winding", "drive", "motor")
-    found = find(document.diagram, "winding motor")
-    assert [(one.inside, one.name, one.part) for one in found] == [
+    results = find(document.diagram, "winding motor")
+    assert [(one.inside, one.name, one.part) for one in results] == [
         (["drive", "motor"], "motor winding", PART)
     ]
     assert [one.name for one in find(document.diagram, "motor")] == ["motor", "motor winding"]
@@ -187,12 +187,12 @@ def test_files_copies_and_undo_keep_bookmarks_after_any_edits(
     document = Document(placed(builder.draft()), load_robot)
     forms = [document.diagram]
     for kind, text, part in steps:
-        found = [one for one in bookmarks_of(document.diagram) if kind in ("rename", "remove")]
+        bookmarks = [one for one in bookmarks_of(document.diagram) if kind in ("rename", "remove")]
         blocks = [name for name in document.diagram.blocks if name != "source"]
         edit: do.DiagramEdit
         inside = [blocks[0]] if chance.random() < 0.6 else []
-        if found:
-            one = chance.choice(found)
+        if bookmarks:
+            one = chance.choice(bookmarks)
             inside = one.inside
             edit = (
                 do.RenameBookmark(name=one.name, to=text)

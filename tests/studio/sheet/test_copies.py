@@ -39,8 +39,8 @@ def test_pasting_all_blocks_into_an_empty_diagram_reproduces_the_diagram(name: s
     document = Document(Diagram(name=original.name, blocks={}, mask=original.mask), load_robot)
     document.edit(PasteBlocks(text=copy(original, *original.blocks, notes=tuple(original.notes))))
     pasted = document.diagram
-    bare = dataclasses.replace(original, settings=pasted.settings, description="")
-    assert not diagram_difference(bare, pasted)
+    content = dataclasses.replace(original, settings=pasted.settings, description="")
+    assert not diagram_difference(content, pasted)
     assert (pasted.layout, pasted.bends, pasted.notes) == (original.layout, original.bends, original.notes)
     document.undo()
     assert document.diagram.blocks == {}
@@ -70,9 +70,9 @@ def test_a_pasted_formula_becomes_a_value_where_its_names_are_undeclared() -> No
         mask_values={"k": 5.0},
     )
     text = copy(placed(masked), "gain")
-    plain = Document(Diagram(name="here", blocks={}), load_robot)
-    plain.edit(PasteBlocks(text=text))
-    assert plain.diagram.blocks["gain"] == Gain(gain=10.0)
+    without_mask = Document(Diagram(name="here", blocks={}), load_robot)
+    without_mask.edit(PasteBlocks(text=text))
+    assert without_mask.diagram.blocks["gain"] == Gain(gain=10.0)
     with_mask = Document(Diagram(name="here", blocks={}, mask=(mask_parameter("k", 1.5),)), load_robot)
     with_mask.edit(PasteBlocks(text=text))
     assert dict(with_mask.diagram.blocks["gain"].formulas) == {"gain": "2*k"}
@@ -81,13 +81,13 @@ def test_a_pasted_formula_becomes_a_value_where_its_names_are_undeclared() -> No
 
 def test_pasting_used_names_or_invalid_text_is_refused() -> None:
     document = Document(placed(load_diagram("van_der_pol_pid", BLOCKS)), load_robot)
-    noted = dataclasses.replace(document.diagram, notes={"/1": Note(x=0, y=0, text="a")})
+    diagram_with_note = dataclasses.replace(document.diagram, notes={"/1": Note(x=0, y=0, text="a")})
     with pytest.raises(DiagramError, match="a block is already named 'PID'"):
         document.edit(PasteBlocks(text=copy(document.diagram, "PID")))
-    document = Document(noted, load_robot)
+    document = Document(diagram_with_note, load_robot)
     with pytest.raises(DiagramError, match="a note with this name exists already"):
-        document.edit(PasteBlocks(text=copy(noted, notes=("/1",))))
-    document.edit(PasteBlocks(text=copy(noted, notes=("/1",)), names={"/1": "/2"}, shift=5.0))
+        document.edit(PasteBlocks(text=copy(diagram_with_note, notes=("/1",))))
+    document.edit(PasteBlocks(text=copy(diagram_with_note, notes=("/1",)), names={"/1": "/2"}, shift=5.0))
     assert document.diagram.notes["/2"] == Note(x=5, y=5, text="a")
     with pytest.raises(FormatError, match="the copied blocks"):
         document.edit(PasteBlocks(text="[1, 2]"))
@@ -109,11 +109,11 @@ def test_pasting_reads_no_file_outside_the_project(tmp_path: Path) -> None:
 
     async def scenario(hub: Any, ask: Any, events: Events) -> None:
         key = await ask("open_shipped", document_kind="diagram", name="puma560_servos")
-        same = await ask("copy", document=key, blocks=["servo 1"])
-        assert same == text
+        copied_text = await ask("copy", document=key, blocks=["servo 1"])
+        assert copied_text == text
         edit = {"kind": "paste", "names": {"servo 1": "another"}}
-        await ask("change", document=key, edit={**edit, "text": same})
-        outside = same.replace("joint_servos#JointServo", "../outside.json#Servo")
+        await ask("change", document=key, edit={**edit, "text": copied_text})
+        outside = copied_text.replace("joint_servos#JointServo", "../outside.json#Servo")
         with pytest.raises(InputError, match="is outside of the project folder"):
             await ask("change", document=key, edit={**edit, "text": outside, "names": {"servo 1": "third"}})
 
@@ -126,14 +126,14 @@ def test_inserting_a_block_into_a_wire_and_removing_it_is_one_step_each() -> Non
     document.edit(PasteBlocks(text=copy(before, "damping"), names={"damping": "free"}))
     unconnected = document.diagram
     place = Place(x=500, y=400)
-    through = [Wire(source="x2/y", target="free/u"), Wire(source="free/y", target="x1/u")]
-    direct = [Wire(source="x2/y", target="x1/u")]
-    document.edit(MoveBlocks(places={"free": place}, wires=through, instead=direct))
+    wires_of_block = [Wire(source="x2/y", target="free/u"), Wire(source="free/y", target="x1/u")]
+    direct_wire = [Wire(source="x2/y", target="x1/u")]
+    document.edit(MoveBlocks(places={"free": place}, wires=wires_of_block, instead=direct_wire))
     assert document.undo_title == "insert free"
     inserted = {str(wire) for wire in document.diagram.connections}
     assert {"x2/y -> free/u", "free/y -> x1/u"} <= inserted
     assert "x2/y -> x1/u" not in inserted
-    document.edit(MoveBlocks(places={"free": place}, wires=direct, instead=through))
+    document.edit(MoveBlocks(places={"free": place}, wires=direct_wire, instead=wires_of_block))
     assert document.undo_title == "disconnect free"
     assert document.diagram.connections == before.connections
     document.undo()
@@ -141,4 +141,4 @@ def test_inserting_a_block_into_a_wire_and_removing_it_is_one_step_each() -> Non
     assert document.diagram == unconnected
     document.edit(RemoveBlocks(blocks=["free"]))
     with pytest.raises(DiagramError, match="the wire free/y -> x1/u does not exist"):
-        document.edit(MoveBlocks(places={}, instead=through[1:]))
+        document.edit(MoveBlocks(places={}, instead=wires_of_block[1:]))

@@ -47,11 +47,11 @@ def inner(document: Document) -> Diagram:
     return block.diagram
 
 
-def declared(name: str, default: Any = 1.0, **more: Any) -> MaskParameter:
-    return MaskParameter(name=name, default=default, **more)
+def parameter(name: str, default: Any = 1.0, **properties: Any) -> MaskParameter:
+    return MaskParameter(name=name, default=default, **properties)
 
 
-def edited(document: Document, parameters: Iterable[MaskParameter], name: str = "") -> None:
+def edit_mask(document: Document, parameters: Iterable[MaskParameter], name: str = "") -> None:
     document.edit(SetMask(block="spring", name=name, parameters=list(parameters)))
 
 
@@ -74,8 +74,8 @@ def test_setting_the_present_mask_changes_nothing(name: str) -> None:
 
 
 def test_an_added_parameter_can_be_used_in_formulas(document: Document) -> None:
-    edited(
-        document, [declared("k", was="k"), declared("damping", "[1 2; 3 4]/2", kind="array", unit="N s/m")]
+    edit_mask(
+        document, [parameter("k", was="k"), parameter("damping", "[1 2; 3 4]/2", kind="array", unit="N s/m")]
     )
     assert document.undo_title == "mask spring"
     rule = inner(document).mask[1]
@@ -85,7 +85,7 @@ def test_an_added_parameter_can_be_used_in_formulas(document: Document) -> None:
 
 
 def test_a_renamed_parameter_keeps_its_value_and_its_formulas(document: Document) -> None:
-    edited(document, [declared("stiffness", was="k", unit="N/m")], name="Spring of steel")
+    edit_mask(document, [parameter("stiffness", was="k", unit="N/m")], name="Spring of steel")
     assert gain(document) == (6.0, "2*stiffness")
     assert inner(document).name == "Spring of steel"
     assert dict(document.diagram.blocks["spring"].formulas) == {"stiffness": "w - 2"}
@@ -96,29 +96,29 @@ def test_a_renamed_parameter_keeps_its_value_and_its_formulas(document: Document
     assert diagram_from_bytes(data, "model.json", BLOCKS, load_robot) == document.diagram
 
 
-def test_two_parameters_exchange_names_and_the_new_order_is_kept(document: Document) -> None:
-    edited(document, [declared("k", was="k"), declared("j", 10.0)])
+def test_two_parameters_exchange_names_and_the_new_order_remains(document: Document) -> None:
+    edit_mask(document, [parameter("k", was="k"), parameter("j", 10.0)])
     document.edit(SetParameters(block="gain", values={"gain": "k/j"}), ["spring"])
-    edited(document, [declared("k", 10.0, was="j"), declared("j", was="k")])
+    edit_mask(document, [parameter("k", 10.0, was="j"), parameter("j", was="k")])
     assert [rule.name for rule in inner(document).mask] == ["k", "j"]
     assert gain(document) == (0.3, "j/k")
 
 
 def test_a_value_at_its_default_follows_a_changed_default() -> None:
     document = Document(spring(), load_robot)
-    edited(document, [declared("k", 4.0, was="k")])
+    edit_mask(document, [parameter("k", 4.0, was="k")])
     assert gain(document)[0] == 8.0
     document.edit(SetParameters(block="spring", values={"k": "7"}))
-    edited(document, [declared("k", 5.0, was="k")])
+    edit_mask(document, [parameter("k", 5.0, was="k")])
     assert gain(document)[0] == 14.0
 
 
 def test_bounds_apply_to_the_default_and_to_set_values(document: Document) -> None:
     with pytest.raises(InputError, match=r"the value is 1.0.*>= 2"):
-        edited(document, [declared("k", was="k", minimum=2.0)])
+        edit_mask(document, [parameter("k", was="k", minimum=2.0)])
     with pytest.raises(InputError, match=r"'k'.*the value is 3.0.*<= 2"):
-        edited(document, [declared("k", was="k", maximum=2.0)])
-    edited(document, [declared("k", was="k", above=0.0, maximum=3.0)])
+        edit_mask(document, [parameter("k", was="k", maximum=2.0)])
+    edit_mask(document, [parameter("k", was="k", above=0.0, maximum=3.0)])
     with pytest.raises(InputError, match=r"the value is 4.0"):
         document.edit(SetParameters(block="spring", values={"k": "w - 1"}))
 
@@ -128,10 +128,10 @@ def test_removing_a_parameter_that_a_formula_reads_is_refused(document: Document
     with pytest.raises(
         DiagramError, match=r"the mask parameter 'k' is removed, and the formula '2\*k' reads it"
     ):
-        edited(document, [])
+        edit_mask(document, [])
     assert document.diagram is before
     document.edit(SetParameters(block="gain", values={"gain": "6"}), ["spring"])
-    edited(document, [])
+    edit_mask(document, [])
     assert inner(document).mask == ()
     assert document.diagram.blocks["spring"].formulas == ()
 
@@ -139,12 +139,12 @@ def test_removing_a_parameter_that_a_formula_reads_is_refused(document: Document
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ([declared("k", was="nothing")], "unknown mask parameter|no mask parameter"),
-        ([declared("k", was="k"), declared("k")], "declared twice"),
-        ([declared("2k", was="k")], "cannot be the name"),
-        ([declared("k", "++", was="k")], "the formula ends where a value is expected"),
-        ([declared("k", "maybe", was="k", kind="boolean")], "the value is 'maybe'"),
-        ([declared("k", was="k"), declared("mode", "c", kind="choice", choices=["a", "b"])], "one of a, b"),
+        ([parameter("k", was="nothing")], "unknown mask parameter|no mask parameter"),
+        ([parameter("k", was="k"), parameter("k")], "declared twice"),
+        ([parameter("2k", was="k")], "cannot be the name"),
+        ([parameter("k", "++", was="k")], "the formula ends where a value is expected"),
+        ([parameter("k", "maybe", was="k", kind="boolean")], "the value is 'maybe'"),
+        ([parameter("k", was="k"), parameter("mode", "c", kind="choice", choices=["a", "b"])], "one of a, b"),
     ],
 )
 def test_invalid_declarations_are_refused(
@@ -152,27 +152,34 @@ def test_invalid_declarations_are_refused(
 ) -> None:
     before = document.diagram
     with pytest.raises(ArmblocksError, match=message):
-        edited(document, parameters)
+        edit_mask(document, parameters)
     assert document.diagram is before
 
 
 def test_parameters_of_all_types_can_be_declared(document: Document) -> None:
     kinds = [
-        declared("k", was="k"),
-        declared("n", "3", kind="integer"),
-        declared("on", "true", kind="boolean"),
-        declared("mode", "b", kind="choice", choices=["a", "b"]),
-        declared("label", "left", kind="string"),
-        declared("arm", "puma560", kind="robot"),
+        parameter("k", was="k"),
+        parameter("n", "3", kind="integer"),
+        parameter("on", "true", kind="boolean"),
+        parameter("mode", "b", kind="choice", choices=["a", "b"]),
+        parameter("label", "left", kind="string"),
+        parameter("arm", "puma560", kind="robot"),
     ]
-    edited(document, kinds)
+    edit_mask(document, kinds)
     values = inner(document).mask_values
     assert (values["n"], values["on"], values["mode"], values["label"]) == (3, True, "b", "left")
     assert values["arm"] == load_robot("puma560")
-    again = [
+    reread_mask = [
         rule.model_copy(update={"default": rule.default}) for rule in mask_of(inner(document)).parameters
     ]
-    assert [rule.kind for rule in again] == ["number", "integer", "boolean", "choice", "string", "robot"]
+    assert [rule.kind for rule in reread_mask] == [
+        "number",
+        "integer",
+        "boolean",
+        "choice",
+        "string",
+        "robot",
+    ]
 
 
 def test_masks_of_primitive_and_linked_blocks_cannot_be_edited(document: Document) -> None:
@@ -188,7 +195,7 @@ def test_masks_of_primitive_and_linked_blocks_cannot_be_edited(document: Documen
 
 
 def test_a_model_can_declare_a_mask(document: Document) -> None:
-    document.edit(SetMask(parameters=[declared("speed", 7.0, was="w")]))
+    document.edit(SetMask(parameters=[parameter("speed", 7.0, was="w")]))
     assert document.undo_title == "mask the model"
     assert dict(document.diagram.blocks["spring"].formulas) == {"k": "speed - 2"}
     assert gain(document)[0] == 10.0
@@ -210,13 +217,13 @@ terms = st.recursive(
 @given(terms, st.permutations(["a", "b", "k", "x1"]))
 def test_renaming_changes_only_whole_names(text: str, order: list[str]) -> None:
     renaming = dict(zip(["a", "b", "k", "x1"], order, strict=True))
-    back = {new: old for old, new in renaming.items()}
+    inverse = {new: old for old, new in renaming.items()}
     renamed = renamed_in(text, renaming)
-    assert renamed_in(renamed, back) == text
+    assert renamed_in(renamed, inverse) == text
     assert Formula(renamed, "").names == {renaming.get(name, name) for name in Formula(text, "").names}
 
 
-def test_a_page_can_read_and_set_a_mask(tmp_path: Path) -> None:
+def test_a_client_can_read_and_set_a_mask(tmp_path: Path) -> None:
     async def scenario(hub: Any, ask: Any, events: Events) -> None:
         key = await ask("open_shipped", document_kind="diagram", name="puma560_servos")
         mask_edit = await ask("ask_mask", document=key, block="servo 1")
