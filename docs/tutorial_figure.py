@@ -15,7 +15,11 @@ from armblocks.blocks import FromTable, Scope, Step
 from armblocks.report.figures import view_figures
 
 TUTORIAL = Path(__file__).parent / "tutorial-controller.md"
-RUNS = {"proportional": "first", "with integral": "winding", "with anti-windup": "better"}
+RUNS = {
+    "proportional": "proportional_run",
+    "with integral": "integral_run",
+    "with anti-windup": "anti_windup_run",
+}
 """The label of each trace, and the variable of its run in the tutorial."""
 
 

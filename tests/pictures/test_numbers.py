@@ -62,8 +62,8 @@ def test_si_prefixes_fit_the_largest_number(largest: float, prefix: str) -> None
 
 def test_text_is_shortened_to_a_given_width() -> None:
     assert shorten("short", 10, 100) == "short"
-    cut = shorten("a very long name of a block", 10, 60)
-    assert cut.endswith("…") and text_width(cut, 10) <= 60
+    shortened = shorten("a very long name of a block", 10, 60)
+    assert shortened.endswith("…") and text_width(shortened, 10) <= 60
     assert text_width("機械", 10) == 20.0
 
 

@@ -53,8 +53,8 @@ const chain = [
 ]
 
 test('disconnecting a block connects its neighbours, and inserting it again restores the wires', () => {
-  const without = disconnectBlocks([gain], chain)
-  expect(sorted(without)).toEqual(
+  const afterDisconnecting = disconnectBlocks([gain], chain)
+  expect(sorted(afterDisconnecting)).toEqual(
     sorted([wire('step/y', 'plant/u'), wire('step/y', 'scope/in1'), wire('clock/y', 'log/in1')]),
   )
   const single = [wire('step/y', 'gain/u'), wire('gain/y', 'plant/u')]
@@ -85,7 +85,7 @@ test('an edit contains exactly the added and removed wires', () => {
   const after = disconnectBlocks([gain], chain)
   const { wires, instead } = wireDifference(chain, after)
   const removed = new Set(instead.map(wireKey))
-  expect(sorted([...chain.filter((one) => !removed.has(wireKey(one))), ...wires])).toEqual(sorted(after))
+  expect(sorted([...chain.filter((old) => !removed.has(wireKey(old))), ...wires])).toEqual(sorted(after))
   expect(wires.concat(instead).map(wireKey)).not.toContain(wireKey(wire('clock/y', 'log/in1')))
 })
 

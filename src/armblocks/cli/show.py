@@ -58,22 +58,22 @@ def show(
             return
         case DocumentKind.ROBOT:
             pass
-    described = ab.load_robot(
+    robot = ab.load_robot(
         model,
         name=name,
         tip=tip,
         packages=named_values(package, "--package"),
         arguments=named_values(argument, "--argument"),
     ).robot
-    # Loading a shipped robot gives no warnings about impossible inertias; this command prints them. Its other
-    # values are compared with their sources by tests: ranges beyond a full turn are no mistakes there.
-    warn_of_inertias(described)
-    if described.source in ab.list_robots():
-        print_robot(described, console)
-        print_facts(described.source, console)
+    # Loading a shipped robot gives no warnings about impossible inertias; this command prints them. Tests
+    # compare its other values with their sources, so ranges beyond a full turn are correct.
+    warn_of_inertias(robot)
+    if robot.source in ab.list_robots():
+        print_robot(robot, console)
+        print_facts(robot.source, console)
     else:
-        warn_of_implausible_values(described)
-        print_robot(described, console)
+        warn_of_implausible_values(robot)
+        print_robot(robot, console)
 
 
 def print_robot(robot: Robot, console: Console) -> None:

@@ -1,4 +1,4 @@
-"""Files of a model in the page: a dropped table, and a Python function that is trusted."""
+"""Files of a model in the studio: a dropped table, and a Python function that is trusted."""
 
 from __future__ import annotations
 

@@ -140,8 +140,8 @@ def test_unsaved_robots_are_offered_and_do_not_overwrite_a_newer_file(disk: Disk
         second = disk.as_after_a_crash(tmp_path / "second")
         newer_content = write_robot(load_robot("kr180"))
         second.project.path("arm.json").write_bytes(newer_content)
-        after = second.robots()
-        (offer,) = after.recoverable.descriptions()
+        restarted = second.robots()
+        (offer,) = restarted.recoverable.descriptions()
         assert (offer.kind, offer.path, offer.disk, offer.edits, offer.parts) == (
             "robot",
             "arm.json",
@@ -150,14 +150,16 @@ def test_unsaved_robots_are_offered_and_do_not_overwrite_a_newer_file(disk: Disk
             6,
         )
         assert [offer.kind for offer in second.documents().recoverable.descriptions()] == ["diagram"]
-        recovered = await after.recover(document_messages.Recover(document=open_file.key, action="keep_both"))
+        recovered = await restarted.recover(
+            document_messages.Recover(document=open_file.key, action="keep_both")
+        )
         assert recovered is not None
         assert recovered.path is not None
         assert recovered.path.startswith("arm recovered 20")
         assert recovered.robot.links[0].mass == 7
         assert second.project.read("arm.json") == newer_content
         with pytest.raises(ArmblocksError, match="there is no robot to recover named"):
-            await after.recover(document_messages.Recover(document=open_file.key, action="open"))
+            await restarted.recover(document_messages.Recover(document=open_file.key, action="open"))
 
     run_async(scenario)
 
@@ -168,11 +170,11 @@ def test_a_robot_edit_repeated_after_a_crash_is_applied_once(disk: Disk, tmp_pat
         open_file = robots.new()
         robots.perform(open_file, cell("one", "link1", "a", "2"))
         robots.perform(open_file, document_messages.Undo(document="", key="two"))
-        after = disk.as_after_a_crash(tmp_path / "second").robots()
-        recovered = after.attach(open_file.key)
-        assert not after.perform(recovered, cell("one", "link1", "a", "2"))
-        assert not after.perform(recovered, document_messages.Undo(document="", key="two"))
-        assert after.perform(recovered, document_messages.Redo(document="", key="three"))
+        restarted = disk.as_after_a_crash(tmp_path / "second").robots()
+        recovered = restarted.attach(open_file.key)
+        assert not restarted.perform(recovered, cell("one", "link1", "a", "2"))
+        assert not restarted.perform(recovered, document_messages.Undo(document="", key="two"))
+        assert restarted.perform(recovered, document_messages.Redo(document="", key="three"))
         assert recovered.robot.links[0].dh is not None
         assert recovered.robot.links[0].dh.a == 2
 
@@ -239,12 +241,12 @@ def test_a_page_does_not_overwrite_a_cell_changed_by_another_page(disk: Disk) ->
         open_file = robots.open_shipped("puma560")
         robots.perform(open_file, cell("1", "link1", "a", "2", author="other", base=0))
         robots.perform(open_file, cell("2", "link1", "d", "3", author="me", base=0))  # another cell
-        for late in (
+        for conflicting in (
             cell("3", "link1", "a", "4", author="me", base=0),
             document_messages.Undo(document="", key="4", author="me", base=0),
         ):
             with pytest.raises(InputError, match=r"another page.*repeat the edit"):
-                robots.perform(open_file, late)
+                robots.perform(open_file, conflicting)
         assert open_file.robot.links[0].dh is not None
         assert (open_file.robot.links[0].dh.a, open_file.robot.links[0].dh.d) == (2, 3)
         robots.perform(
