@@ -345,6 +345,11 @@ article table.docutils:has(th:nth-child(5)){font-size:.875rem}
 .symbol.alone{float:right;margin:0 0 1rem 1.5rem}
 .block-list{display:grid;grid-template-columns:repeat(auto-fill,minmax(320px,1fr));gap:.4rem 1.6rem}
 .block-entry{display:grid;grid-template-columns:112px 1fr;gap:.8rem;align-items:center}
+.robot-list{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(220px,40%),1fr));gap:1.2rem}
+.robot-entry img{display:block;width:100%;height:auto}
+.robot-entry p{margin:.2rem 0;line-height:1.35;font-size:.9em}
+.robot-entry p:empty{display:none}article figure.robot img{width:100%;max-width:400px;height:auto}
+#all-robots td:last-child{overflow-wrap:anywhere}
 .block-entry p{margin:.2rem 0;line-height:1.35;font-size:.92em}
 .block-entry .symbol{justify-self:center}
 @media(max-width:46em){article table.docutils td:not(:first-child) code{overflow-wrap:anywhere}}

@@ -10,7 +10,7 @@ from pathlib import Path
 from block_pages import block_pages, drawing_html, prose, style_sheet
 from function_tables import function_tables
 from reference_signatures import arm_page
-from robot_pages import robots_page
+from robot_pages import robot_pages
 from tutorial_figure import controller_figure
 
 import armblocks as ab
@@ -26,7 +26,6 @@ def write_generated_pages(folder: Path) -> None:
     """
     pages = {
         "examples.md": examples_page(),
-        "robots.md": robots_page(),
         "solver-table.txt": solver_table(),
         "function-tables.txt": function_tables(),
         "arm.txt": arm_page(),
@@ -34,6 +33,7 @@ def write_generated_pages(folder: Path) -> None:
         "controller-figure.txt": controller_figure(),
         "static/pictures.css": style_sheet(),
         **dict(block_pages()),
+        **dict(robot_pages()),
     }
     for name, text in pages.items():
         path = folder / name

@@ -34,7 +34,7 @@ def docs(
     page: Annotated[
         str,
         typer.Argument(
-            help="A page, such as simulation or installation, or a block, such as Gain.",
+            help="A page, such as simulation, a block, such as Gain, or a robot, such as panda.",
             show_default="the first page",
             autocompletion=complete_pages,
         ),
@@ -54,8 +54,10 @@ def docs(
 
 
 def pages(folder: Path) -> dict[str, Path]:
-    """All pages by name, including blocks; a guide takes precedence over a block of the same name."""
-    files = [*sorted(folder.glob("reference/blocks/*.html")), *sorted(folder.glob("reference/*.html"))]
+    """All pages by name, including blocks and robots; a guide takes precedence over one of the same name."""
+    kinds = ("robots", "blocks")
+    files = [path for kind in kinds for path in sorted(folder.glob(f"reference/{kind}/*.html"))]
+    files += sorted(folder.glob("reference/*.html"))
     return {path.stem: path for path in [*files, *sorted(folder.glob("*.html"))]}
 
 
