@@ -39,6 +39,7 @@ from armblocks.blocks import (
     TransportDelay,
     TriggeredSubsystem,
     VariableTimeDelay,
+    VariableTransportDelay,
     ZeroOrderHold,
 )
 from armblocks.diagram import Block
@@ -268,6 +269,24 @@ def test_the_sensitivity_of_a_delayed_ramp_agrees_with_the_closed_form() -> None
     assert np.allclose(result["y", "u.slope"], np.where(after_delay, result.time - 0.7, 0.0), atol=1e-12)
     assert np.allclose(result["y", "y.delay"][after_delay], -1.5, atol=1e-12)
     assert np.array_equal(result["y", "y.initial"], result.time < 0.65)
+
+
+def test_the_arrival_in_a_pipe_whose_transit_time_changes_at_the_start() -> None:
+    """With the transit time a for t < 0 and T from 0 on, the delay is a + t (1 - a/T) until the first arrival
+    at t = T, then it is T. The rate of the delay jumps at the arrival."""
+    builder = ab.DiagramBuilder("pipe")
+    pipe = builder.add("pipe", VariableTransportDelay(initial_delay=0.55, initial=-0.5))
+    builder.connect(builder.add("u", Constant(value=1.0)), pipe["u"])
+    builder.connect(builder.add("T", Constant(value=0.52)), pipe["T"])
+    builder.add("sum", Integrator(), pipe["y"])
+    names = ["T.value", "pipe.initial_delay"]
+    result = ab.sensitivity(builder.build(), names, ["pipe/delay", "sum"], **TIGHT)
+    t, arrived = result.time, result.time > 0.52
+    by_transit = np.where(arrived, 1.0, t * 0.55 / 0.52**2)
+    assert np.allclose(result["pipe/delay", "T.value"], by_transit, atol=1e-8)
+    by_initial = np.where(arrived, 0.0, 1.0 - t / 0.52)
+    assert np.allclose(result["pipe/delay", "pipe.initial_delay"], by_initial, atol=1e-8)
+    assert np.allclose(result["sum", "T.value"], np.where(arrived, -1.5, 0.0), atol=1e-8)
 
 
 def test_a_held_output_depends_on_the_time_when_the_subsystem_is_disabled() -> None:

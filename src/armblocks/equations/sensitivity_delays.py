@@ -12,7 +12,19 @@ Source: Bellen and Zennaro, Numerical Methods for Delay Differential Equations, 
 
 from __future__ import annotations
 
-from casadi import SX, Function, depends_on, fabs, fmax, if_else, logic_and, logic_or, vertcat, vertsplit
+from casadi import (
+    SX,
+    Function,
+    depends_on,
+    fabs,
+    fmax,
+    if_else,
+    logic_and,
+    logic_or,
+    substitute,
+    vertcat,
+    vertsplit,
+)
 
 from armblocks.equations.hybrid_system import Delays
 from armblocks.equations.sensitivity_layout import Columns
@@ -144,10 +156,18 @@ class DelayedSensitivities:
         assert delays is not None
         return delays
 
-    def arrival(self, k: int) -> SX:
-        """The derivative with respect to parameter ``k`` of the arrival time of the last jump, (n,)."""
-        steady = if_else(self.delay_rate == 1.0, 0.0, self.delay_rate)
-        return (self.delayed_p[k] + self.tau_p[k]) / (1.0 - steady)
+    def arrivals(self, fired: SX) -> list[SX]:
+        """The derivatives of the arrival times of the last jumps with respect to the parameters, each (n,).
+
+        The rate d' is its left limit: a jump that arrives may change it.
+        """
+        if not self.n:
+            return [SX(0, 1) for _ in self.columns.names]
+        rate = substitute(self.delay_rate, self.columns.z, self.before_arrival(fired))
+        steady = if_else(rate == 1.0, 0.0, rate)
+        return [
+            (jump + along) / (1.0 - steady) for jump, along in zip(self.delayed_p, self.tau_p, strict=True)
+        ]
 
     def before_arrival(self, fired: SX) -> SX:
         """z with the delayed values before the jumps that have arrived."""

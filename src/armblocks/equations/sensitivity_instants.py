@@ -241,12 +241,12 @@ class Instants:
         follows = vertcat(jumped, SX.zeros(2), sources != 0.0, SX.zeros(arrived.numel()))
         follows = logic_and(follows, _any_marked(vertcat(*at_fixed)))
         instants: list[SX] = []
+        arrivals = self.delays.arrivals(arrived)
         differing = SX.zeros(marks.numel())
         for k, known in enumerate(self.instant_p):
             steady = if_else(self.g_rate == 0.0, 1.0, self.g_rate)
             by_guards = -self.by_parameter(self.g, k) / steady
-            by_arrivals = self.delays.arrival(k) if self.delays.n else SX(0, 1)
-            derivatives = vertcat(by_guards, SX.zeros(2), self._times_by_parameter(k), by_arrivals)
+            derivatives = vertcat(by_guards, SX.zeros(2), self._times_by_parameter(k), arrivals[k])
             mean = dot(if_else(marks, derivatives, 0.0), marks) / fmax(dot(marks, marks), 1.0)
             differs = fabs(derivatives - mean) > SAME_DERIVATIVE * (1.0 + fabs(mean))
             differs = logic_or(logic_and(marks, differs), logic_and(follows, mean != 0.0))
