@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from itertools import pairwise
 
@@ -24,6 +25,7 @@ from armblocks.blocks import (
     HitCrossing,
     Inport,
     Integrator,
+    Modulo,
     Outport,
     Ramp,
     RandomNumber,
@@ -36,6 +38,7 @@ from armblocks.blocks import (
     Step,
     StickSlipFriction,
     Sum,
+    TransferFunction,
     TransportDelay,
     TriggeredSubsystem,
     VariableTimeDelay,
@@ -287,6 +290,28 @@ def test_the_arrival_in_a_pipe_whose_transit_time_changes_at_the_start() -> None
     by_initial = np.where(arrived, 0.0, 1.0 - t / 0.52)
     assert np.allclose(result["pipe/delay", "pipe.initial_delay"], by_initial, atol=1e-8)
     assert np.allclose(result["sum", "T.value"], np.where(arrived, -1.5, 0.0), atol=1e-8)
+
+
+def test_every_jump_of_a_rapid_series_arrives_after_a_delay() -> None:
+    """u moves from -9.4 to -1.4, and from 0.5 s on from 7.06 to -0.14, with the time constant 0.01 s. y =
+    mod(u, M) jumps at u = k M, at first twice a millisecond. Its integral is that of u - M floor(u / M)."""
+    builder = ab.DiagramBuilder("series")
+    step = builder.add("step", Step(time=0.5, initial=1.0, final=0.1))
+    lag = builder.add("lag", TransferFunction(numerator=(8.0,), denominator=(0.01, 1.0)), step)
+    u = builder.add("u", Sum(signs="+-"), lag, builder.add("direct", Gain(gain=9.4), step))
+    y = builder.add("y", Modulo(), u, builder.add("M", Constant(value=0.31)))
+    builder.add("sum", Integrator(), builder.add("late", TransportDelay(delay=0.3), y))
+    settings = {**TIGHT, "stop_time": 1.4, "solver": "dop853"}
+    result = ab.sensitivity(builder.build(), "M.value", "sum", **settings)
+    expected = 0.0
+    for begin, end, first, last in ((0.0, 0.5, -9.4, -1.4), (0.5, 1.1, 7.06, -0.14)):
+        direction = math.copysign(1.0, last - first)
+        k = np.arange(math.floor(first / 0.31) + (direction > 0.0), last / 0.31, direction)
+        times = begin - 0.01 * np.log((k * 0.31 - last) / (first - last))
+        rates = (last - k * 0.31) / 0.01
+        floors = math.floor(first / 0.31) + direction * np.arange(k.size + 1)
+        expected -= np.sum(floors * np.diff([begin, *times, end])) - 0.31 * np.sum(direction * k / rates)
+    assert abs(result["sum", "M.value"][-1] - expected) < 1e-5
 
 
 def test_a_held_output_depends_on_the_time_when_the_subsystem_is_disabled() -> None:

@@ -149,13 +149,14 @@ class EventSearch:
         """Store the signs of all guards just before the event.
 
         A guard may have crossed zero against its direction in this step. That crossing is no event, but the
-        guard needs its present sign for the comparison at the event.
+        guard needs its present sign for the comparison at the event. On the dense output of a step that was
+        taken to an unreliable location, guards may fire slightly earlier; these keep their signs.
         """
         f, r = self.frame, self.frame.r
         h = f.h.value
         self.records.extra_stages_once(time, h)
-        with r.when(self.count_fired_at(maximum(instant, time), time, h) == 0):
-            r.call(self.functions.store_signs, f.reals, r.constant_boolean(False))
+        self.count_fired_at(maximum(instant, time), time, h)
+        r.call(self.functions.store_other_signs, f.reals)
 
     def _check_location(self, reason: IntegerVariable, instant: Real, time: Real, h: Real) -> None:
         """Set ``reason`` to the reason why the event location is unreliable, or to 0 if it is reliable.

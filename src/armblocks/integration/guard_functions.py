@@ -50,6 +50,7 @@ class GuardFunctions:
         self.directions = tuple(float(direction) for direction in sizes.directions)
         self.mark_fired = program.define(self._mark_fired, "mark_fired")
         self.store_signs = program.define(self._store_signs, "store_signs")
+        self.store_other_signs = program.define(self._store_other_signs, "store_other_signs")
         self.store_silenced_signs = (
             program.define(self._store_silenced_signs, "store_silenced_signs")
             if sizes.silenced_guards
@@ -281,6 +282,16 @@ class GuardFunctions:
             sign_after_reset = select(directed & has_fired, -1.0 * mark, new_sign)
             sign_after_event = select(has_fired, select(nonzero, new_sign, sign_after_reset), old_sign)
             signs[i] = select(only_fired, sign_after_event, present_sign)
+
+    def _store_other_signs(self, r: Routine, reals: Reals) -> None:
+        """Store the signs of the guards that have not fired."""
+        workspace = self.workspace
+        values, signs, fired = (
+            reals.after(place) for place in (workspace.guards, workspace.signs, workspace.fired)
+        )
+        for i in r.each(self.count):
+            now, known = sign(values[i]), signs[i]
+            signs[i] = select((fired[i] == 0.0) & (now != 0.0), now, known)
 
     def _store_silenced_signs(self, r: Routine, reals: Reals) -> None:
         """Set the signs of silenced guards to the signs of their values, including 0."""
