@@ -50,8 +50,8 @@ SAME_INSTANT = 2.0**-48
 """Relative tolerance of equal times."""
 SAME_DERIVATIVE = 1e-6
 """Relative tolerance of equal time derivatives of events."""
-JUST_BEFORE = 1.0 - 2.0**-51
-"""Factor from a time to a time just before it."""
+JUST_BEFORE = 1.0 - 2.0**-49
+"""Factor from a time to a time just before it, and before all breakpoints of the same instant."""
 NEVER = -1.0
 """The time of an event that has not occurred, s."""
 

@@ -42,8 +42,7 @@ class Clocks:
         with self.frame.r.unless(self.frame.counts[Count.AT_START] != 0):
             for clock in range(self.count):
                 self.ticking[clock] = 0.0
-            before = (time.bits() - 1).from_bits()
-            self.point.value = select(time > 0.0, before, time)
+            self.point.value = self.frame.just_before(time)
             self.update()
 
     def tick(self, time: Real, until: Real) -> None:

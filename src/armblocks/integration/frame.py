@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from armblocks.integration.workspace import Count, LoopSizes, Scalar, Status, Workspace
+from armblocks.routines.arithmetic import minimum, select
 from armblocks.routines.memory import Integers, Reals, RealVariable
 from armblocks.routines.routine import Part, Routine
-from armblocks.routines.values import Boolean, Integer
+from armblocks.routines.values import Boolean, Integer, Real
 
 SAME_ABOVE, SAME_BELOW = 1.0 + 2.0**-50, 1.0 - 2.0**-50
 """Two times are the same instant if their ratio is between these factors."""
@@ -105,6 +106,15 @@ class Frame:
     def time(self) -> RealVariable:
         """Time that the last accepted step reached."""
         return self.scalar[Scalar.TIME]
+
+    def just_before(self, time: Real) -> Real:
+        """The time of the left limits of an instant: the last double before it. Several breakpoints at one
+        instant may have different times; the left limits are then those before the earliest."""
+        before = select(time > 0.0, (time.bits() - 1).from_bits(), time)
+        segment = self.count[Count.SEGMENT].value
+        ended = select(segment > 0, segment - 1, self.r.constant_integer(0))
+        at_breakpoint = (segment > 0) & (self.arrays.ends[ended] == time)
+        return select(at_breakpoint, minimum(before, self.arrays.clamps[ended]), before)
 
     def vector(self, place: int) -> Reals:
         """A vector of the workspace."""

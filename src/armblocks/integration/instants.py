@@ -133,7 +133,7 @@ class Instants(Schedule):
         initial values."""
         f, records = self.frame, self.records
         with f.r.when(records.jumps_recorded & (f.counts[Count.JUMPS] & 1 == 0)):
-            before = select(time > 0.0, (time.bits() - 1).from_bits(), time)
+            before = f.just_before(time)
             self.point.value = before
             self.evaluation.solve(self.point.memory, self.x)
             records.record_side(before, f.count[Count.SAMPLE].value, self.x)
@@ -236,7 +236,8 @@ class Instants(Schedule):
                 self.point.value = minimum(new_time, f.clamp.value)
                 self.evaluation.solve(self.point.memory, self.x)
                 self.evaluation.accept_unknowns()
-            records.samples(new_time, new_time * SAME_ABOVE, None)
+            # A sample time within rounding of the end of the piece is recorded with the values there.
+            records.samples(new_time, minimum(new_time * SAME_ABOVE, f.end.value * SAME_BELOW), None)
             stages.go(STEP)
         with r.when(new_time >= self.segment_end.value):
             f.increase(Count.SEGMENT)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from armblocks.compiler.ir_text import Module
 from armblocks.compiler.llvm_ir import emit_function
 from armblocks.compiler.native import load_code
+from armblocks.integration.breakpoints import ends_of_segments
 from armblocks.integration.delay_history import ROWS_OF_A_STEP
 from armblocks.integration.elimination_plan import JacobianPattern
 from armblocks.integration.explicit_method import STIFF_CHECKS
@@ -109,11 +110,7 @@ class NativeIntegrator:
         begin_time, stop = start.time, float(samples[-1]) if stop is None else stop
         if checkpoint is not None:
             begin_time = float(checkpoint.reals[Scalar.TIME])
-        # A set instead of np.unique, which would load all of numpy.ma.
-        inside = np.array(sorted({float(time) for time in breakpoints if begin_time < time <= stop}))
-        ends = inside if inside.size and inside[-1] == stop else np.append(inside, stop)
-        clamps = ends.copy()
-        clamps[: inside.size] = np.nextafter(inside, -np.inf)
+        ends, clamps = ends_of_segments(breakpoints, begin_time, stop)
         run = Integration(self, p, samples, ends, clamps)
         if checkpoint is not None:
             run.restore(checkpoint)

@@ -10,7 +10,7 @@ from armblocks.integration.evaluation import Evaluation
 from armblocks.integration.frame import Frame, copy
 from armblocks.integration.method import Method
 from armblocks.integration.workspace import Count, LoopSizes, Stage, Status
-from armblocks.routines.arithmetic import select
+from armblocks.routines.arithmetic import maximum, select
 from armblocks.routines.memory import Reals
 from armblocks.routines.values import Boolean, Integer, Real
 
@@ -37,7 +37,8 @@ class Records:
     def samples(self, time: Real, until: Real, h: Real | None) -> None:
         """Record all sample times up to ``until``: the state y at ``until``, interpolated states before it.
 
-        If ``h`` is None there is no step, and all these sample times are recorded with the state x.
+        If ``h`` is None there is no step, and all these sample times are recorded with the state x. A sample
+        time just before the instant ``time``, within rounding, is recorded with the values of the instant.
         """
         f, r, method = self.frame, self.frame.r, self.method
         with r.loop() as loop:
@@ -54,7 +55,7 @@ class Records:
                     method.interpolate(instant, time, h, row)
                 with r.otherwise():
                     copy(r, method.y, row, f.n)
-            self.discrete_and_unknowns(instant, sample, row)
+            self.discrete_and_unknowns(maximum(instant, time) if h is None else instant, sample, row)
             f.increase(Count.SAMPLE)
 
     def discrete_and_unknowns(self, instant: Real, sample: Integer, x: Reals) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from armblocks.integration.frame import Frame
+from armblocks.integration.frame import SAME_BELOW, Frame
 from armblocks.integration.method import Method
 from armblocks.integration.records import Records
 from armblocks.integration.schedule import START, STEP, Schedule, Trial
@@ -72,7 +72,7 @@ class Segments(Schedule):
         f = self.frame
         x, sample = f.vector(f.workspace.x), f.count[Count.SAMPLE].value
         first = sample == 0
-        recorded = f.arrays.samples[select(first, 0, sample - 1)] >= time
+        recorded = f.arrays.samples[select(first, 0, sample - 1)] > time * SAME_BELOW
         before = select(first | ~recorded, sample, sample - 1)
         self.records.record_side(f.clamp.value, before, x)
         self.records.record_side(time, sample, x)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable
@@ -11,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.integration.frame import SAME_ABOVE
+from armblocks.integration.breakpoints import ends_of_segments, evaluation_times
+from armblocks.integration.frame import SAME_ABOVE, SAME_BELOW
 from armblocks.integration.native_integrator import Integration
 from armblocks.integration.run_point import NO_NUMBERS, Checkpoint, RunPoint
 from armblocks.integration.system import CompiledSystem
@@ -27,11 +27,13 @@ class Rows:
     """Recorded samples from number ``begin`` on.
 
     ``time (N,)`` s, ``states (N, nx)``, ``discrete (N, nz)``, ``algebraic (N, nw)``, and the parameters ``p
-    (np,)``. ``previous`` is the time of the sample before these, s.
+    (np,)``. ``instant (N,)`` s are the times at which the signals are evaluated; they differ by rounding from
+    the sample times just before a breakpoint. ``previous`` is the time of the sample before these, s.
     """
 
     begin: int
     time: Array
+    instant: Array
     states: Array
     discrete: Array
     algebraic: Array
@@ -46,6 +48,7 @@ class Rows:
         return Rows(
             begin=self.begin + skip,
             time=time,
+            instant=self.instant[skip:],
             states=states,
             discrete=discrete,
             algebraic=algebraic,
@@ -55,7 +58,7 @@ class Rows:
 
     def signals(self, compiled: CompiledSystem) -> Array:
         """All signals of these samples, ``(ny, N)``."""
-        return compiled.evaluate_signals(self.time, self.states, self.discrete, self.algebraic, self.p)
+        return compiled.evaluate_signals(self.instant, self.states, self.discrete, self.algebraic, self.p)
 
 
 Consumer = Callable[[Rows], None]
@@ -80,9 +83,11 @@ class RunPart:
         window: int | None,
         change: Change | None = None,
         breakpoints: Array = NO_NUMBERS,
+        record_jumps: bool = True,
     ) -> None:
         """``change``: the point and the parameters before a change of parameters at the begin of this part.
-        ``breakpoints``: times at which sources jump, s; they are recorded here without integration."""
+        ``breakpoints``: times at which sources jump, s; without integration these jumps are recorded here,
+        unless ``record_jumps`` is false."""
         self.p = p
         self.integration = integration
         self.first = begin
@@ -91,7 +96,11 @@ class RunPart:
         """Number of the first sample in memory."""
         self.window = window
         self._change = change
-        self._breakpoints = _breakpoint_sides(breakpoints, sample_times) if integration is None else None
+        self._start = -np.inf if integration is None else integration.time
+        """The time of this part's first instant, s."""
+        self._ends = ends_of_segments(breakpoints, self._start, sample_times.stop)[0]
+        recorded = breakpoints if record_jumps else NO_NUMBERS
+        self._breakpoints = _breakpoint_sides(recorded, sample_times) if integration is None else None
         self._delivered = sample_times.start * SAME_ABOVE if begin == 0 else -np.inf
         """Instants up to this time (s) belong to another run or were received by a consumer."""
         self._sample_times = sample_times
@@ -141,10 +150,12 @@ class RunPart:
         no_columns = np.empty((in_memory, 0))
         parts = (no_columns,) * 3 if run is None else (run.states, run.discrete, run.algebraic)
         states, discrete, algebraic = (part[start:in_memory] for part in parts)
+        # The loop has the times: a block that ends the run adds the time of the end.
+        time = (self._time if run is None else run.inputs[1])[start:in_memory]
         return Rows(
             begin=self.begin + start,
-            # The loop has the times: a block that ends the run adds the time of the end.
-            time=(self._time if run is None else run.inputs[1])[start:in_memory],
+            time=time,
+            instant=evaluation_times(time, self._start, self._ends),
             states=states,
             discrete=discrete,
             algebraic=algebraic,
@@ -267,8 +278,9 @@ def first_window(sample_times: SampleTimes, begin: int, window: int | None) -> A
 
 def _breakpoint_sides(breakpoints: Array, sample_times: SampleTimes) -> tuple[Array, Array]:
     """Rows ``(M, 2, 2)`` and numbers of samples ``(M, 2)`` of the breakpoints inside a run."""
-    inside = sorted({float(time) for time in breakpoints if sample_times.start < time <= sample_times.stop})
-    times = np.array([[math.nextafter(time, -math.inf), time] for time in inside]).reshape(-1, 2)
+    times = np.stack(ends_of_segments(breakpoints, sample_times.start, sample_times.stop)[::-1], axis=1)
+    times = times[times[:, 0] < times[:, 1]]
     rows = np.stack([times, np.zeros_like(times)], axis=2)
-    sample = np.array([[sample_times.up_to(t) for t in pair] for pair in times.tolist()], dtype=np.float64)
+    ends = [(end * SAME_BELOW, end * SAME_ABOVE) for end in times[:, 1].tolist()]
+    sample = np.array([[sample_times.up_to(t) for t in pair] for pair in ends], dtype=np.float64)
     return rows, sample.reshape(-1, 2)

@@ -299,7 +299,6 @@ class Simulation:
         integration = self._method.begin(self._p, first_window(sample_times, begin, window), before)
         self._write_remaining()
         change = self._end_of_part(self._parts[-1]) if self._parts else None
-        breakpoints = self.compiled.breakpoints(self._p) if integration is None else NO_NUMBERS
         recorded = self.options.record_jumps
         self._parts.append(
             RunPart(
@@ -309,7 +308,8 @@ class Simulation:
                 integration,
                 window,
                 change=change if recorded else None,
-                breakpoints=breakpoints if recorded else NO_NUMBERS,
+                breakpoints=self.compiled.breakpoints(self._p),
+                record_jumps=recorded,
             )
         )
         self._changed = False

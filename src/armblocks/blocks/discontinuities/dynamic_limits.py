@@ -51,7 +51,10 @@ class MovingLimits(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class SaturationDynamic(MovingLimits):
-    """The input limited by two signals: y = min(max(u, lower), upper)."""
+    """The input limited by two signals: y = min(max(u, lower), upper).
+
+    If ``lower`` exceeds ``upper``, y is ``upper`` where u > upper, and else ``lower`` where u < lower.
+    """
 
     title: ClassVar[str] = "Saturation Dynamic"
     sign: ClassVar[FaceSign] = SATURATION
