@@ -164,7 +164,7 @@ def test_the_times_of_a_million_ticks_have_no_accumulated_rounding_error() -> No
 
 
 @pytest.mark.parametrize(
-    ("clocks", "stop", "together"),
+    ("clocks", "stop", "common_ticks"),
     [
         ([(0.002, 0.0), (0.005, 0.0)], 10.0, 1001),
         ([(0.1, 0.0), (0.3, 0.0)], 3000.0, 10_001),
