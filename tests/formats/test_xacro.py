@@ -95,7 +95,7 @@ def test_files_that_cannot_be_expanded_are_refused(content: str, words: str, tmp
 def test_an_expansion_without_an_end_is_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(xacro_expansion, "SECONDS", 1.5)
     began = time.perf_counter()
-    with pytest.raises(FormatError, match=r"the expansion takes more than 1.5 s|ended without a result"):
+    with pytest.raises(FormatError, match=r"the expansion takes more than|ended without a result"):
         load_robot(written(tmp_path, '<link name="${9**9**9**9}"/>'))
     assert time.perf_counter() - began < 60  # without the limit it would take years
 

@@ -14,7 +14,11 @@ from armblocks.formats.file_findings import FileContext
 from armblocks.formats.xml_elements import Element, read_elements
 
 SECONDS = 5.0
-"""Maximum duration of an expansion."""
+"""Maximum processor time of an expansion."""
+_PATIENCE = 8.0
+"""Maximum duration of an expansion, as a multiple: other programs may need the processor."""
+_SIGNALS = (-9, -24)
+"""Return codes of a process that the limit of processor time has ended: SIGKILL, SIGXCPU."""
 
 
 def uses_xacro(root: Element) -> bool:
@@ -55,12 +59,12 @@ def expanded(data: bytes, file: str, context: FileContext) -> Element:
             command,
             input=json.dumps(request).encode(),
             capture_output=True,
-            timeout=SECONDS,
+            timeout=_PATIENCE * SECONDS,
             env={**os.environ, "PYTHONPATH": path, "PYTHONIOENCODING": "utf-8"},
         )
-        reply = json.loads(completed.stdout or b'{"error": "the expansion ended without a result"}')
+        reply = json.loads(completed.stdout or json.dumps({"error": _silent_end(completed.returncode)}))
     except subprocess.TimeoutExpired:
-        reply = {"error": f"the expansion takes more than {SECONDS:g} s"}
+        reply = {"error": f"the expansion takes more than {_PATIENCE * SECONDS:g} s"}
     if "text" not in reply:
         raise FormatError(
             f"xacro cannot expand the file: {reply['error']}",
@@ -69,3 +73,9 @@ def expanded(data: bytes, file: str, context: FileContext) -> Element:
             fix="give packages={name: folder} and arguments={name: value}, or expand the file with xacro",
         )
     return read_elements(reply["text"].encode(), f"{file} (expanded)")
+
+
+def _silent_end(code: int) -> str:
+    if code in _SIGNALS:
+        return f"the expansion takes more than {SECONDS:g} s of processor time"
+    return "the expansion ended without a result"
