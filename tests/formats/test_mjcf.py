@@ -272,3 +272,12 @@ def test_damaged_files_are_read_or_refused(seed: int) -> None:
         read_mjcf(bytes(data), "damaged.xml", FileContext())
     except FormatError as error:
         assert "damaged.xml" in str(error)
+
+
+def test_backslashes_in_paths_are_read_as_slashes(tmp_path: Path) -> None:
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "arm.xml").write_text("<mujocoinclude><body name='a'/></mujocoinclude>")
+    (tmp_path / "model.xml").write_text(
+        r"<mujoco><worldbody><include file='parts\arm.xml'/></worldbody></mujoco>"
+    )
+    assert [link.name for link in ab.load_robot(tmp_path / "model.xml").robot.links] == ["a"]

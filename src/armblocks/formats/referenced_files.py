@@ -48,7 +48,18 @@ def _manifest_names(manifest: Path, name: str) -> bool:
 
 
 def resolved(reference: str, context: FileContext, start: Path | None = None) -> Path | str:
-    """The file of a reference, or the reason why there is none."""
+    """The file of a reference, or the reason why there is none.
+
+    A backslash, which files from Windows contain, is read as a slash if there is no file with its name.
+    """
+    path = _resolved(reference, context, start)
+    if isinstance(path, str) and "\\" in reference:
+        other = _resolved(reference.replace("\\", "/"), context, start)
+        return other if isinstance(other, Path) else path
+    return path
+
+
+def _resolved(reference: str, context: FileContext, start: Path | None) -> Path | str:
     scheme, separator, rest = reference.partition("://")
     start = start or context.folder
     if separator and scheme in ("package", "model"):
