@@ -194,9 +194,9 @@ def test_data_that_a_format_does_not_have_give_warnings(format: str) -> None:
     warned("depends on the direction; the mean is written", motor=Motor(coulomb_friction=(0.2, -0.1)))
     with pytest.warns(ArmblocksWarning, match="friction accelerates the joint"):
         warned(f"is not part of {format} files", motor=Motor(viscous_friction=-1.0))
-    warned(f"{format} reserves the name of link 'world'; it is 'world_'", name="world")
+    warned(f"the name of link 'world' becomes 'world_', as {format} requires", name="world")
     if format == "SDF":
-        warned("reserves the name of link 'a::b'; it is 'a_b_'", name="a::b")
+        warned("the name of link 'a::b' becomes 'a_b_'", name="a::b")
         return
     warned("gear ratios are not part of an MJCF file", motor=Motor(gear_ratio=5.0))
     warned("speed limits are not part of an MJCF file", joint=Revolute(limits=JointLimits(speed=1.0)))

@@ -15,6 +15,8 @@ import math
 import re
 from typing import cast
 
+import numpy as np
+
 from armblocks.errors import ArmblocksError, FormatError, RobotError
 from armblocks.formats.canonical_json import canonical_bytes
 from armblocks.formats.json_document import Node, closed_members, read_document
@@ -266,7 +268,8 @@ def _transform_from_json(node: Node) -> Transform:
         _vector_from_json(members["translation"]) if "translation" in members else identity.translation
     )
     try:
-        return Transform(rotation=rotation, translation=translation)
+        with np.errstate(all="ignore"):  # numbers whose products overflow are no rotation
+            return Transform(rotation=rotation, translation=translation)
     except ArmblocksError as error:
         raise node.error(error.what, allowed=error.allowed, fix=error.fix) from error
 

@@ -93,9 +93,12 @@ def file_names(robot: Robot, is_reserved: Callable[[str], bool], format: str) ->
     for link in robot.links:
         names[link.name] = link.name
         if is_reserved(link.name):
-            new = free_name(link.name.replace("::", "_").strip("_") + "_", used)
+            new = free_name(link.name.strip()[:100].replace("::", "_").strip("_") + "_", used)
             names[link.name] = new
-            warn(f"robot '{robot.name}'", f"{format} reserves the name of link '{link.name}'; it is '{new}'")
+            warn(
+                f"robot '{robot.name}'",
+                f"the name of link '{link.name[:60]}' becomes '{new[:60]}', as {format} requires",
+            )
     return names
 
 

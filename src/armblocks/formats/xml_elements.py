@@ -23,6 +23,8 @@ MAX_DEPTH = 64
 """Maximum nesting of elements."""
 MAX_ELEMENTS = 200_000
 """Maximum number of elements of a file."""
+MAX_NUMBER = 1e50
+"""Maximum magnitude of a number, so that products of several numbers do not overflow."""
 
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 
@@ -83,12 +85,12 @@ class Element:
             )
         return value
 
-    def number(self, attribute: str, default: float | None = None) -> float:
-        """The number of an attribute; ``default`` if it is absent."""
+    def number(self, attribute: str, default: float | None = None, *, limit: float = MAX_NUMBER) -> float:
+        """The number of an attribute; ``default`` if it is absent. ``limit``: its maximum magnitude."""
         if attribute not in self.attributes and default is not None:
             return default
-        self.required(attribute, "a number")
-        (value,) = self.numbers(attribute, (1,))
+        text = self.required(attribute, "a number")
+        (value,) = self._numbers(f"the attribute '{attribute}'", text, (1,), limit)
         return value
 
     def vector(self, attribute: str, default: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -102,11 +104,13 @@ class Element:
         """The numbers of an attribute that is present; ``counts``: how many there may be."""
         return self._numbers(f"the attribute '{attribute}'", self.attributes[attribute], counts)
 
-    def text_numbers(self, count: int) -> list[float]:
-        """``count`` numbers of the text inside the element, separated by spaces."""
-        return self._numbers(f"the element <{self.tag}>", self.text, (count,))
+    def text_numbers(self, count: int, *, limit: float = MAX_NUMBER) -> list[float]:
+        """``count`` numbers of the text inside the element, separated by spaces; ``limit``: their maximum."""
+        return self._numbers(f"the element <{self.tag}>", self.text, (count,), limit)
 
-    def _numbers(self, subject: str, text: str, counts: Collection[int]) -> list[float]:
+    def _numbers(
+        self, subject: str, text: str, counts: Collection[int], limit: float = MAX_NUMBER
+    ) -> list[float]:
         words = re.split(r"\s*,\s+|\s+", text.strip())  # a comma before a space separates, as a space does
         if len(words) not in counts:
             allowed = f"{min(counts)} to {max(counts)}" if len(counts) > 1 else str(max(counts))
@@ -122,6 +126,12 @@ class Element:
                     f"{subject} contains '{shortened(word)}', which is not a number",
                     allowed="finite decimal numbers such as 0.25 or -1.5e-3",
                     fix=_hint(word),
+                )
+            if abs(value) > limit:
+                raise self.error(
+                    f"{subject} contains '{shortened(word)}', which is too large",
+                    allowed=f"magnitudes up to {limit:g}",
+                    fix="correct the number, or leave it out where it means no limit",
                 )
             values.append(value)
         return values

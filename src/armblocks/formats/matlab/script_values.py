@@ -126,7 +126,7 @@ class ScriptValues:
             return
         matches = difflib.get_close_matches(name, [*self._variables, *callable_names], n=1, cutoff=0.6)
         raise location.error(
-            f"'{name}' is neither a variable nor a supported function",
+            f"'{name[:60]}' is neither a variable nor a supported function",
             allowed=f"straight-line robot scripts, with {', '.join(callable_names)}",
             fix=f"did you mean '{matches[0]}'?" if matches else "define it, or remove the line",
         )

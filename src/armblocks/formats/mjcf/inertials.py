@@ -10,9 +10,10 @@ import numpy as np
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.mjcf.meshes import MeshAssets
 from armblocks.formats.mjcf.poses import rotation_of
+from armblocks.formats.mjcf.rules import INERTIA
 from armblocks.formats.mjcf.settings import Settings
 from armblocks.formats.mjcf.shapes import Geom, inertia_of
-from armblocks.formats.xml_elements import Element
+from armblocks.formats.xml_elements import Element, note
 from armblocks.robot.link import ZERO3
 from armblocks.spatial import Matrix3, Vector3, matrix3
 from armblocks.spatial.inertia import RigidInertia
@@ -47,6 +48,10 @@ def mass_properties(
             if low <= geom.element.number("group", 0.0) <= high:
                 total = total.plus(inertia_of(geom, meshes, body.label, context))
         properties = _about_centre(total)
+        if not np.isfinite([properties.mass, *properties.centre, *np.ravel(properties.inertia)]).all():
+            what = "its mass cannot be computed from sizes or masses that are almost zero; it is read as zero"
+            note(context, INERTIA, body, what)
+            properties = MassProperties()
     return _bounded(properties, settings) if properties.mass > 0 else properties
 
 

@@ -31,7 +31,8 @@ from armblocks.robot.shapes import Material, Shape
 from armblocks.spatial import Transform, transl
 
 _NOT_READ = ("replicate", "attach", "composite", "flexcomp", "plugin")
-_MAX_NAME = 200
+MAX_NAME = 200
+"""Maximum number of characters of the name of a link."""
 
 
 def read_mjcf(data: bytes, file: str, context: FileContext) -> Robot:
@@ -216,7 +217,7 @@ class _Model:
 
     def _free_name(self, given_name: str, substitute: str) -> str:
         """The name of an element, or a new name if the element has none or its name is in use."""
-        base = given_name.strip()[:_MAX_NAME] or substitute
+        base = given_name.strip()[:MAX_NAME] or substitute
         name, number = base, 2
         is_body = substitute == "body" and given_name.strip() != ""
         while name in self.names or (name in self.body_names and not (is_body and name == base)):

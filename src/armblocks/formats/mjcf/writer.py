@@ -17,7 +17,7 @@ import numpy as np
 
 from armblocks.errors import FormatError
 from armblocks.formats.file_findings import FileContext
-from armblocks.formats.mjcf.reader import read_mjcf
+from armblocks.formats.mjcf.reader import MAX_NAME, read_mjcf
 from armblocks.formats.robot_writing import (
     check_joint,
     file_names,
@@ -64,7 +64,7 @@ def write_mjcf(robot: Robot) -> bytes:
     for link in robot.links:
         check_joint(robot, link, "MJCF")
     _warn_of_losses(robot)
-    names = file_names(robot, lambda name: name == "world", "MJCF")
+    names = file_names(robot, _is_changed, "MJCF")
     meshes: list[str] = []
     bodies, roots = _bodies(robot)
     lines = _nested(robot, bodies, roots, names, meshes)
@@ -80,6 +80,11 @@ def write_mjcf(robot: Robot) -> bytes:
     tip = names[robot.links[-1].name] if robot.tool.is_identity else _tool_name(robot, names)
     warn_of_order(robot, tip, read_mjcf(data, "robot.xml", FileContext()), "MJCF")
     return data
+
+
+def _is_changed(name: str) -> bool:
+    """Whether the reader would not give a body this name."""
+    return name == "world" or name != name.strip() or len(name) > MAX_NAME
 
 
 def _warn_of_losses(robot: Robot) -> None:

@@ -140,11 +140,9 @@ class Frames:
         The common part of the chains of both frames is not computed, so that the default pose of a joint on
         its child link is exactly the identity.
         """
-        chain_a, chain_b = self._chain(a), self._chain(b)
-        in_b = set(chain_b)
-        common = next(frame for frame in chain_a if frame in in_b)  # the world, if no other frame is common
-        T_b = self._product(chain_b[: chain_b.index(common)])
-        return T_b if common is a else self._product(chain_a[: chain_a.index(common)]).inverse() @ T_b
+        chain_a, chain_b = self._chains(a, b)
+        T_b = self._product(chain_b)
+        return T_b if not chain_a else self._product(chain_a).inverse() @ T_b
 
     def inside(self, link: Frame, pose: Element | None) -> Transform:
         """The pose in a link of an element of the link, such as a visual."""
@@ -199,16 +197,25 @@ class Frames:
             return self.lookup(frame, attached_to, frame.element)
         return frame.model_frame or _world(frame.scope)
 
-    def _chain(self, frame: Frame) -> list[Frame]:
-        """The frame, the frame that its pose is relative to, and so on to the world."""
-        chain: dict[Frame, None] = {frame: None}
-        while frame.kind != WORLD:
-            frame, _ = self._step(frame)
-            if frame in chain:
-                names = list(chain)
-                raise _cycle([*names[names.index(frame) :], frame], "relative to")
-            chain[frame] = None
-        return list(chain)
+    def _chains(self, a: Frame, b: Frame) -> tuple[list[Frame], list[Frame]]:
+        """The frames from a and from b to the first frame that both are relative to, without that one.
+
+        Both chains grow in turns, so that the effort depends on the distance of the frames only.
+        """
+        chains: tuple[dict[Frame, None], dict[Frame, None]] = ({a: None}, {b: None})
+        ends = [a, b]
+        while True:
+            for own, other in ((0, 1), (1, 0)):
+                if ends[own] in chains[other]:
+                    first, second = ([*chain] for chain in chains)
+                    return first[: first.index(ends[own])], second[: second.index(ends[own])]
+                if ends[own].kind == WORLD:
+                    continue
+                ends[own], _ = self._step(ends[own])
+                if ends[own] in chains[own]:
+                    names = list(chains[own])
+                    raise _cycle([*names[names.index(ends[own]) :], ends[own]], "relative to")
+                chains[own][ends[own]] = None
 
     def _product(self, chain: list[Frame]) -> Transform:
         """The pose of the first frame in the frame that follows the last one."""

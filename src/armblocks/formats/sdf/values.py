@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.sdf.rules import ANGLE
-from armblocks.formats.xml_elements import Element, note, shortened
+from armblocks.formats.xml_elements import MAX_NUMBER, Element, note, shortened
 from armblocks.spatial import Transform, transl, trotx, troty, trotz
 
 MAX_ANGLE = 2 * math.pi * (1 + 1e-6)
@@ -16,15 +16,17 @@ _TRUE, _FALSE = ("true", "1"), ("false", "0", "")
 _INFINITE = ("inf", "+inf", "infinity", "-inf", "-infinity")
 
 
-def number_in(parent: Element | None, tag: str, default: float) -> float:
+def number_in(parent: Element | None, tag: str, default: float, *, limit: float = MAX_NUMBER) -> float:
     """The number in a child element; ``default`` if it is absent. Infinite numbers are not allowed.
+
+    ``limit``: the maximum magnitude.
 
     Files of SDF 1.0 to 1.2 have attributes instead of child elements.
     """
     child = parent.first(tag) if parent is not None else None
     if child is not None:
-        return child.text_numbers(1)[0]
-    return default if parent is None else parent.number(tag, default)
+        return child.text_numbers(1, limit=limit)[0]
+    return default if parent is None else parent.number(tag, default, limit=limit)
 
 
 def unbounded_number_in(parent: Element | None, tag: str, default: float) -> float:
@@ -32,7 +34,7 @@ def unbounded_number_in(parent: Element | None, tag: str, default: float) -> flo
     child = parent.first(tag) if parent is not None else None
     text = (parent.attributes.get(tag, "") if parent is not None else "") if child is None else child.text
     word = text.strip().lower()
-    return float(word) if word in _INFINITE else number_in(parent, tag, default)
+    return float(word) if word in _INFINITE else number_in(parent, tag, default, limit=math.inf)
 
 
 def text_in(parent: Element, tag: str) -> str:

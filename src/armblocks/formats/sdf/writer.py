@@ -71,7 +71,8 @@ def write_sdf(robot: Robot) -> bytes:
 
 
 def _is_reserved(name: str) -> bool:
-    return name == "world" or "::" in name or (name.startswith("__") and name.endswith("__"))
+    is_private = name.startswith("__") and name.endswith("__")
+    return name == "world" or "::" in name or name != name.strip() or is_private
 
 
 def _link_lines(robot: Robot, link: Link, names: Mapping[str | None, str], joint: str) -> list[str]:

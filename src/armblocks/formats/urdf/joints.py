@@ -103,7 +103,7 @@ def _limits(element: Element, kind: str, context: FileContext) -> JointLimits:
 
 def _bound(limit: Element, name: str) -> float:
     text = limit.attributes.get(name, "0").strip()
-    value = float(text) if text.lower() in _INFINITE else limit.number(name, 0.0)
+    value = float(text) if text.lower() in _INFINITE else limit.number(name, 0.0, limit=math.inf)
     return value if abs(value) < UNLIMITED else math.copysign(math.inf, value)
 
 

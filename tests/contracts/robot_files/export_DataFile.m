@@ -1,0 +1,14 @@
+smiData.RigidTransform(1).translation = [1 2 3];  % mm
+smiData.RigidTransform(1).angle = 1.5;  % rad
+smiData.RigidTransform(1).axis = [1 2 3];
+smiData.RigidTransform(1).ID = 'B[a-1:-:b-1]';
+smiData.RigidTransform(2).translation = [1 2 3];  % mm
+smiData.RigidTransform(2).angle = 1.5;  % rad
+smiData.RigidTransform(2).axis = [1 2 3];
+smiData.RigidTransform(2).ID = 'F[a-1:-:b-1]';
+smiData.Solid(1).mass = 3;  % kg
+smiData.Solid(1).CoM = [1 2 3];  % mm
+smiData.Solid(1).MoI = [4 5 6];  % kg*mm^2
+smiData.Solid(1).PoI = [1 2 3];  % kg*mm^2
+smiData.Solid(1).ID = 'a*:*Default';
+smiData.RevoluteJoint(1).ID = '[a-1:-:b-1]';
