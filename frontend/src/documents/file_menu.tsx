@@ -94,14 +94,16 @@ function Shipped() {
   return (
     <>
       <Menu.Label>Robots</Menu.Label>
-      {(welcome?.robots ?? []).map((shipped) => (
-        <Menu.Item
-          key={shipped}
-          onClick={() => void ask({ kind: 'open_shipped', document_kind: 'robot', name: shipped })}
-        >
-          {shipped}
-        </Menu.Item>
-      ))}
+      <div className="shipped-robots">
+        {(welcome?.robots ?? []).map((shipped) => (
+          <Menu.Item
+            key={shipped}
+            onClick={() => void ask({ kind: 'open_shipped', document_kind: 'robot', name: shipped })}
+          >
+            {shipped}
+          </Menu.Item>
+        ))}
+      </div>
       <Menu.Label>Examples</Menu.Label>
       {Object.entries(welcome?.examples ?? {}).map(([example, description]) => (
         <Menu.Item

@@ -278,14 +278,16 @@ export function RobotItems() {
     <>
       <Menu.Item onClick={() => void ask({ kind: 'new', document_kind: 'robot' })}>New robot</Menu.Item>
       <Menu.Label>Shipped robots</Menu.Label>
-      {robots.map((shipped) => (
-        <Menu.Item
-          key={shipped}
-          onClick={() => void ask({ kind: 'open_shipped', document_kind: 'robot', name: shipped })}
-        >
-          {shipped}
-        </Menu.Item>
-      ))}
+      <div className="shipped-robots">
+        {robots.map((shipped) => (
+          <Menu.Item
+            key={shipped}
+            onClick={() => void ask({ kind: 'open_shipped', document_kind: 'robot', name: shipped })}
+          >
+            {shipped}
+          </Menu.Item>
+        ))}
+      </div>
     </>
   )
 }
