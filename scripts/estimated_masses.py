@@ -56,8 +56,11 @@ def _with_mass(link: Link, shapes: tuple[Shape, ...], density: float) -> Link:
     volume, centre, inertia = _solid(shapes)
     mass = _rounded(volume * density)
     scale = mass / volume if volume else 0.0
-    threshold = 0.02 * float(np.abs(inertia).max())
-    moments = [[_rounded(x * scale) if abs(x) > threshold else 0.0 for x in row] for row in inertia]
+    threshold = 0.02 * float(np.abs(inertia).max())  # smaller products of inertia are omitted
+    moments = [
+        [_rounded(x * scale) if i == j or abs(x) > threshold else 0.0 for j, x in enumerate(row)]
+        for i, row in enumerate(inertia)
+    ]
     position = tuple(round(float(x), 3) + 0.0 for x in centre)
     return replace(link, mass=mass, centre_of_mass=position, inertia=np.array(moments))
 

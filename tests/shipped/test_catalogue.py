@@ -25,6 +25,7 @@ PANDA = json.loads((Path(__file__).parent / "panda_dynamics.json").read_text(enc
 EXERCISES = {"kr180", "kr180_cell", "planar3r", "puma560", "twolink"}
 """Robots that are older than the catalogue."""
 CATALOGUE = sorted(set(list_robots()) - EXERCISES)
+ESTIMATED = [name for name in CATALOGUE if shipped_facts(name).masses is MassOrigin.ESTIMATED]
 NOT_COMPARED = {"phantomx", "puma560_akb", "stanford"}
 """Robots for which no second source is known."""
 
@@ -114,7 +115,14 @@ def test_the_reach_is_that_of_the_data_sheet(name: str) -> None:
     assert reach is not None and 0.75 * distance < reach < 1.15 * distance
 
 
-@pytest.mark.parametrize("name", CATALOGUE)
+@pytest.mark.parametrize("name", ESTIMATED)
+def test_every_link_of_an_estimate_has_a_possible_inertia(name: str) -> None:
+    robot = load_robot(name)
+    assert inertia_findings(robot) == ()
+    assert all(link.mass > 0 and np.linalg.eigvalsh(link.I).min() > 0 for link in robot.links)
+
+
+@pytest.mark.parametrize("name", [name for name in CATALOGUE if name not in ESTIMATED])
 def test_the_inertia_matrix_is_symmetric_and_positive_definite(name: str) -> None:
     robot = load_robot(name)
     M = np.asarray(function(trace_inertia(robot))(sample(robot, 2))).reshape(robot.n, robot.n)
