@@ -316,7 +316,7 @@ def test_unknown_suffix_is_refused() -> None:
 def test_oversized_file_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "big.m"
     path.write_bytes(b" " * (2**20 + 1))
-    with pytest.raises(FormatError, match=r"the file is too large. Allowed: at most 1048576 bytes"):
+    with pytest.raises(FormatError, match=r"the file has 1048577 bytes. Allowed: at most 1048576"):
         load_robot(path)
 
 
