@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 from pathlib import Path
 
 import numpy as np
@@ -329,3 +330,13 @@ def test_a_path_may_begin_with_the_assembly_itself() -> None:
     )
     robot, codes = found(text)
     assert robot.joint_names == ("b",) and robot.link("b").parent is None and codes == ["simscape-free"]
+
+
+def test_many_redundant_mates_are_read_in_bounded_time() -> None:
+    began = time.process_time()
+    pair = (mate("Concentric", "line", "line"), mate("Coincident", *PLANE))
+    robot, codes = found(mates(*(pair * 3000)))
+    assert robot.joint_letters == "R" and codes == []
+    with pytest.raises(FormatError, match="the assembly has too many mates"):
+        found(mates(*(pair * 5001)))
+    assert time.process_time() - began < 60

@@ -22,7 +22,7 @@ import numpy as np
 
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.simscape.assembly import GROUND, Assembly, Connection, Kind, Part
-from armblocks.formats.simscape.mates import GEOMETRIES, Geometry, motion_of, rows_of
+from armblocks.formats.simscape.mates import GEOMETRIES, Geometry, Motion, motion_of, rows_of
 from armblocks.formats.simscape.rules import FRAMES, GEOMETRY, JOINT_CODE, MASS, MATE, UNITS
 from armblocks.formats.simscape.units import LENGTHS, MASSES
 from armblocks.formats.xml_elements import Element, note, read_elements, shortened
@@ -40,6 +40,8 @@ JOINT_KINDS = {
     "revolute": Kind.REVOLUTE,
     "prismatic": Kind.PRISMATIC,
 }
+MAX_MATES = 10 * MAX_LINKS
+"""Maximum number of mates of an assembly."""
 _TOLERANCE = 1e-6
 
 
@@ -122,6 +124,8 @@ class _Reader:
                     assembly.connections.append(self._joint(joint, instance))
                 for mate in _all_inside(source, "Constraints"):
                     self._mates += self._mate(mate, instance)
+                    if len(self._mates) > MAX_MATES:
+                        raise mate.error("the assembly has too many mates", allowed=f"at most {MAX_MATES}")
         assembly.connections += self._mated(assembly)
         self._note_left_out()
         return assembly
@@ -313,16 +317,19 @@ class _Reader:
         poses = {GROUND: Transform(), **assembly.poses}
         groups = _Groups([c for c in assembly.connections if c.kind is Kind.WELD])
         found: list[Connection] = []
+        known: dict[tuple[int, ...], Motion] = {}
         while True:
             pairs: dict[tuple[str, str], list[_Mate]] = {}
             for mate in self._mates:
                 a, b = (groups.leader(end) for end in mate.ends)
                 if a != b:
                     pairs.setdefault((min(a, b), max(a, b)), []).append(mate)
-            motions = {
-                pair: motion_of([m.rows for m in mates if m.rows is not None])
-                for pair, mates in pairs.items()
-            }
+            motions: dict[tuple[str, str], Motion] = {}
+            for pair, mates in pairs.items():
+                key = tuple(map(id, mates))
+                if key not in known:
+                    known[key] = motion_of([mate.rows for mate in mates if mate.rows is not None])
+                motions[pair] = known[key]
             welds = [pair for pair, motion in motions.items() if motion.kind is Kind.WELD]
             if not welds:
                 break

@@ -118,7 +118,9 @@ class Motion(NamedTuple):
 
 def motion_of(rows: Sequence[_Array]) -> Motion:
     """The motion between two bodies that satisfies all equations."""
-    A = np.vstack(rows)
+    all_rows = np.vstack(rows)
+    # Six rows with the same solutions, if there are more.
+    A: _Array = all_rows if len(all_rows) <= 6 else np.asarray(np.linalg.qr(all_rows, mode="r"))
     # Moments are divided by a length, so that all entries of the equations have about the same size.
     length = max(float(np.abs(A[:, 3:]).max()), 1e-3)
     scaled = A / np.array([1.0] * 3 + [length] * 3)
