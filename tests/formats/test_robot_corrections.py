@@ -197,3 +197,17 @@ def test_multiples_of_half_a_degree_above_30_are_degrees() -> None:
     assert not are_degrees((-10.0, 10.0))  # a joint that turns three times
     assert not are_degrees((-31.4159, 31.4159)) and not are_degrees((-1.57, 180.0)) and not are_degrees(())
     assert not are_degrees((0.0, 3600.0))
+
+
+def test_repeated_names_of_mjcf_bodies_are_corrected(tmp_path: Path) -> None:
+    path = tmp_path / "arm.xml"
+    inner = "<geom size='0.1'/><joint/>"
+    path.write_text(
+        f"<mujoco><worldbody><body name='a'>{inner}<body name='a 2'>{inner}</body>"
+        f"<body name='a'>{inner}</body></body></worldbody></mujoco>",
+        encoding="utf-8",
+    )
+    result, copy = corrected(path)
+    assert codes(result) == ["mjcf-name"] and not result.remaining
+    names = [link.name for link in robot_of(copy).links]
+    assert sorted(names) == sorted(link.name for link in robot_of(path).links) == ["a", "a 2", "a 3"]

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from armblocks.formats.file_corrections import are_degrees, numbers_text
 from armblocks.formats.file_findings import FileFinding
-from armblocks.formats.mjcf.rules import LIMIT
+from armblocks.formats.mjcf.rules import LIMIT, NAME
 from armblocks.formats.mjcf.settings import settings_of
 from armblocks.formats.robot_rules import IMPLAUSIBLE
 from armblocks.formats.xml_corrections import Edit, XmlFile
@@ -18,7 +18,20 @@ def edits_of(finding: FileFinding, element: Element, file: XmlFile) -> Sequence[
     """The changes that remove a finding; none if its remedy is not certain."""
     if finding.rule is IMPLAUSIBLE:
         return [*_range_in_degrees(finding.link, file)]
-    return [*_ordered_range(element)] if finding.rule.code == LIMIT.code else []
+    if finding.rule is NAME:
+        return [*_unique_name(element, file)]
+    return [*_ordered_range(element)] if finding.rule is LIMIT else []
+
+
+def _unique_name(body: Element, file: XmlFile) -> Iterator[Edit]:
+    base, number = body.attributes["name"].strip(), 2
+    used = {
+        element.attributes.get("name", "").strip() for tag in ("body", "joint") for element in file.all(tag)
+    }
+    while f"{base} {number}" in used:
+        number += 1
+    new = f"{base} {number}"
+    yield Edit(element=body, what=f"body renamed '{new}'", attributes={"name": new})
 
 
 def _ordered_range(joint: Element) -> Iterator[Edit]:

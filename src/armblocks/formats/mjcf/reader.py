@@ -20,7 +20,7 @@ from armblocks.formats.mjcf.inertials import mass_properties
 from armblocks.formats.mjcf.joints import joint_of, torque_limits
 from armblocks.formats.mjcf.meshes import MeshAssets
 from armblocks.formats.mjcf.poses import pose_of
-from armblocks.formats.mjcf.rules import EQUALITY, FREE, STIFFNESS, TENDON, UNREAD
+from armblocks.formats.mjcf.rules import EQUALITY, FREE, NAME, STIFFNESS, TENDON, UNREAD
 from armblocks.formats.mjcf.settings import MAIN, Defaults, Settings, sections, settings_of
 from armblocks.formats.mjcf.shapes import Geom, drawn, geom_of, is_collision_only
 from armblocks.formats.xml_elements import Element, note, read_elements, shortened
@@ -107,6 +107,7 @@ class _Model:
         self.torques = torque_limits(root, self.defaults, context)
         self.body_names = {body.attributes.get("name", "").strip() for body in _bodies(root)}
         self.names: set[str] = set()
+        self.read_bodies: set[str] = set()
         self.has_shapes = False
         self._note_left_out()
 
@@ -141,6 +142,11 @@ class _Model:
         pose = place.pose @ pose_of(body, self.settings)
         inside = self._contents(body, replace(place, pose=Transform(), default_class=default_class))
         name = self._free_name(body.attributes.get("name", ""), "body")
+        given = body.attributes.get("name", "").strip()
+        if given and given in self.read_bodies:
+            what = f"there is another body of this name; this one is read as '{shortened(name)}'"
+            note(self.context, NAME, body, what)
+        self.read_bodies.add(given)
         self.context.lines[name] = body.line
         series: list[Link] = []
         parent, before, offset = place.parent, pose, transl(0.0, 0.0, 0.0)

@@ -54,6 +54,11 @@ UNREAD = Rule(
     allowed="a tree of bodies with hinges and slides",
     remedy="write the part out as bodies",
 )
+NAME = Rule(
+    code="mjcf-name",
+    allowed="unique names of bodies",
+    remedy="rename one of the bodies",
+)
 
-MJCF_RULES = (*(FREE, STIFFNESS, EQUALITY, TENDON, LIMIT, FRICTION, INERTIA, MESH, SHAPE, UNREAD),)
+MJCF_RULES = (*(FREE, STIFFNESS, EQUALITY, TENDON, LIMIT, FRICTION, INERTIA, MESH, SHAPE, UNREAD, NAME),)
 """All rules of this format."""
