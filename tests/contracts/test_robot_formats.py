@@ -6,6 +6,7 @@ the time of a clock.
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import time
 import warnings
@@ -20,7 +21,8 @@ from armblocks.formats import ROBOT_FORMATS, RobotFormat, robot_bytes
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.robot_lint import findings_of
 from armblocks.robot import Link, Motor, Robot, standard_dh
-from robots_for_tests import build_random_tree
+from armblocks.robot.robot import STANDARD_GRAVITY
+from robots_for_tests import build_random_tree, evaluate, random_states
 
 SECONDS = 20.0
 """A bound for the processor time of one file: a hang takes longer on every machine."""
@@ -185,6 +187,21 @@ def test_document_types_and_entities_are_refused_in_every_xml_format(format: Rob
 
 
 WRITERS = [format for format in ROBOT_FORMATS if format.write is not None]
+
+
+@pytest.mark.parametrize("format", WRITERS, ids=lambda format: format.name)
+def test_every_written_format_keeps_the_poses_and_torques(format: RobotFormat) -> None:
+    assert format.write is not None
+    robot = dataclasses.replace(ARM, gravity=STANDARD_GRAVITY)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ArmblocksWarning)
+        again = read(format, format.write(robot))
+    assert isinstance(again, Robot) and again.joint_names == robot.joint_names
+    q, qd, qdd = random_states(robot, 1)[0]
+    for name, arguments in (("fkine", (q,)), ("rne", (q, qd, qdd))):
+        expected = evaluate(robot.nofriction(), name, *arguments)
+        actual = evaluate(again.nofriction(), name, *arguments)
+        np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-12 * max(1.0, np.abs(expected).max()))
 
 
 @pytest.mark.parametrize("format", WRITERS, ids=lambda format: format.name)
