@@ -5,6 +5,7 @@ Differences are relative to the largest entry of a result, or to 1 if that is sm
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,9 @@ import pinocchio as pin
 
 from armblocks.dynamics import TRACES
 from armblocks.formats.xml_elements import read_elements
-from armblocks.robot import Robot
+from armblocks.robot import Free, Robot
 from armblocks.robot.geometry import link_frames
+from armblocks.spatial import Transform
 
 STATES = 2
 
@@ -77,20 +79,15 @@ def difference_to_pinocchio(robot: Robot, model: pin.Model, path: Path) -> float
 
 
 def mujoco_model(path: Path) -> mujoco.MjModel | None:
-    """The model without free joints, or ``None`` if MuJoCo refuses it."""
+    """The model, or ``None`` if MuJoCo refuses it."""
     try:
-        spec = mujoco.MjSpec.from_file(str(path))
-        for body in spec.bodies:
-            for joint in [*body.joints]:
-                if joint.type == mujoco.mjtJoint.mjJNT_FREE:
-                    spec.delete(joint)
-        return spec.compile()
+        return mujoco.MjModel.from_xml_path(str(path))
     except (ValueError, RuntimeError):
         return None
 
 
-def columns_of(robot: Robot, model: mujoco.MjModel) -> list[int]:
-    """For each coordinate of the robot, the index of the joint of the model; -1 for joints without a name."""
+def joints_of(robot: Robot, model: mujoco.MjModel) -> list[int]:
+    """For each joint of the robot, the index of that of the model; -1 for joints without a name."""
     joints = {model.joint(j).name: j for j in range(model.njnt)}
     last_joint = {
         model.body(b).name: model.body_jntadr[b] + model.body_jntnum[b] - 1
@@ -105,13 +102,22 @@ def difference_to_mujoco(robot: Robot, model: mujoco.MjModel, max_joints: int) -
 
     It is infinite if the joints cannot be assigned by their names.
     """
-    columns = columns_of(robot, model)
-    if sorted(columns) != list(range(model.nq)):
+    # The coordinates of a free joint of MuJoCo are its pose in the world, here relative to its initial pose.
+    links = tuple(
+        replace(link, before=Transform()) if isinstance(link.joint, Free) else link for link in robot.links
+    )
+    robot = replace(robot, links=links)
+    rows: list[int] = []
+    columns: list[int] = []
+    for joint, j in zip(robot.joints, joints_of(robot, model)):
+        rows += range(model.jnt_qposadr[j], model.jnt_qposadr[j] + joint.nq)
+        columns += range(model.jnt_dofadr[j], model.jnt_dofadr[j] + joint.nv)
+    if sorted(rows) != list(range(model.nq)) or sorted(columns) != list(range(model.nv)):
         return np.inf, False
     random = np.random.default_rng(0)
-    q, qd, qdd = random.uniform(-1, 1, (3, robot.n))
+    q, (qd, qdd) = random.uniform(-1, 1, robot.nq), random.uniform(-1, 1, (2, robot.n))
     data = mujoco.MjData(model)
-    data.qpos[columns], data.qvel[columns], data.qacc[columns] = q, qd, qdd
+    data.qpos[rows], data.qvel[columns], data.qacc[columns] = q, qd, qdd
     mujoco.mj_fwdPosition(model, data)
     mujoco.mj_fwdVelocity(model, data)
     poses = dict(zip((link.name for link in robot.links), link_frames(robot, q)[1:]))

@@ -184,9 +184,9 @@ def _dh_table(robot: Robot) -> Iterator[str]:
 def _limits(robot: Robot) -> Iterator[str]:
     unit_symbols = {"rad": "°", "m": " m"}
     rows: list[tuple[str, ...]] = []
-    for k, (joint, unit) in enumerate(zip(robot.joint_names, robot.joint_units)):
+    for k, (joint, unit) in enumerate(robot.speeds):
         scale = 180 / np.pi if unit == "rad" else 1.0
-        low, high = robot.qlim[k] * scale
+        low, high = np.array(robot.limits[k].position or (-np.inf, np.inf)) * scale
         speed, torque = robot.speed_limits[k] * scale, robot.torque_limits[k]
         rows.append(
             (

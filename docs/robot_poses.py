@@ -76,4 +76,4 @@ _POSES: dict[str, tuple[float, ...]] = {
 
 def pose_of(name: str, robot: Robot) -> tuple[float, ...]:
     """Joint positions of the robot's picture, rad or m; 0 for robots that are not listed."""
-    return _POSES.get(name, (0.0,) * robot.n)
+    return _POSES.get(name, tuple(robot.neutral.tolist()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from math import pi
 
@@ -12,14 +13,19 @@ from numpy.typing import ArrayLike
 from armblocks.dynamics import TRACES
 from armblocks.formats.robot_files import shipped_robot
 from armblocks.robot import (
+    JOINT_TYPES,
     Fixed,
+    Free,
     FrictionModel,
+    Joint,
     JointLimits,
     Link,
     Motor,
     Prismatic,
     Revolute,
     Robot,
+    Spherical,
+    Universal,
     serial_chain,
     standard_dh,
 )
@@ -192,6 +198,48 @@ def build_random_tree(seed: int, count: int = 7, *, chain: bool = False) -> Robo
     )
 
 
+def random_joint(kind: type[Joint], random: np.random.Generator) -> Joint:
+    """Return a joint of a type with random parameters."""
+    values = {
+        "axis": tuple(random.normal(size=3)),
+        "second_axis": tuple(random.normal(size=3)),
+        "offset": random.uniform(-1, 1),
+        "pitch": random.uniform(0.2, 0.6),
+    }
+    return kind(**{name: values[name] for name in kind.parameters})
+
+
+def build_mixed_tree(seed: int, kinds: Sequence[type[Joint]]) -> Robot:
+    """Return a random tree with one joint of each type in random order, with motors, base and tool."""
+    random = np.random.default_rng(seed)
+    links: list[Link] = []
+    for i, k in enumerate(random.permutation(len(kinds))):
+        links.append(
+            Link(
+                name=f"link{i + 1}",
+                parent=None if i == 0 else f"link{random.integers(max(1, i - 2), i + 1)}",
+                joint=random_joint(kinds[k], random),
+                before=random_transform(random),
+                after=random_transform(random),
+                mass=random.uniform(0.5, 3),
+                centre_of_mass=random.uniform(-0.3, 0.3, 3),
+                inertia=random_inertia(random),
+                motor=Motor(
+                    inertia=2e-4, gear_ratio=12.0, viscous_friction=1e-3, coulomb_friction=(0.05, -0.04)
+                )
+                if random.random() < 0.5
+                else None,
+            )
+        )
+    return Robot(
+        name=f"mixed{seed}",
+        links=tuple(links),
+        base=random_transform(random),
+        tool=random_transform(random),
+        gravity=tuple(random.uniform(-10, 10, 3)),
+    )
+
+
 RANDOM_ROBOTS: tuple[Robot, ...] = (
     build_random_tree(1),
     build_random_tree(2),
@@ -199,13 +247,31 @@ RANDOM_ROBOTS: tuple[Robot, ...] = (
     build_random_tree(4, 9),
 )
 
+MOVING_TYPES = tuple(kind for kind in JOINT_TYPES if kind is not Fixed)
+MIXED_ROBOTS: tuple[Robot, ...] = (
+    build_mixed_tree(5, MOVING_TYPES),
+    build_mixed_tree(6, (Spherical, Fixed, Revolute, Universal, Free, Spherical)),
+)
+"""Trees of all joint types; the first one has more joints than the mass matrix is factored for."""
+
 LAW_NAMES = ("kr180", "kr180_cell", "panda", "planar3r", "puma560", "stanford", "twolink")
 """Shipped robots of different kinds; ``tests/shipped/test_catalogue.py`` has light laws of all of them."""
 
 LAW_ROBOTS: dict[str, Robot] = {
-    robot.name: robot for robot in (*(shipped_robot(name) for name in LAW_NAMES), *RANDOM_ROBOTS)
+    robot.name: robot
+    for robot in (*(shipped_robot(name) for name in LAW_NAMES), *RANDOM_ROBOTS, *MIXED_ROBOTS)
 }
 """Robots for tests of physical laws: shipped robots, and random trees."""
+
+
+def law_robots_of(types: Sequence[type[Joint]]) -> list[Robot]:
+    """Return the robots for laws that have joints of some types only, for formats without the other types."""
+    return [
+        robot
+        for robot in LAW_ROBOTS.values()
+        if all(isinstance(link.joint, tuple(types)) for link in robot.links)
+    ]
+
 
 CONSISTENT_ROBOTS: dict[str, Robot] = {robot.name: robot for robot in RANDOM_ROBOTS}
 """Random trees: all their inertias are physically consistent, unlike those of some shipped robots."""
@@ -224,7 +290,15 @@ def evaluate(robot: Robot, name: str, *values: ArrayLike) -> np.ndarray:
 
 
 def random_states(robot: Robot, count: int = 4, seed: int = 7) -> list[tuple[np.ndarray, ...]]:
-    """Return ``count`` triples of arrays (n,): joint positions, speeds, and accelerations or torques."""
+    """Return ``count`` triples: joint positions (nq,), speeds (n,), and accelerations or torques (n,).
+
+    Quaternions have random lengths: all functions depend on their directions only.
+    """
     random = np.random.default_rng(seed)
-    scales = (np.pi, 2.0, 5.0)
-    return [tuple(random.uniform(-s, s, robot.n) for s in scales) for _ in range(count)]
+    scales = ((np.pi, robot.nq), (2.0, robot.n), (5.0, robot.n))
+    return [tuple(random.uniform(-s, s, size) for s, size in scales) for _ in range(count)]
+
+
+def along(robot: Robot, q: np.ndarray, qd: np.ndarray, dt: float) -> np.ndarray:
+    """Return the coordinates after a time at constant speeds."""
+    return evaluate(robot, "integrate", q, qd, dt).ravel()

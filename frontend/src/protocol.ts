@@ -1546,7 +1546,8 @@ export interface CellColumn {
  * Bodies, joints and size of a robot.
  *
  * ``reach`` (m) of the arm; ``foot`` (m): distance by which the bodies of the base extend below its frame.
- * ``rows`` is the number of poses: base, links and tool.
+ * ``rows`` is the number of poses: base, links and tool. ``joints`` are those with one axis. ``rest``: the
+ * coordinates q of the pose that is shown without motion.
  */
 export interface RobotScene {
   name: string;
@@ -1555,6 +1556,7 @@ export interface RobotScene {
   rows: number;
   bodies: SceneBody[];
   joints: SceneJoint[];
+  rest: number[];
   [k: string]: unknown;
 }
 /**

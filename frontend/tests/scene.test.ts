@@ -1,7 +1,7 @@
 import { expect, test } from 'vitest'
 import { posesForScene, type RobotScene } from '../src/robot/scene'
 
-const scene: RobotScene = { name: 'arm', reach: 1, foot: 0, rows: 3, bodies: [], joints: [] }
+const scene: RobotScene = { name: 'arm', reach: 1, foot: 0, rows: 3, bodies: [], joints: [], rest: [] }
 const row = [
   [1, 2, 3, 4],
   [5, 6, 7, 8],

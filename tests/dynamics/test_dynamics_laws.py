@@ -4,13 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from casadi import SX, Function, jacobian, jtimes
+from casadi import SX, Function, jacobian, jtimes, vertcat
 from numpy.testing import assert_allclose
 
 from armblocks.dynamics import TRACES
+from armblocks.dynamics.ball_joints import position_rates
+from armblocks.dynamics.joint_motion import entries
 from armblocks.robot import Fixed, Link, Robot
 from armblocks.spatial import Transform
 from robots_for_tests import evaluate, random_states
+
+
+def rates_of(robot: Robot, q: SX, qd: SX) -> SX:
+    """Return dq/dt (nq,)."""
+    return SX(vertcat(*position_rates(robot, entries(q), entries(qd))))
 
 
 def check_close(actual: np.ndarray, expected: np.ndarray, tolerance: float) -> None:
@@ -45,8 +52,8 @@ def test_columns_of_the_mass_matrix_are_torques_of_unit_accelerations(robot: Rob
 
 def test_mass_matrix_rate_minus_twice_coriolis_is_skew_symmetric(robot: Robot):
     traced = TRACES["inertia"](robot)
-    qd = SX.sym("qd", robot.n)
-    rate = Function("Mdot", [traced.arguments[0], qd], [jtimes(traced.results[0], traced.arguments[0], qd)])
+    q, qd = traced.arguments[0], SX.sym("qd", robot.n)
+    rate = Function("Mdot", [q, qd], [jtimes(traced.results[0], q, rates_of(robot, q, qd))])
     for q, v, _ in random_states(robot):
         Mdot = np.asarray(rate(q, v)).reshape(robot.n, robot.n)
         N = Mdot - 2 * evaluate(robot, "coriolis", q, v)
@@ -72,9 +79,11 @@ def test_kinetic_energy_is_half_the_quadratic_form_of_the_mass_matrix(robot: Rob
 
 def test_gravity_load_is_the_gradient_of_potential_energy(robot: Robot):
     traced = TRACES["potential_energy"](robot)
-    rates = Function("g", [traced.arguments[0]], [jacobian(traced.results[0], traced.arguments[0])])
-    for q, _, _ in random_states(robot):
-        check_close(evaluate(robot, "gravload", q), np.asarray(rates(q)).ravel(), 1e-12)
+    (symbol,), qd = traced.arguments, SX.sym("qd", robot.n)
+    power = jtimes(traced.results[0], symbol, rates_of(robot, symbol, qd))
+    rates = Function("g", [symbol, qd], [jacobian(power, qd)])
+    for q, v, _ in random_states(robot):
+        check_close(evaluate(robot, "gravload", q), np.asarray(rates(q, 0 * v)).ravel(), 1e-12)
 
 
 def test_power_of_the_torques_is_the_time_derivative_of_energy(robot: Robot):
@@ -83,9 +92,11 @@ def test_power_of_the_torques_is_the_time_derivative_of_energy(robot: Robot):
     q, qd = T.arguments
     (q_of_V,) = V.arguments
     qdd = SX.sym("qdd", robot.n)
-    kinetic = jtimes(T.results[0], q, qd) + jtimes(T.results[0], qd, qdd)
+    kinetic = jtimes(T.results[0], q, rates_of(robot, q, qd)) + jtimes(T.results[0], qd, qdd)
     rate = Function("Edot", [q, qd, qdd], [kinetic])
-    potential_power = Function("Vdot", [q_of_V, qd], [jtimes(V.results[0], q_of_V, qd)])
+    potential_power = Function(
+        "Vdot", [q_of_V, qd], [jtimes(V.results[0], q_of_V, rates_of(robot, q_of_V, qd))]
+    )
     for position, speed, acceleration in random_states(robot):
         power = evaluate(frictionless, "rne", position, speed, acceleration) @ speed
         change = float(rate(position, speed, acceleration)) + float(potential_power(position, speed))
@@ -95,7 +106,7 @@ def test_power_of_the_torques_is_the_time_derivative_of_energy(robot: Robot):
 def test_energy_stays_constant_without_friction(robot: Robot):
     frictionless = robot.nofriction()
     random = np.random.default_rng(3)
-    q, qd = random.uniform(-1, 1, robot.n), random.uniform(-0.5, 0.5, robot.n)
+    q, qd = robot.neutral + random.uniform(-0.5, 0.5, robot.nq), random.uniform(-0.5, 0.5, robot.n)
     no_torque = np.zeros(robot.n)
 
     def energy() -> float:
@@ -104,7 +115,8 @@ def test_energy_stays_constant_without_friction(robot: Robot):
         )
 
     def rates(q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return qd, evaluate(frictionless, "accel", q, qd, no_torque)
+        rates = evaluate(frictionless, "position_rates", q, qd)
+        return rates, evaluate(frictionless, "accel", q, qd, no_torque)
 
     start, h = energy(), 5e-4
     max_kinetic_energy = float(evaluate(frictionless, "kinetic_energy", q, qd))

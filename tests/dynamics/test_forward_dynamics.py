@@ -24,7 +24,7 @@ ROD = {"mass": 1.0, "centre_of_mass": (0.5, 0.0, 0.0), "inertia": (0.0, 0.08, 0.
 
 def test_articulated_body_algorithm_agrees_with_the_factored_mass_matrix(robot: Robot):
     tree = regrouped(KinematicTree.of(robot))
-    q, qd, tau = (SX.sym(name, robot.n) for name in ("q", "qd", "tau"))
+    q, qd, tau = SX.sym("q", robot.nq), SX.sym("qd", robot.n), SX.sym("tau", robot.n)
     rates, torques = entries(qd), entries(tau)
     wrench = {tree.n - 1: Wrench((1.0, -2.0, 3.0), (0.1, 0.2, -0.3))}
     by_matrix = forward_dynamics(tree, q, rates, torques, wrench)

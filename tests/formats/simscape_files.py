@@ -52,7 +52,7 @@ class Export:
         link = self.robot.link(name)
         A = turned_to(np.array(link.joint.axis))
         base = self.robot.base.matrix if link.parent is None else np.eye(4)
-        moved = link.joint.motion(link.joint.offset).matrix if link.joint.moves else np.eye(4)
+        moved = link.joint.motion(link.joint.neutral).matrix
         return base @ link.before.matrix @ moved @ A, np.linalg.inv(link.after.matrix) @ A
 
     def path(self, name: str, inside: bool) -> str:

@@ -19,6 +19,7 @@ from armblocks.formats.mjcf.reader import read_mjcf
 from armblocks.formats.mjcf.solids import solid_of_mesh
 from armblocks.robot import Robot
 from armblocks.robot.geometry import link_frames
+from robots_for_tests import evaluate
 
 
 def read(text: str, context: FileContext | None = None) -> Robot:
@@ -39,6 +40,29 @@ def columns_of(robot: Robot, model: mujoco.MjModel) -> list[int]:
         model.body(b).name: model.body_jntadr[b] + model.body_jntnum[b] - 1 for b in range(model.nbody)
     }
     return [int(joints.get(link.name, last_joint.get(link.name, -1))) for link in robot.moving_links]
+
+
+def test_free_and_ball_joints_have_the_equations_of_mujoco() -> None:
+    """The free body is at its initial pose at neutral coordinates, so that q is relative to this pose."""
+    inner = "<joint name='k' type='ball' pos='0.1 0 0.2' armature='0.1' damping='0.2'/><geom size='0.1'/>"
+    inside = f"<freejoint/><geom size='0.2' pos='0.1 0 0'/><body name='b' pos='0 0.3 0'>{inner}</body>"
+    text = body(inside).replace("<body name='a'>", "<body name='a' pos='1 2 3'>")
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    robot = read(text)
+    assert (robot.nq, robot.n, robot.joint_letters) == (11, 9, "6S")
+    np.testing.assert_allclose(evaluate(robot, "link_poses", robot.neutral)[1, :3, 3], model.qpos0[:3])
+    random = np.random.default_rng(4)
+    q, (qd, qdd) = random.normal(size=robot.nq), random.normal(size=(2, robot.n))
+    data.qpos[:], data.qvel[:], data.qacc[:] = q, qd, qdd
+    data.qpos[:3] += (1, 2, 3)
+    mujoco.mj_fwdPosition(model, data)
+    mujoco.mj_fwdVelocity(model, data)
+    mujoco.mj_inverse(model, data)
+    poses = evaluate(robot, "link_poses", q)
+    np.testing.assert_allclose(poses[1:3, :3, 3], data.xpos[1:], atol=1e-13)
+    np.testing.assert_allclose(poses[1:3, :3, :3].reshape(2, 9), data.xmat[1:], atol=1e-13)
+    np.testing.assert_allclose(evaluate(robot, "rne", q, qd, qdd), data.qfrc_inverse, atol=1e-10)
 
 
 # -- against MuJoCo ----------------------------------------------------------------------------------------
@@ -190,8 +214,7 @@ def test_actuators_give_the_torque_limits_of_their_joints() -> None:
 @pytest.mark.parametrize(
     ("text", "code"),
     [
-        (body("<freejoint/>" + HINGE), "mjcf-free"),
-        (body("<joint type='free'/><geom size='0.1'/>"), "mjcf-free"),
+        (body("<joint type='ball' range='0 1'/><geom size='0.1'/>"), "mjcf-limit"),
         (body("<joint stiffness='3'/><geom size='0.1'/>"), "mjcf-stiffness"),
         (body(HINGE, "<equality><connect body1='a' anchor='0 0 0'/></equality>"), "mjcf-equality"),
         (
@@ -222,7 +245,8 @@ def test_what_is_left_out_is_a_finding_with_a_code_and_a_line(text: str, code: s
         ("<robot name='r'/>", "the root element is <robot>"),
         ("<mujoco/>", "the model has no bodies"),
         ("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>", "the model has no bodies"),
-        (body("<joint type='ball'/>"), "of type 'ball' with 3 degrees of freedom"),
+        (body("<joint type='wheel'/>"), "of type 'wheel', which MJCF does not have"),
+        (body(HINGE + "<body><freejoint/></body>"), "a body inside another body has a free joint"),
         (body("<joint axis='0 0 0'/>"), "the axis of the joint is zero"),
         (body("<joint axis='0 0'/>"), "has 2 values"),
         (body("<joint axis='0 nan 0'/>"), "which is not a number"),
@@ -235,7 +259,7 @@ def test_what_is_left_out_is_a_finding_with_a_code_and_a_line(text: str, code: s
         (body("", "<compiler eulerseq='xyw'/>"), "the order of Euler angles is 'xyw'"),
         (body("<body>" * 100 + "</body>" * 100), "nested too deeply"),
     ],
-    ids=range(15),
+    ids=range(16),
 )
 def test_invalid_files_are_refused_with_file_line_and_reason(text: str, words: str) -> None:
     with pytest.raises(FormatError) as caught:
@@ -253,10 +277,11 @@ def test_files_that_include_each_other_are_refused(tmp_path: Path) -> None:
 
 def test_load_robot_warns_once_for_each_kind_of_finding(tmp_path: Path) -> None:
     file = tmp_path / "floating.xml"
-    file.write_text(body(HINGE + "<freejoint/><body><freejoint/><geom size='1'/></body>"))
-    with pytest.warns(ArmblocksWarning, match="moves freely") as caught:
+    spring = "<joint stiffness='2'/><geom size='1'/>"
+    file.write_text(body(f"{spring}<body>{spring}</body>"))
+    with pytest.warns(ArmblocksWarning, match="the spring of the joint is left out") as caught:
         ab.load_robot(file)
-    assert len([entry for entry in caught if "mjcf-free" in str(entry.message)]) == 1
+    assert len([entry for entry in caught if "mjcf-stiffness" in str(entry.message)]) == 1
 
 
 @pytest.mark.parametrize("seed", range(30))

@@ -79,7 +79,7 @@ def test_a_corrected_urdf_file_has_no_corrected_finding_and_the_same_poses(seed:
     q = np.random.default_rng(seed).uniform(-2, 2, robot.n)
     assert_allclose(evaluate(again, "fkine", q), evaluate(robot, "fkine", q), rtol=0, atol=1e-12)
     assert_allclose(evaluate(again, "inertia", q), evaluate(robot, "inertia", q), rtol=1e-12, atol=1e-12)
-    turning = np.array([unit == "rad" for unit in again.joint_units])
+    turning = np.array([entry.unit == "rad" for entry in again.positions])
     assert (np.nan_to_num(again.qlim[turning], posinf=0) <= 7).all()
     # Everything else stays: comments, and the elements in their order.
     text = copy.read_text(encoding="utf-8")

@@ -18,15 +18,15 @@ from armblocks.errors import ArmblocksError, ArmblocksWarning, FormatError, Iner
 from armblocks.formats import load_robot, read_robot, robot_files, write_robot
 from armblocks.formats.shipped import shipped_folder
 from armblocks.robot import (
+    JOINT_TYPES,
     DhConvention,
     DhRow,
-    Fixed,
     FrictionModel,
+    Joint,
     JointLimits,
     Link,
     Motor,
     Prismatic,
-    Revolute,
     Robot,
     link_from_dh,
 )
@@ -82,6 +82,21 @@ BODY: dict[str, Any] = {
 
 
 @st.composite
+def joints(draw: st.DrawFn) -> Joint:
+    """Joints of all types with all their parameters; limits for each coordinate, or one for all."""
+    kind = draw(st.sampled_from(JOINT_TYPES))
+    axes = VECTORS.filter(any)
+    values = {"axis": axes, "second_axis": axes, "offset": ANGLES, "pitch": NUMBERS.filter(bool)}
+    joint = kind(**{name: draw(values[name]) for name in kind.parameters})
+    if any(len(motion.positions) != len(motion.speeds) for motion in joint.motions):
+        limits = LIMITS.map(lambda limit: replace(limit, position=None))
+    else:
+        limits = LIMITS
+    several = st.tuples(*[limits] * joint.nv) if joint.nv else limits
+    return replace(joint, limits=draw(limits | several))
+
+
+@st.composite
 def robots(draw: st.DrawFn) -> Robot:
     """Trees of all joint types, with and without D-H rows."""
     links: list[Link] = []
@@ -100,8 +115,7 @@ def robots(draw: st.DrawFn) -> Robot:
             )
             links.append(link_from_dh(f"l{i}", dh, parent=parent, limits=draw(LIMITS), **body))
         else:
-            kind = draw(st.sampled_from([Revolute, Prismatic, Fixed]))
-            joint = kind(axis=draw(VECTORS.filter(any)), offset=draw(ANGLES), limits=draw(LIMITS))
+            joint = draw(joints())
             body["inertia"] = link_from_dh("x", DhRow(), inertia=body["inertia"]).inertia
             links.append(
                 Link(name=f"l{i}", parent=parent, joint=joint, before=draw(POSES), after=draw(POSES), **body)
@@ -188,6 +202,19 @@ INVALID_DOCUMENTS = [
     (with_change(*LINK, "dh", "alpha", value="\u0669 deg"), "is not an angle"),
     (with_change(*LINK, "dh", "alpha", value="9" * 400 + " deg"), "is not an angle"),
     (with_change(*LINK, "limits", value={"position": [1]}), "1 limits are given"),
+    (with_change("links", 0, value={"name": "a", "joint": {"type": "ball"}}), "'ball' is not known here"),
+    (
+        with_change("links", 0, value={"name": "a", "joint": {"type": "free", "axis": [1, 0, 0]}}),
+        "'axis' is not known",
+    ),
+    (
+        with_change("links", 0, value={"name": "a", "joint": {"type": "screw"}}),
+        "the pitch of a screw joint is 0 m",
+    ),
+    (
+        with_change("links", 0, value={"name": "a", "joint": {"type": "planar"}, "limits": [{}]}),
+        "1 limits are given. Allowed: 3, one for each speed",
+    ),
     (with_change(*LINK, "limits", value={"position": [1, 0]}), "the position limits are reversed"),
     (with_change(*LINK, "limits", value={"speed": "3 deg"}), "'3 deg' is not an angle"),
     (with_change(*LINK, "centre_of_mass", value=[1, 2]), "2 numbers are given"),

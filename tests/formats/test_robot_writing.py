@@ -17,13 +17,27 @@ from armblocks.formats.mjcf.reader import read_mjcf
 from armblocks.formats.mjcf.writer import quaternion_of, write_mjcf
 from armblocks.formats.sdf.reader import read_sdf
 from armblocks.formats.sdf.writer import write_sdf
-from armblocks.robot import JointLimits, Link, Motor, Prismatic, Revolute, Robot, with_tip
+from armblocks.robot import (
+    Fixed,
+    Free,
+    Joint,
+    JointLimits,
+    Link,
+    Motor,
+    Prismatic,
+    Revolute,
+    Robot,
+    Screw,
+    Spherical,
+    with_tip,
+)
 from armblocks.robot.shapes import Box, Cylinder, Housing, Mesh, Shape, Sphere
 from armblocks.spatial import Transform, transl, trotx
 from robots_for_tests import (
-    LAW_ROBOTS,
+    build_mixed_tree,
     build_random_tree,
     evaluate,
+    law_robots_of,
     random_inertia,
     random_rotation,
     random_states,
@@ -77,23 +91,59 @@ def detailed_robot(seed: int) -> Robot:
 
 
 DETAILED = [detailed_robot(seed) for seed in range(6)]
-ROBOTS = [*LAW_ROBOTS.values(), *DETAILED]
+ROBOTS = [*law_robots_of((Revolute, Prismatic, Fixed)), *DETAILED]
+
+
+def with_quaternions(seed: int, kinds: tuple[type[Joint], ...]) -> Robot:
+    """A random tree without motors; the frames of links with quaternions are those of their joints."""
+    robot = build_mixed_tree(seed, kinds)
+    links: list[Link] = []
+    for link in robot.links:
+        has_quaternion = link.joint.nq != link.joint.nv
+        after = Transform() if has_quaternion else link.after
+        links.append(dataclasses.replace(link, motor=None, after=after))
+    return dataclasses.replace(robot, links=tuple(links))
+
+
+FLOATING = with_quaternions(11, (Spherical, Revolute, Prismatic, Spherical, Revolute))
+"""The first link is free, which MuJoCo supports at the base only."""
+FLOATING = dataclasses.replace(
+    FLOATING,
+    base=Transform(),
+    links=(dataclasses.replace(FLOATING.links[0], joint=Free(), after=Transform()), *FLOATING.links[1:]),
+)
+GENERAL_ROBOTS = [
+    ("SDF", with_quaternions(10, (Revolute, Screw, Spherical, Prismatic, Fixed, Screw))),
+    ("MJCF", with_quaternions(12, (Revolute, Spherical, Prismatic, Spherical, Fixed))),
+    ("MJCF", FLOATING),
+]
 
 
 @FORMATS
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
 def test_reading_what_was_written_gives_the_same_equations(robot: Robot, format: str) -> None:
+    compare_with_the_written_file(robot, format)
+
+
+@pytest.mark.parametrize(("format", "robot"), GENERAL_ROBOTS)
+def test_joints_with_quaternions_and_screws_have_the_same_coordinates(robot: Robot, format: str) -> None:
+    compare_with_the_written_file(robot, format)
+
+
+def compare_with_the_written_file(robot: Robot, format: str) -> None:
     again = written(robot, format)
-    order = [robot.joint_names.index(name) for name in again.joint_names]
+    order = [robot.speeds.index(entry) for entry in again.speeds]
+    places = [robot.positions.index(entry) for entry in again.positions]
     assert sorted(order) == list(range(robot.n))
-    assert_allclose(again.qlim, robot.qlim[order])
+    assert sorted(places) == list(range(robot.nq))
+    assert_allclose(again.qlim, robot.qlim[places])
     assert_allclose(again.torque_limits, robot.torque_limits[order])
     if format == "SDF":
         assert_allclose(again.speed_limits, robot.speed_limits[order])
         assert_allclose(again.gear_ratios, robot.gear_ratios[order])
     ours, theirs = robot.nofriction(), again.nofriction()
     q, qd, qdd = random_states(robot, count=1)[0]
-    other = [values[order] for values in (q, qd, qdd)]
+    other = [q[places], qd[order], qdd[order]]
 
     def close(actual: np.ndarray, expected: np.ndarray) -> None:
         scale = max(1.0, float(np.abs(expected).max(initial=0.0)))
@@ -219,6 +269,28 @@ def test_another_tip_or_order_of_coordinates_gives_a_warning(format: str) -> Non
 
 class Rail(Prismatic):
     """A joint type of a user."""
+
+
+def test_data_of_joints_with_quaternions_that_a_format_does_not_have_are_named() -> None:
+    limits = JointLimits(torque=3.0)
+    ball = Link(
+        name="b", joint=Spherical(limits=limits), mass=1.0, motor=Motor(inertia=1.0), after=trotx(0.2)
+    )
+    robot = Robot(name="r", links=(ball,))
+    limits_left_out = "link 'b': the limits of its spherical joint are not part of the"
+    with (
+        pytest.warns(ArmblocksWarning, match=limits_left_out),
+        pytest.warns(ArmblocksWarning, match="friction and rotor inertia of its ball joint are not part"),
+    ):
+        write_sdf(robot)
+    with (
+        pytest.warns(ArmblocksWarning, match=limits_left_out),
+        pytest.warns(ArmblocksWarning, match="the coordinates of its joint are relative to the axes of the"),
+    ):
+        write_mjcf(robot)
+    inner = Robot(name="r", links=(Link(name="a"), Link(name="b", parent="a", joint=Free(), mass=1.0)))
+    with pytest.raises(FormatError, match="link 'b': the free joint is not at the base"):
+        write_mjcf(inner)
 
 
 @FORMATS

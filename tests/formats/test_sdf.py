@@ -208,14 +208,14 @@ def test_what_is_not_read_as_written_is_a_finding_with_a_code(text: str, code: s
 
 def test_every_model_of_a_world_is_a_robot_and_others_are_named() -> None:
     good = two(Z).partition(">")[2].removesuffix("</sdf>")
-    ball = good.replace('name="r"', 'name="b"').replace("revolute", "ball")
+    wobble = good.replace('name="r"', 'name="b"').replace("revolute", "wobble")
     far = '<include><uri>model://far</uri></include><light name="sun"/>'
     context = FileContext()
-    robots = read(f'<sdf version="1.9"><world name="w">{good}{ball}{far}</world></sdf>', context)
+    robots = read(f'<sdf version="1.9"><world name="w">{good}{wobble}{far}</world></sdf>', context)
     assert list(robots) == ["r"]
     assert [finding.rule.code for finding in context.findings] == ["sdf-model", "sdf-model"]
     assert [finding.element for finding in context.findings] == ["include", "model 'b'"]
-    assert "the joint is of type 'ball'" in context.findings[1].what
+    assert "the joint is of type 'wobble'" in context.findings[1].what
     two_models = f'<sdf version="1.9">{good}{good}</sdf>'
     with pytest.raises(FormatError, match="there is another element of this name in line 1"):
         read(two_models)

@@ -55,10 +55,9 @@ INVALID = [
     (chain(1001), "the model has 1001 links. Allowed: at most 1000"),
     (model(LINK + "".join(frame(f"f{k}") for k in range(6000))), "too many links, joints and frames"),
     (
-        two(Z, kind="ball"),
-        "joint 'j': the joint is of type 'ball' (ball joint, with three degrees of freedom)",
+        two("<screw_thread_pitch>0</screw_thread_pitch>" + Z, kind="screw"),
+        "the pitch of the thread is 0. Allowed: m per turn, other than 0",
     ),
-    (two(Z, kind="screw"), "the joint is of type 'screw' (screw joint), which is not supported"),
     (two(Z, kind="wobble"), "the joint is of type 'wobble', which is not supported. Allowed: revolute"),
     (two(Z, kind=""), "the attribute 'type' is missing or empty"),
     (two("<axis><xyz>0 0 0</xyz></axis>"), "the axis of joint 'j' is 0 0 0"),

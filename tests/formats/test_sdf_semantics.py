@@ -15,7 +15,7 @@ from armblocks.formats.file_findings import FileContext
 from armblocks.formats.sdf.reader import read_sdf
 from armblocks.formats.urdf.reader import read_urdf
 from armblocks.robot import Robot, with_tip
-from armblocks.spatial import Transform
+from armblocks.spatial import Transform, trotz
 from robots_for_tests import evaluate
 
 
@@ -138,6 +138,31 @@ def test_a_joint_with_two_axes_becomes_two_joints_in_series(kind: str) -> None:
     )
     assert robot.joint_names == ("j", "arm")
     assert_allclose(evaluate(robot, "fkine", [q2, q1])[:3, :3], expected, atol=1e-15)
+
+
+def test_a_ball_joint_has_a_quaternion_about_the_joint_frame() -> None:
+    robot = read(two("<pose>0 1 0 0 0 0</pose>", kind="ball"))
+    assert (robot.nq, robot.n, robot.joint_letters) == (4, 3, "S")
+    ball = robot.link("arm")
+    assert_allclose(evaluate(robot, "fkine", robot.neutral), evaluate(robot, "fkine", [2.0, 0, 0, 0]))
+    turned = evaluate(robot, "fkine", [1.0, 0.0, 0.0, 1.0])
+    expected = ball.before.matrix @ trotz(np.pi / 2).matrix @ ball.after.matrix
+    assert_allclose(turned, expected, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("thread", "pitch"),
+    [
+        ("<screw_thread_pitch>0.5</screw_thread_pitch><thread_pitch>9</thread_pitch>", 0.5),
+        (f"<thread_pitch>{-4 * np.pi!r}</thread_pitch>", 0.5),
+        ("", 1.0),
+    ],
+)
+def test_a_screw_advances_by_its_pitch_in_each_turn(thread: str, pitch: float) -> None:
+    robot = read(two(thread + "<axis><xyz>0 0 1</xyz></axis>", kind="screw"))
+    start, turned = (evaluate(robot, "fkine", [q]) for q in (0.0, 2 * np.pi))
+    assert_allclose(turned[:3, :3], start[:3, :3], atol=1e-14)
+    assert_allclose(turned[:3, 3] - start[:3, 3], (0, 0, pitch), atol=1e-14)
 
 
 def test_poses_of_models_and_worlds_place_the_base_and_gravity_is_that_of_the_world() -> None:

@@ -290,6 +290,29 @@ def test_the_name_of_the_robot_is_that_of_the_file_if_it_has_none() -> None:
     assert name == robot.name == "mine"
 
 
+@pytest.mark.parametrize("axis", ["0 0 1", "0 0 -1", "1 0 0", "0.6 0 0.8"])
+def test_a_planar_joint_moves_in_the_plane_normal_to_its_axis(axis: str) -> None:
+    text = joint(f'<origin xyz="1 2 3" rpy="0.1 0.2 0.3"/><axis xyz="{axis}"/>').replace("revolute", "planar")
+    robot = read(text)[0]
+    assert (robot.nq, robot.n, robot.joint_letters) == (3, 3, "E")
+    start, moved = evaluate(robot, "fkine", [0, 0, 0]), evaluate(robot, "fkine", [0.3, -0.2, 0.7])
+    assert_allclose(start, robot.link("arm").pose().matrix, atol=1e-15)
+    normal = start[:3, :3] @ np.array([float(part) for part in axis.split()])
+    assert abs(normal @ (moved - start)[:3, 3]) < 1e-15
+    assert_allclose(np.linalg.norm((moved - start)[:3, 3]), np.hypot(0.3, 0.2))
+    turn = moved[:3, :3] @ start[:3, :3].T
+    assert_allclose(turn @ normal, normal, atol=1e-15)
+    assert np.trace(turn) == pytest.approx(1 + 2 * np.cos(0.7))
+
+
+def test_a_floating_joint_is_free() -> None:
+    robot = read(joint('<origin xyz="1 2 3"/>').replace("revolute", "floating"))[0]
+    assert (robot.nq, robot.n, robot.joint_letters) == (7, 6, "6")
+    T = evaluate(robot, "fkine", [0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 1.0])
+    assert_allclose(T[:3, 3], (1.1, 2.2, 3.3))
+    assert_allclose(T[:3, :3], [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-15)
+
+
 def test_valid_files_give_no_warnings(tmp_path: Path) -> None:
     file = tmp_path / "r.urdf"
     file.write_text(joint(LIMIT), encoding="utf-8")

@@ -17,11 +17,23 @@ from armblocks.errors import ArmblocksWarning, FormatError
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.urdf.reader import read_urdf
 from armblocks.formats.urdf.writer import write_urdf
-from armblocks.robot import Joint, Link, Motor, Prismatic, Robot, standard_dh, with_tip
+from armblocks.robot import (
+    Fixed,
+    Free,
+    Joint,
+    Link,
+    Motor,
+    Planar,
+    Prismatic,
+    Revolute,
+    Robot,
+    standard_dh,
+    with_tip,
+)
 from armblocks.robot.robot import STANDARD_GRAVITY
 from armblocks.robot.shapes import Box, Cylinder, Housing, Sphere
 from armblocks.spatial import transl, trotx
-from robots_for_tests import LAW_ROBOTS, RANDOM_ROBOTS, evaluate, random_states
+from robots_for_tests import RANDOM_ROBOTS, build_mixed_tree, evaluate, law_robots_of, random_states
 
 
 def read(data: bytes) -> Robot:
@@ -37,21 +49,27 @@ def written(robot: Robot) -> Robot:
     return with_tip(again, "tool" if tool else last.name)
 
 
-ROBOTS = [*LAW_ROBOTS.values(), *(read(random_urdf(seed).encode()) for seed in range(3))]
+URDF_TYPES = (Revolute, Prismatic, Fixed, Planar, Free)
+ROBOTS = [
+    *law_robots_of(URDF_TYPES),
+    build_mixed_tree(4, URDF_TYPES),
+    *(read(random_urdf(seed).encode()) for seed in range(3)),
+]
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
 def test_kinematics_and_dynamics_are_those_of_the_robot(robot: Robot) -> None:
     again = written(robot)
-    order = [robot.joint_names.index(name) for name in again.joint_names]
-    assert_allclose(again.qlim, robot.qlim[order])
+    order = [robot.speeds.index(entry) for entry in again.speeds]
+    places = [robot.positions.index(entry) for entry in again.positions]
+    assert_allclose(again.qlim, robot.qlim[places])
     assert_allclose(again.speed_limits, robot.speed_limits[order])
     assert_allclose(again.torque_limits, robot.torque_limits[order])
     original = dataclasses.replace(robot, gravity=(0.0, 0.0, -9.81)).nofriction()
     reread = again.nofriction()
     for state in random_states(robot, count=2):
         q, qd, qdd = state
-        other = [values[order] for values in state]
+        other = [q[places], qd[order], qdd[order]]
 
         def close(actual: np.ndarray, expected: np.ndarray) -> None:
             scale = max(1.0, float(np.abs(expected).max(initial=0.0)))

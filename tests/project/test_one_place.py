@@ -57,41 +57,45 @@ assert "Doubled" in [kind.type for kind in library()]
 """
 
 
-JOINT = '''"""The screw joint."""
+JOINT = '''"""The telescopic ball joint."""
 
 from dataclasses import dataclass
 from typing import ClassVar
 
 from armblocks.robot.joints.joint import Joint
+from armblocks.robot.joints.motions import AxisMotion, BallMotion
 
 
 @dataclass(frozen=True, kw_only=True)
-class Screw(Joint):
-    """A rotation by q rad about the axis, with a translation of 0.25 m per radian along it."""
+class Telescope(Joint):
+    """Any rotation about a point, then a translation along the axis."""
 
-    letter: ClassVar[str] = "H"
-    unit: ClassVar[str] = "rad"
-    angular: ClassVar[float] = 1.0
-    linear: ClassVar[float] = 0.25
+    letter: ClassVar[str] = "T"
+    parameters: ClassVar[tuple[str, ...]] = ("axis",)
+
+    @property
+    def motions(self):
+        return BallMotion(), AxisMotion(axis=self.axis, linear=1.0, name="stroke")
 '''
 USE_OF_JOINT = """
 import numpy as np
 
 import armblocks as ab
 from armblocks.robot import JOINT_TYPES
-from armblocks.robot.joints.screw import Screw
+from armblocks.robot.joints.telescope import Telescope
 
-assert JOINT_TYPES[-1] is Screw
-body = ab.Link(name="nut", joint=Screw(), mass=2.0, centre_of_mass=(0.1, 0.0, 0.0), inertia=(0.1, 0.2, 0.3))
-robot = ab.Robot(name="made", links=[body])
-ab.save_robot(robot, "made.json")
+assert Telescope in JOINT_TYPES
+body = ab.Link(name="tube", joint=Telescope(axis=(1, 0, 0)), mass=2.0, inertia=(0.1, 0.2, 0.3))
+ab.save_robot(ab.Robot(name="made", links=[body]), "made.json")
 arm = ab.load_robot("made.json")
-assert type(arm.robot.links[0].joint) is Screw
-pose = arm.fkine([0.4])
-assert np.allclose(pose[:3, 3], [0.0, 0.0, 0.1]) and np.isclose(pose[0, 1], -np.sin(0.4))
-# The gravity force along the axis, and the inertia of rotation and translation.
-assert np.allclose(arm.rne([0.4], [0.0], [0.0]), [2.0 * 9.81 * 0.25])
-assert np.allclose(arm.inertia([0.4]), [[0.3 + 2.0 * 0.1**2 + 2.0 * 0.25**2]])
+assert type(arm.robot.links[0].joint) is Telescope
+assert [entry.name for entry in arm.robot.speeds] == ["tube.wx", "tube.wy", "tube.wz", "tube.stroke"]
+q = np.array([1.0, 0.0, 0.0, 1.0, 0.5])  # a quarter turn about z, and 0.5 m along the rotated x axis
+assert np.allclose(arm.fkine(q)[:3, 3], [0.0, 0.5, 0.0])
+# Moments of inertia about the centre of the ball, and gravity, which presses on the tilted axis only.
+assert np.allclose(arm.inertia(q), np.diag([0.1, 0.2 + 0.5, 0.3 + 0.5, 2.0]))
+assert np.allclose(arm.gravload(q), [0.0, -2.0 * 9.81 * 0.5, 0.0, 0.0])
+assert np.allclose(arm.difference(q, arm.integrate(q, np.ones(4), 0.5)), 0.5)
 """
 SOLVER = '''"""Ralston's method."""
 
@@ -157,7 +161,7 @@ assert ".dh" in READABLE
     ("place", "file", "use"),
     [
         ("blocks/maths/doubled.py", BLOCK, USE),
-        ("robot/joints/screw.py", JOINT, USE_OF_JOINT),
+        ("robot/joints/telescope.py", JOINT, USE_OF_JOINT),
         ("simulation/methods/ralston.py", SOLVER, USE_OF_SOLVER),
         ("formats/robot_formats/dh_table.py", FORMAT, USE_OF_FORMAT),
     ],

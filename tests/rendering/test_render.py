@@ -95,7 +95,7 @@ def test_cropping_keeps_all_drawn_pixels() -> None:
 
 
 def test_every_robot_can_be_drawn(robot: Robot) -> None:
-    picture = arm_picture(robot, [0.2] * robot.n, width=160, height=140)
+    picture = arm_picture(robot, [0.2] * robot.nq, width=160, height=140)
     (raster,) = (mark for mark in picture.marks if isinstance(mark, Raster))
     assert (raster.pixels[..., 3] == 255).mean() > 0.005
     assert raster.x >= 0 and raster.x + raster.width <= 160 and raster.y + raster.height <= 140

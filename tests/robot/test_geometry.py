@@ -72,7 +72,7 @@ def test_every_robot_has_bodies_of_finite_size_in_every_frame(robot: Robot) -> N
 def test_frames_equal_the_traced_link_poses(robot: Robot) -> None:
     from armblocks.dynamics import trace_link_poses
 
-    q = np.random.default_rng(3).uniform(-1, 1, robot.n)
+    q = np.random.default_rng(3).uniform(-1, 1, robot.nq)
     (traced,) = trace_link_poses(robot)(q)
     # Frames and link poses are products of the same few rotations.
     assert link_frames(robot, q.tolist()) == pytest.approx(traced, abs=1e-12)

@@ -91,7 +91,7 @@ def test_joints_are_listed_in_the_order_of_q():
     assert robot.n == 2
     assert robot.joint_names == ("arm", "lift")
     assert robot.joint_letters == "RP"
-    assert robot.joint_units == ("rad", "m")
+    assert robot.positions == robot.speeds == (("arm", "rad"), ("lift", "m"))
     assert [link.parent for link in robot.links] == [None, "stand", "arm"]
     np.testing.assert_array_equal(robot.qlim, [[-1, 2], [-np.inf, np.inf]])
     np.testing.assert_array_equal(robot.speed_limits, [3, np.inf])
@@ -121,8 +121,8 @@ def test_nofriction_keeps_the_rotors(puma560: Robot):
 
 def test_the_pose_of_a_link_is_the_product_before_motion_after():
     link = standard_dh("l", alpha=np.pi / 2, a=0.3, d=0.2, offset=0.1)
-    expected = link.before @ link.joint.motion(0.5 + 0.1) @ link.after
+    expected = link.before @ link.joint.motion([0.5]) @ link.after
     assert link.pose(0.5) == expected
     assert Link(name="l", joint=Fixed(offset=3.0), before=transl(1, 0, 0)).pose() == transl(1, 0, 0)
-    slide = Prismatic(axis=(0, 1, 0)).motion(0.4)
+    slide = Prismatic(axis=(0, 1, 0)).motion([0.4])
     assert slide == Transform(translation=(0, 0.4, 0))

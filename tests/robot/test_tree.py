@@ -7,25 +7,27 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from armblocks.robot import Fixed, Joint, Link, Motor, Prismatic, Revolute, Robot, serial_chain
+from armblocks.robot import Fixed, Joint, Link, Motor, Prismatic, Revolute, Robot, Screw, serial_chain
+from armblocks.robot.joints import AxisMotion, BallMotion, Motion
 from armblocks.robot.tree import BASE, KinematicTree
-from robots_for_tests import evaluate, random_inertia, random_states, random_transform
+from robots_for_tests import along, evaluate, random_inertia, random_states, random_transform
 
 
 @dataclass(frozen=True, kw_only=True)
-class Screw(Joint):
-    """Rotates and advances 5 cm per radian, like a joint type in a user's file."""
+class Gimbal(Joint):
+    """Rotates about x, then advances along z by 5 cm per radian, then about any axis: a user's joint type."""
 
-    letter: ClassVar[str] = "H"
-    unit: ClassVar[str] = "rad"
-
-    @property
-    def angular(self) -> float:
-        return 1.0
+    letter: ClassVar[str] = "G"
+    parameters: ClassVar[tuple[str, ...]] = ("axis",)
 
     @property
-    def linear(self) -> float:
-        return 0.05
+    def motions(self) -> tuple[Motion, ...]:
+        return (
+            AxisMotion(axis=(1.0, 0.0, 0.0), angular=1.0, name="roll"),
+            AxisMotion(axis=(0.0, 0.0, 1.0), angular=1.0, linear=0.05, offset=0.2, name="screw"),
+            BallMotion(),
+            AxisMotion(axis=self.axis, linear=1.0, name="stroke"),
+        )
 
 
 def test_bodies_are_numbered_parents_first_and_refer_to_their_joint():
@@ -40,7 +42,7 @@ def test_bodies_are_numbered_parents_first_and_refer_to_their_joint():
     )
     tree = KinematicTree.of(robot)
     assert [body.link for body in tree.bodies] == ["arm", "hand"]
-    assert [body.joint for body in tree.bodies] == [1, 0]
+    assert [body.position for body in tree.bodies] == [body.speed for body in tree.bodies] == [1, 0]
     assert [body.parent for body in tree.bodies] == [BASE, 0]
     assert [frame.body for frame in tree.links] == [1, BASE, 0, 0]
     assert tree.bodies[0].inertia.mass == 3.0
@@ -53,16 +55,17 @@ def test_bodies_are_numbered_parents_first_and_refer_to_their_joint():
     "axis", [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1), (0.6, 0, 0.8), (1, 2, 3)]
 )
 def test_joints_move_about_or_along_any_axis(axis: tuple[float, float, float]):
-    for kind in (Revolute, Prismatic, Screw):
-        arm = Robot(name="arm", links=(Link(name="l", joint=kind(axis=axis, offset=0.3)),))
+    joints = (Revolute(axis=axis, offset=0.3), Prismatic(axis=axis, offset=0.3), Screw(axis=axis, pitch=0.3))
+    for joint in joints:
+        arm = Robot(name="arm", links=(Link(name="l", joint=joint),))
         expected = arm.links[0].pose(0.5).matrix
         assert_allclose(evaluate(arm, "fkine", [0.5]), expected, rtol=0, atol=1e-15)
 
 
 def test_a_new_joint_type_works_in_every_algorithm():
     random = np.random.default_rng(8)
-    screws = Robot(
-        name="screws",
+    robot = Robot(
+        name="gimbals",
         links=serial_chain(
             [
                 Link(
@@ -74,23 +77,28 @@ def test_a_new_joint_type_works_in_every_algorithm():
                     inertia=random_inertia(random),
                     motor=Motor(inertia=1e-4, gear_ratio=30),
                 )
-                for i, kind in enumerate((Screw, Revolute, Screw))
+                for i, kind in enumerate((Gimbal, Revolute, Gimbal))
             ]
         ),
     )
-    assert screws.joint_letters == "HRH"
-    for q, qd, qdd in random_states(screws):
-        tau = evaluate(screws, "rne", q, qd, qdd)
-        M = evaluate(screws, "inertia", q)
-        C = evaluate(screws, "coriolis", q, qd)
-        assert_allclose(tau, M @ qdd + C @ qd + evaluate(screws, "gravload", q), rtol=0, atol=1e-12)
-        assert_allclose(evaluate(screws, "accel", q, qd, tau), qdd, rtol=0, atol=1e-11)
-        assert evaluate(screws, "kinetic_energy", q, qd) == pytest.approx(qd @ M @ qd / 2, rel=1e-13)
+    assert (robot.nq, robot.n, robot.joint_letters) == (15, 13, "GRG")
+    assert [entry.name for entry in robot.speeds[:7]] == [
+        *("l0.roll", "l0.screw", "l0.wx", "l0.wy", "l0.wz", "l0.stroke", "l1"),
+    ]
+    for q, qd, qdd in random_states(robot, 2):
+        tau = evaluate(robot, "rne", q, qd, qdd)
+        M = evaluate(robot, "inertia", q)
+        C = evaluate(robot, "coriolis", q, qd)
+        assert_allclose(tau, M @ qdd + C @ qd + evaluate(robot, "gravload", q), rtol=0, atol=1e-12)
+        assert_allclose(evaluate(robot, "accel", q, qd, tau), qdd, rtol=0, atol=1e-10)
+        assert evaluate(robot, "kinetic_energy", q, qd) == pytest.approx(qd @ M @ qd / 2, rel=1e-13)
         step = 1e-6
-        for j in range(screws.n):
-            ahead, behind = (evaluate(screws, "fkine", q + s * step * np.eye(screws.n)[j]) for s in (1, -1))
+        for j in range(robot.n):
+            ahead, behind = (
+                evaluate(robot, "fkine", along(robot, q, np.eye(robot.n)[j], s * step)) for s in (1, -1)
+            )
             velocity = (ahead[:3, 3] - behind[:3, 3]) / (2 * step)
-            assert_allclose(evaluate(screws, "jacob0", q)[:3, j], velocity, rtol=0, atol=1e-8)
+            assert_allclose(evaluate(robot, "jacob0", q)[:3, j], velocity, rtol=0, atol=1e-8)
 
 
 def test_gravity_of_the_tree_is_in_base_axes(puma560: Robot):

@@ -27,7 +27,7 @@ export default function RobotView() {
     void loadRunStage()
     void ask({ kind: 'scene', document, inside, block }).then(async (scene) => {
       if (!scene || !current) return
-      const q = scene.joints.map(({ limits }) => (limits ? Math.min(Math.max(0, limits[0]), limits[1]) : 0))
+      const q = scene.rest
       const poses = await ask({ kind: 'pose', document, inside, block, q })
       if (current && poses) setShown({ scene, rest: poses, q })
     })

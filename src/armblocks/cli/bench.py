@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -45,22 +45,23 @@ def bench(
     arm = ab.load_robot(robot)
     console = results_console()
     console.print(
-        f"{arm.name}, {arm.n} joints; batches of {samples:,}; {os.cpu_count()} processors; "
+        f"{arm.name}, {len(arm.robot.joints)} joints; batches of {samples:,}; {os.cpu_count()} processors; "
         f"the minimum of {_REPEATS} repeats, ns per evaluation",
         style=STRONG,
     )
     columns = ("one call", "batch", f"{threads} threads", "multiplies", "adds", "fused", "others")
     rows = table(("method", "left"), *((name, "right") for name in columns))
     for method, inputs in METHODS.items():
-        rows.add_row(method, *_row(arm, method, len(inputs), samples, threads))
+        rows.add_row(method, *_row(arm, method, inputs, samples, threads))
     console.print(rows)
 
 
-def _row(arm: Arm, method: str, inputs: int, samples: int, threads: int) -> list[str]:
+def _row(arm: Arm, method: str, inputs: Sequence[str], samples: int, threads: int) -> list[str]:
     import numpy as np
 
     generator = np.random.default_rng(0)
-    batch = [generator.uniform(-1.0, 1.0, (samples, arm.n)) for _ in range(inputs)]
+    sizes = [arm.nq if name == "q" else arm.n for name in inputs]
+    batch = [generator.uniform(-1.0, 1.0, (samples, size)) for size in sizes]
     single = [np.ascontiguousarray(values[0]) for values in batch]
     call = getattr(arm, method)
     out = call(*batch)

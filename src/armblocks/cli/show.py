@@ -131,6 +131,8 @@ def _print_kinematics(robot: Robot, console: Console) -> None:
 
 
 def _print_tree(robot: Robot, console: Console) -> None:
+    from armblocks.robot.dh_table import axis_text
+
     columns = [
         ("link", "left"),
         ("parent", "left"),
@@ -140,10 +142,11 @@ def _print_tree(robot: Robot, console: Console) -> None:
     ]
     poses = table(*columns)
     for link in robot.links:
-        x, y, z = link.pose(0.0).translation
-        axis = "" if not link.joint.moves else " ".join(f"{part:.3g}" for part in link.joint.axis)
+        x, y, z = link.pose().translation
         kind = type(link.joint).__name__.lower()
-        poses.add_row(link.name, link.parent or "(base)", kind, axis, f"{x:.5g}, {y:.5g}, {z:.5g}")
+        poses.add_row(
+            link.name, link.parent or "(base)", kind, axis_text(link.joint), f"{x:.5g}, {y:.5g}, {z:.5g}"
+        )
     console.print(poses)
 
 
@@ -189,30 +192,30 @@ def _print_links(robot: Robot, console: Console, title: str, rows: Sequence[Row]
 
 
 def _print_limits(robot: Robot, console: Console) -> None:
-    if all(joint.limits == type(joint.limits)() for joint in robot.joints):
+    if all(limits == type(limits)() for limits in robot.limits):
         return
-    speeds = any(joint.limits.speed is not None for joint in robot.joints)
-    torques = any(joint.limits.torque is not None for joint in robot.joints)
-    limits = table(
+    speeds = any(limits.speed is not None for limits in robot.limits)
+    torques = any(limits.torque is not None for limits in robot.limits)
+    shown = table(
         ("joint", "left"),
         ("lowest", "right"),
         ("highest", "right"),
         *((("speed", "right"),) if speeds else ()),
         *((("torque", "right"),) if torques else ()),
     )
-    for name, joint in zip(robot.joint_names, robot.joints):
-        is_revolute = joint.unit == "rad"
+    for coordinate, limits in zip(robot.speeds, robot.limits):
+        is_revolute = coordinate.unit == "rad"
         scale, unit = (_DEGREE, "deg") if is_revolute else (1.0, "m")
-        low, high = joint.limits.position or (float("nan"), float("nan"))
+        low, high = limits.position or (float("nan"), float("nan"))
         cells = [_with_unit(low / scale, unit), _with_unit(high / scale, unit)]
         if speeds:
-            cells.append(_with_unit(_or_nan(joint.limits.speed) / scale, f"{unit}/s"))
+            cells.append(_with_unit(_or_nan(limits.speed) / scale, f"{unit}/s"))
         if torques:
-            cells.append(_with_unit(_or_nan(joint.limits.torque), "N m" if is_revolute else "N"))
-        limits.add_row(name, *cells)
+            cells.append(_with_unit(_or_nan(limits.torque), "N m" if is_revolute else "N"))
+        shown.add_row(coordinate.name, *cells)
     console.print()
     console.print("Limits", style=STRONG)
-    console.print(limits)
+    console.print(shown)
 
 
 def _print_frames(robot: Robot, console: Console) -> None:

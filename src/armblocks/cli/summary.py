@@ -108,7 +108,7 @@ def _joint_table(joints: Sequence[JointSummary], exceeded: set[tuple[str, LimitK
             joint.name,
             *((angle,) if mixed else ()),
             _limit_cell(
-                _span(joint.position_min * position, joint.position_max * position),
+                _range(joint.position_min, joint.position_max, position),
                 (joint.name, LimitKind.POSITION) in exceeded,
             ),
             "" if ends is None else _span(ends[0] * position, ends[1] * position),
@@ -124,6 +124,11 @@ def _joint_table(joints: Sequence[JointSummary], exceeded: set[tuple[str, LimitK
 def _limit_cell(text: str, is_exceeded: bool) -> Text:
     """A cell; a value beyond a limit has a mark and a colour."""
     return Text(f"{LIMIT_MARK} {text}", ERROR) if is_exceeded else Text(text)
+
+
+def _range(low: float | None, high: float | None, factor: float) -> str:
+    """The range of a coordinate; empty for the speeds of ball joints, which have none."""
+    return "" if low is None or high is None else _span(low * factor, high * factor)
 
 
 def _span(low: float, high: float) -> str:

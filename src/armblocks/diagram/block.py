@@ -266,6 +266,10 @@ class Block(ABC):
         """Delayed inputs that the equations read; each must be in ``differentiated_inputs`` too."""
         return ()
 
+    def output_rate(self, port: str) -> str | None:
+        """The output that is the exact time derivative of an output, by ``output_rates``."""
+        return self.output_rates.get(port)
+
     def output_shapes(self, inputs: Shapes) -> Shapes:
         """Shapes of the outputs whose port does not declare one, from the shapes of all inputs.
 

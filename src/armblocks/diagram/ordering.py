@@ -59,10 +59,9 @@ class Network:
         """The location of an output port's value. A derivative port adds one derivative order."""
         route = self.route(ref)
         ref, order = route[-1], order + len(route) - 1
-        rates = self.diagram.blocks[ref.block].output_rates
-        port = ref.port
-        while order and port in rates:
-            port, order = rates[port], order - 1
+        block, port = self.diagram.blocks[ref.block], ref.port
+        while order and (rate := block.output_rate(port)):
+            port, order = rate, order - 1
         if self.diagram.clocked(ref.block) and (order or not self.ticking):
             return Value(Node(ref.block, HELD, order), SlotKind.OUTPUT, port)
         return self._slot(ref.block, SlotKind.OUTPUT, port, order)

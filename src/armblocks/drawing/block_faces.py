@@ -221,7 +221,7 @@ def _robot(area: FaceArea, robot: Robot, caption: str) -> list[Mark]:
     box = area.shrunk(7.0, 7.0)
     if caption:
         box = FaceArea(box.x, box.y + 8, box.width, box.height - 8)
-    frames = link_frames(robot, [0.35 + 0.25 * k if k % 2 else 0.3 for k in range(robot.n)])
+    frames = link_frames(robot, [0.35 + 0.25 * k if k % 2 else 0.3 for k in range(robot.nq)])
     row = {link.name: k for k, link in enumerate(robot.links, start=1)}
     points = frames[:, :3, 3]
     camera = Camera.framing(points + 1e-6 * np.arange(3), box.width, box.height, margin=3.0)

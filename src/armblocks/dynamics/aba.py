@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from casadi import SX, mtimes, vertcat
 
+from armblocks.dynamics.ball_joints import axis_accelerations, speed_rates
 from armblocks.dynamics.joint_motion import JointMotion
 from armblocks.dynamics.rnea import Wrench
 from armblocks.robot.tree import BASE, KinematicTree
@@ -21,7 +22,7 @@ def aba(
     gravity: Vector,
     on_bodies: Mapping[int, Wrench] | None = None,
 ) -> list[SX]:
-    """Joint accelerations from the joint torques minus friction, in the order of q.
+    """Joint accelerations from the joint torques minus friction, in the order of qd.
 
     ``on_bodies``: wrenches that bodies exert on the surroundings, each in its body's frame. Spatial vectors
     have the angular part first. The cost is proportional to n instead of n^3, an advantage for long chains.
@@ -37,7 +38,7 @@ def aba(
     pA: list[SX] = []
     # 1. Outward: velocities and velocity-product terms.
     for i, body in enumerate(bodies):
-        vJ = S[i] * qd[body.joint]
+        vJ = S[i] * qd[body.speed]
         inherited = SX(6, 1) if body.parent == BASE else mtimes(X[i], v[body.parent])
         v.append(inherited + vJ)
         c.append(_cross_motion(v[i], vJ))
@@ -45,6 +46,8 @@ def aba(
         if on_bodies and i in on_bodies:
             bias = bias + vertcat(*on_bodies[i].moment, *on_bodies[i].force)
         pA.append(bias)
+    # The rotors of ball joints have the accelerations qdd, the bodies those of axes in a series.
+    shift = axis_accelerations(tree, qd, [0.0] * tree.n)
     U: list[SX] = [SX(6, 1)] * tree.n
     d: list[SX] = [SX(1, 1)] * tree.n
     u: list[SX] = [SX(1, 1)] * tree.n
@@ -55,7 +58,8 @@ def aba(
         pivot = mtimes(S[i].T, U[i]) + body.reflected_inertia
         # This is 1 / pivot. With that expression CasADi would replace every product with d by a division.
         d[i] = 2.0 / (pivot + pivot)
-        u[i] = tau[body.joint] - mtimes(S[i].T, pA[i])
+        rotor = body.reflected_inertia * shift[body.speed]
+        u[i] = tau[body.speed] + rotor - mtimes(S[i].T, pA[i])
         if body.parent != BASE:
             Ia = IA[i] - mtimes(U[i], U[i].T) * d[i]
             pa = pA[i] + mtimes(Ia, c[i]) + U[i] * (d[i] * u[i])
@@ -67,15 +71,14 @@ def aba(
     qdd: list[SX] = [SX(1, 1)] * tree.n
     for i, body in enumerate(bodies):
         carried = mtimes(X[i], ground if body.parent == BASE else a[body.parent]) + c[i]
-        qdd[body.joint] = d[i] * (u[i] - mtimes(U[i].T, carried))
-        a.append(carried + S[i] * qdd[body.joint])
-    return qdd
+        qdd[body.speed] = d[i] * (u[i] - mtimes(U[i].T, carried))
+        a.append(carried + S[i] * qdd[body.speed])
+    return speed_rates(tree, qd, qdd)
 
 
 def _motion_transform(joint: JointMotion) -> SX:
     """The transform of motion vectors from the parent body to the body: ``[E 0; -E [p]x E]``."""
-    c, s = joint.rotation
-    R = multiply(joint.body.placement.rotation, ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
+    R = multiply(joint.body.placement.rotation, joint.rotation.matrix())
     E = _sx(R).T
     lower = -mtimes(E, _skew(joint.p))
     return _stack(E, SX(3, 3), lower, E)

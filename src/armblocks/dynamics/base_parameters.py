@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from armblocks.robot.tree import BASE, KinematicTree
+from armblocks.robot.tree import BASE, Body, KinematicTree
 from armblocks.spatial import Transform, transl
 from armblocks.spatial.inertia import NO_INERTIA, RigidInertia
 from armblocks.spatial.vectors import ZERO, Symmetric
@@ -15,9 +15,9 @@ def regrouped(tree: KinematicTree) -> KinematicTree:
 
     Some parameters of a body have the same effect as parameters of its parent and are added to these. For a
     revolute joint they are the mass, the first moment along the axis, and an inertia that is equal about all
-    directions normal to the axis; for a prismatic joint the whole inertia matrix. Before that, each body's
-    origin is shifted along its joint axis to the foot of the common normal with the next axis. This removes
-    products with the distance between them.
+    directions normal to the axis; for a prismatic joint the whole inertia matrix; for a ball joint the mass.
+    Before that, each body's origin is shifted along its joint axis to the foot of the common normal with the
+    next axis. This removes products with the distance between them.
 
     Joint torques, mass matrix and kinetic energy are those of the robot; the inertia of a single body is not.
     Source: Khalil, Dombre, *Modeling, Identification and Control of Robots*, 9.4 (base inertial parameters).
@@ -26,7 +26,7 @@ def regrouped(tree: KinematicTree) -> KinematicTree:
     inertias = [body.inertia for body in tree.bodies]
     for i in reversed(range(tree.n)):
         body = tree.bodies[i]
-        shared = _shared_with_parent(inertias[i], angular=body.angular, linear=body.linear)
+        shared = _shared_with_parent(inertias[i], body)
         inertias[i] = _without(inertias[i], shared)
         if body.parent != BASE:
             inertias[body.parent] = inertias[body.parent].plus(shared.moved(body.placement))
@@ -34,14 +34,17 @@ def regrouped(tree: KinematicTree) -> KinematicTree:
     return replace(tree, bodies=bodies)
 
 
-def _shared_with_parent(inertia: RigidInertia, *, angular: float, linear: float) -> RigidInertia:
-    """The part of the inertia that can be assigned to either side of the joint."""
+def _shared_with_parent(inertia: RigidInertia, body: Body) -> RigidInertia:
+    """The part of the inertia that can be assigned to either side of the body's joint."""
+    if body.ball is not None:
+        # Only the centre of a ball joint is fixed to both sides.
+        return RigidInertia(inertia.mass, ZERO, NO_INERTIA)
     second = inertia.second
-    if angular:
+    if body.angular:
         # Equal normal to the axis and zero about it: a rotation about the axis changes neither this inertia
         # nor its momentum.
         second = Symmetric(second.yy, second.yy, 0.0, 0.0, 0.0, 0.0)
-    if linear:
+    if body.linear:
         # Without mass a translation causes no momentum; without first moment it does not change the inertia.
         return RigidInertia(0.0, ZERO, second)
     return RigidInertia(inertia.mass, (0.0, 0.0, inertia.first[2]), second)
@@ -58,12 +61,15 @@ def _without(inertia: RigidInertia, part: RigidInertia) -> RigidInertia:
 
 
 def _origins_on_common_normals(tree: KinematicTree) -> KinematicTree:
-    """Shift each body's origin along its axis so that the origin of its first child has z = 0."""
+    """Shift each body's origin along its axis so that the origin of its first child has z = 0.
+
+    The origins of the bodies of a ball joint stay at its centre.
+    """
     bodies = list(tree.bodies)
     links = list(tree.links)
     for i in reversed(range(tree.n)):
         children = [k for k, body in enumerate(bodies) if body.parent == i]
-        if not children:
+        if not children or bodies[i].ball is not None:
             continue
         shift = bodies[children[0]].placement.translation[2]
         to_new_origin, to_old_origin = transl(0.0, 0.0, shift), transl(0.0, 0.0, -shift)

@@ -33,7 +33,7 @@ def kinetic_energy(tree: KinematicTree, joints: Sequence[JointMotion], qd: Seque
             w_parent = omegas[body.parent]
             w = joint.to_body(w_parent)
             v = joint.to_body(add(velocities[body.parent], cross(w_parent, joint.p)))
-        rate = qd[body.joint]
+        rate = qd[body.speed]
         w = (w[0], w[1], w[2] + body.angular * rate)
         v = (v[0], v[1], v[2] + body.linear * rate)
         omegas.append(w)

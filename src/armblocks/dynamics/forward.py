@@ -36,13 +36,13 @@ def forward_dynamics(
     tau: Sequence[Scalar],
     on_bodies: Mapping[int, Wrench] | None = None,
 ) -> list[SX]:
-    """Accelerations of the joints, in the order of q; ``tau`` is the joint torque minus friction."""
+    """Accelerations of the joints, in the order of qd; ``tau`` is the joint torque minus friction."""
     joints = joint_motions(tree, q)
     n = tree.n
     if n > MAX_JOINTS_BY_MATRIX:
         return aba(tree, joints, qd, tau, tree.gravity, on_bodies)
     bias = rnea(tree, joints, qd, [0.0] * n, tree.gravity, on_bodies)
-    order = [body.joint for body in tree.bodies]
+    order = [body.speed for body in tree.bodies]
     net_torque = [tau[j] - bias[j] for j in order]
     solution = solve_factored(tree, crba(tree, joints), net_torque)
     qdd: list[SX] = [SX(0.0)] * n
@@ -59,13 +59,13 @@ def check_accelerations_exist(tree: KinematicTree) -> None:
     """
     if tree.n == 0:
         return
-    q = SX.sym("q", tree.n)
+    q = SX.sym("q", tree.robot.nq)
     M = crba(tree, joint_motions(tree, q))
     evaluate = Function("M", [q], [horzcat(*(vertcat(*(SX(entry) for entry in row)) for row in M))])
     random = np.random.default_rng(0)
     has_inertia = np.zeros(tree.n, dtype=bool)
     for _ in range(RANDOM_POSITIONS):
-        numbers = np.asarray(evaluate(random.uniform(-np.pi, np.pi, tree.n)).full())
+        numbers = np.asarray(evaluate(random.uniform(-np.pi, np.pi, tree.robot.nq)).full())
         has_inertia |= _pivots(numbers) > PIVOT_TOLERANCE * np.abs(np.diag(numbers))
     if has_inertia.all():
         return

@@ -89,23 +89,23 @@ class JointEquations:
         no_acceleration = [0.0] * tree.n
         self.bias = SX(vertcat(*rnea(tree, joints, entries(qd), no_acceleration, tree.gravity, on_bodies)))
         self._M: SquareMatrix = crba(tree, joints)
-        body_of_joint = sorted(range(tree.n), key=lambda i: tree.bodies[i].joint)
+        body_of_joint = sorted(range(tree.n), key=lambda i: tree.bodies[i].speed)
         self.M = SX(vertcat(*(vertcat(*(SX(self._M[i][j]) for j in body_of_joint)).T for i in body_of_joint)))
 
     def solve(self, right: SX, free: SX) -> SX:
         """``x`` with ``M x = right`` in the rows of the free joints (1), and exactly 0 for the others (0)."""
         n, bodies = self._tree.n, self._tree.bodies
-        is_free = [free[body.joint] for body in bodies]
+        is_free = [free[body.speed] for body in bodies]
         masked: SquareMatrix = [
             [self._M[i][j] if i == j else self._M[i][j] * is_free[i] * is_free[j] for j in range(n)]
             for i in range(n)
         ]
         solution = solve_factored(
-            self._tree, masked, [right[body.joint] * is_free[i] for i, body in enumerate(bodies)]
+            self._tree, masked, [right[body.speed] * is_free[i] for i, body in enumerate(bodies)]
         )
         result = SX(n, 1)
         for body, value in zip(bodies, solution):
-            result[body.joint] = value
+            result[body.speed] = value
         return result
 
     def accelerations(self, torque: SX, free: SX) -> SX:

@@ -12,7 +12,17 @@ from armblocks.dynamics.joint_motion import joint_motions
 from armblocks.dynamics.kinematics import Pose, body_poses, constant_pose, frame_pose
 from armblocks.robot.tree import BASE, KinematicTree
 from armblocks.spatial import Transform
-from armblocks.spatial.vectors import ZERO, Scalar, Vector, add, cross, scale, subtract
+from armblocks.spatial.vectors import (
+    ZERO,
+    Rotation,
+    RotationZ,
+    Scalar,
+    Vector,
+    add,
+    cross,
+    scale,
+    subtract,
+)
 
 Column = tuple[Vector, Vector]
 """Linear and angular velocity of the tool per unit speed of one joint."""
@@ -39,17 +49,27 @@ def tool_columns(tree: KinematicTree, q: SX) -> list[Column]:
     joints = joint_motions(tree, q)
     pose = constant_pose(tree.tool.pose.inverse())
     for i in () if carrier == BASE else (carrier, *tree.ancestors(carrier)):
-        body, (c, s) = tree.bodies[i], joints[i].rotation
+        body = tree.bodies[i]
         w = scale(body.angular, pose.z)
         # Here the tool's origin is the reference point: z x (0 - p) = p x z.
         v = add(cross(pose.p, w), scale(body.linear, pose.z))
-        columns[body.joint] = (v, w)
-        x = subtract(scale(c, pose.x), scale(s, pose.y))
-        y = add(scale(s, pose.x), scale(c, pose.y))
-        before_rotation = Pose(x, y, pose.z, pose.p)
-        parent = before_rotation.after(Transform(rotation=body.placement.inverse().rotation))
+        columns[body.speed] = (v, w)
+        parent = _rotated_back(pose, joints[i].rotation).after(
+            Transform(rotation=body.placement.inverse().rotation)
+        )
         pose = parent._replace(p=subtract(pose.p, parent.rotate(joints[i].p)))
     return columns
+
+
+def _rotated_back(pose: Pose, rotation: RotationZ | Rotation) -> Pose:
+    """The pose of the frame before a rotation, from the pose of the frame after it."""
+    if isinstance(rotation, Rotation):
+        rows = [pose.rotate(row) for row in rotation.R]
+        return Pose(rows[0], rows[1], rows[2], pose.p)
+    c, s = rotation
+    x = subtract(scale(c, pose.x), scale(s, pose.y))
+    y = add(scale(s, pose.x), scale(c, pose.y))
+    return Pose(x, y, pose.z, pose.p)
 
 
 def _columns(tree: KinematicTree, bodies: Sequence[Pose], tip: Vector) -> list[Column]:
@@ -64,7 +84,7 @@ def _columns(tree: KinematicTree, bodies: Sequence[Pose], tip: Vector) -> list[C
         body, pose = tree.bodies[i], bodies[i]
         w = scale(body.angular, pose.z)
         v = cross(w, subtract(tip, pose.p)) if body.angular else ZERO
-        columns[body.joint] = (add(v, scale(body.linear, pose.z)), w)
+        columns[body.speed] = (add(v, scale(body.linear, pose.z)), w)
     return columns
 
 

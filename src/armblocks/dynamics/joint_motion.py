@@ -8,19 +8,20 @@ from dataclasses import dataclass
 
 from casadi import SX, cos, sin
 
+from armblocks.dynamics.ball_joints import ball_rotation
 from armblocks.robot.tree import Body, KinematicTree
-from armblocks.spatial.vectors import RotationZ, Scalar, Vector, add, rotate
+from armblocks.spatial.vectors import Rotation, RotationZ, Scalar, Vector, add, rotate
 
 
 @dataclass(frozen=True, eq=False)
 class JointMotion:
-    """The motion of a body's joint at one q: ``rotation`` about z, and ``p``.
+    """The motion of a body's joint at one q: ``rotation``, about z but for ball joints, and ``p``.
 
     ``p`` is the position of the body's origin in the parent body's frame, m.
     """
 
     body: Body
-    rotation: RotationZ
+    rotation: RotationZ | Rotation
     p: Vector
 
     def to_body(self, a: Vector) -> Vector:
@@ -38,8 +39,8 @@ class JointMotion:
 
 
 def joint_motions(tree: KinematicTree, q: SX) -> list[JointMotion]:
-    """The motion of every body's joint; ``q`` column (n, 1)."""
-    return [_motion(body, q[body.joint]) for body in tree.bodies]
+    """The motion of every body's joint; ``q`` column (nq, 1)."""
+    return [_motion(body, entries(q)) for body in tree.bodies]
 
 
 def entries(x: SX | Sequence[Scalar]) -> list[Scalar]:
@@ -64,9 +65,12 @@ def cos_sin(variable: Scalar, constant: float) -> RotationZ:
             return RotationZ(s, -c)
 
 
-def _motion(body: Body, q: SX) -> JointMotion:
-    rotation = cos_sin(body.angular * q, body.angular * body.offset) if body.angular else RotationZ(1.0, 0.0)
+def _motion(body: Body, coordinates: Sequence[Scalar]) -> JointMotion:
     p: Vector = body.placement.translation
+    if body.ball is not None:
+        return JointMotion(body, ball_rotation(body, coordinates), p)
+    q = coordinates[body.position]
+    rotation = cos_sin(body.angular * q, body.angular * body.offset) if body.angular else RotationZ(1.0, 0.0)
     if body.linear:
         shift = body.linear * q + body.linear * body.offset
         p = add(p, rotate(body.placement.rotation, (0.0, 0.0, shift)))

@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 from casadi import SX, horzcat, vertcat
 
+from armblocks.dynamics.ball_joints import ball_rotation
 from armblocks.dynamics.joint_motion import cos_sin
 from armblocks.robot.tree import BASE, Body, Frame, KinematicTree
 from armblocks.spatial import IDENTITY3, Transform
-from armblocks.spatial.vectors import ZERO, RotationZ, Scalar, Vector, add, scale
+from armblocks.spatial.vectors import ZERO, RotationZ, Scalar, Vector, add, scale, transpose
 
 
 class Pose(NamedTuple):
@@ -67,12 +68,22 @@ def body_poses(tree: KinematicTree, q: Sequence[Scalar], ground: Pose) -> list[P
     rotated: list[_RotatedPose] = []
     for body in tree.bodies:
         parent = base if body.parent == BASE else rotated[body.parent]
-        rotated.append(_body_pose(parent, body, q[body.joint]))
+        rotated.append(_body_pose(parent, body, q) if body.ball is None else _ball_pose(parent, body, q))
     return [entry.pose for entry in rotated]
 
 
-def _body_pose(parent: _RotatedPose, body: Body, q: Scalar) -> _RotatedPose:
-    """The pose of a body, from that of its parent."""
+def _ball_pose(parent: _RotatedPose, body: Body, q: Sequence[Scalar]) -> _RotatedPose:
+    """The pose of a body of a ball joint, from that of its parent."""
+    before = parent.pose.after(body.placement)
+    rotation = ball_rotation(body, q)
+    x, y, z = (before.rotate(column) for column in transpose(rotation.matrix()))
+    pose = Pose(x, y, z, before.p)
+    return _RotatedPose(pose, 0.0, 0.0, RotationZ(1.0, 0.0), pose)
+
+
+def _body_pose(parent: _RotatedPose, body: Body, coordinates: Sequence[Scalar]) -> _RotatedPose:
+    """The pose of a body on an axis, from that of its parent."""
+    q = coordinates[body.position]
     p = parent.start.rotate(parent.rotation.rotate(body.placement.translation))
     p = add(parent.pose.p, p)
     if body.placement.rotation == IDENTITY3:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from armblocks.dynamics.ball_joints import axis_accelerations
 from armblocks.dynamics.joint_motion import JointMotion
 from armblocks.robot.tree import BASE, KinematicTree
 from armblocks.spatial.inertia import RigidInertia
@@ -43,13 +44,14 @@ def rnea(
     gravity: Vector,
     on_bodies: Mapping[int, Wrench] | None = None,
 ) -> list[Scalar]:
-    """Joint torques of the rigid bodies (no motor, no friction), in the order of q.
+    """Joint torques of the rigid bodies (no motor, no friction), in the order of qd.
 
     ``gravity``: m/s2 in base axes. ``on_bodies``: wrenches that bodies exert on the surroundings, each in its
     body's frame. Source: Luh, Walker, Paul 1980 in the form of Khalil and Dombre, *Modeling, Identification
     and Control of Robots*, 9.5 (with its numbers of the passes), with three-vectors in link frames.
     """
     bodies = tree.bodies
+    qdd = axis_accelerations(tree, qd, qdd)
     motions: list[BodyMotion] = []
     wrenches: list[Wrench] = []
     ground = BodyMotion(ZERO, ZERO, scale(-1.0, gravity), _rotation_accelerations(ZERO, ZERO))
@@ -67,7 +69,7 @@ def rnea(
     for i in reversed(range(len(bodies))):
         body = bodies[i]
         force, moment = wrenches[i]
-        tau[body.joint] = body.angular * moment[2] + body.linear * force[2]
+        tau[body.speed] = body.angular * moment[2] + body.linear * force[2]
         if body.parent != BASE:
             wrenches[body.parent] = _with_child_wrench(wrenches[body.parent], wrenches[i], joints[i])
     return tau
@@ -78,7 +80,7 @@ def _body_motion(
 ) -> BodyMotion:
     """The motion of a body, from the motion of its parent."""
     body = joint.body
-    j = body.joint
+    j = body.speed
     w = joint.to_body(parent.omega)
     alpha = joint.to_body(parent.alpha)
     acceleration = joint.to_body(add(parent.acceleration, rotate(parent.U, joint.p)))

@@ -2,8 +2,10 @@
 
 Shapes, units and frames of the inputs and outputs, here and in all functions below:
 
-``q`` (n,) rad or m, ``qd`` (n,) per second, ``qdd`` (n,) per second squared, ``tau`` (n,) N m or N, all in
-the order of the robot's moving links.
+``q`` (nq,) rad or m, ``qd`` (n,) per second, ``qdd`` (n,) per second squared, ``tau`` (n,) N m or N, all in
+the order of the robot's moving links. A ball joint has a quaternion w x y z in q, of which only the direction
+counts, and an angular velocity in the axes of the link's side in qd; NOTATION.md has the layout. ``n`` is the
+number of degrees of freedom.
 ``wrench`` (6,): force (N) and moment (N m) of the tip on the environment, about the origin and in
 the axes of the *last link's* frame (the toolbox's ``fext``, independent of the tool transform).
 ``payload`` (10,): mass (kg), centre x y z (m), inertia xx yy zz xy yz xz about that centre (kg m2), in the
@@ -16,8 +18,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from casadi import SX, jacobian, vertcat
+from casadi import SX, jacobian, mtimes, vertcat
 
+from armblocks.dynamics.ball_joints import (
+    difference,
+    integrated,
+    normalised,
+    position_rates,
+    structure_matrix,
+)
 from armblocks.dynamics.base_parameters import regrouped
 from armblocks.dynamics.crba import crba
 from armblocks.dynamics.energy import first_moment, kinetic_energy, potential_energy
@@ -132,11 +141,11 @@ def trace_gravload(robot: Robot) -> TracedFunction:
 def trace_inertia(robot: Robot) -> TracedFunction:
     """``M (n, n)``: joint-space inertia, rotors included; kg m2, kg m or kg."""
     tree = regrouped(KinematicTree.of(robot))
-    body_of_joint = _body_of_joint(tree)
+    body_of_speed = _body_of_speed(tree)
 
     def equations(q: SX) -> SX:
         M = crba(tree, joint_motions(tree, q))
-        return _matrix([[M[i][j] for j in body_of_joint] for i in body_of_joint])
+        return _matrix([[M[i][j] for j in body_of_speed] for i in body_of_speed])
 
     return _trace("inertia", robot, ("q",), ("M", (robot.n, robot.n), "kg m2"), equations)
 
@@ -146,14 +155,23 @@ def trace_coriolis(robot: Robot) -> TracedFunction:
 
     The velocity torque is quadratic, ``c(q, qd) = C(q, qd) qd``; half its derivative with respect to ``qd``
     is the matrix of Christoffel symbols (Siciliano, Sciavicco, Villani, Oriolo, *Robotics*, 7.1.2 and 7.2.1).
+    With ball joints, whose speeds are not rates of coordinates, the symbols are those of the same connection
+    in these speeds: ``C = (dc/dqd + M W) / 2`` with W of :func:`structure_matrix`.
     """
     tree = regrouped(KinematicTree.of(robot))
+    body_of_speed = _body_of_speed(tree)
 
     def equations(q: SX, qd: SX) -> SX:
         zero_gravity = (0.0, 0.0, 0.0)
         no_acceleration = [0.0] * tree.n
-        c = _sum(rnea(tree, joint_motions(tree, q), entries(qd), no_acceleration, zero_gravity))
-        return 0.5 * jacobian(c, qd)
+        joints, rates = joint_motions(tree, q), entries(qd)
+        c = _sum(rnea(tree, joints, rates, no_acceleration, zero_gravity))
+        W = structure_matrix(tree, rates)
+        if W is None:
+            return 0.5 * jacobian(c, qd)
+        M = crba(tree, joints)
+        ordered = _matrix([[M[i][j] for j in body_of_speed] for i in body_of_speed])
+        return 0.5 * (jacobian(c, qd) + mtimes(ordered, W))
 
     return _trace("coriolis", robot, ("q", "qd"), ("C", (robot.n, robot.n), "N m s"), equations)
 
@@ -244,6 +262,42 @@ def trace_centre_of_mass(robot: Robot) -> TracedFunction:
     return _trace("centre_of_mass", robot, ("q",), ("centre", (3,), "m"), equations)
 
 
+def trace_position_rates(robot: Robot) -> TracedFunction:
+    """``rates (nq,)``: dq/dt for the speeds ``qd``, which are these rates but for quaternions."""
+
+    def equations(q: SX, qd: SX) -> SX:
+        return _sum(position_rates(robot, entries(q), entries(qd)))
+
+    return _trace("position_rates", robot, ("q", "qd"), ("rates", (robot.nq,), ""), equations)
+
+
+def trace_integrate(robot: Robot) -> TracedFunction:
+    """``q (nq,)`` after the time ``dt`` (s) at constant ``qd``, with quaternions of length 1."""
+
+    def equations(q: SX, qd: SX, dt: SX) -> SX:
+        return _sum(integrated(robot, entries(q), entries(qd), dt))
+
+    return _trace("integrate", robot, ("q", "qd", "dt"), ("q", (robot.nq,), ""), equations)
+
+
+def trace_difference(robot: Robot) -> TracedFunction:
+    """``qd (n,)`` that leads from ``q0`` to ``q1`` in one second; a ball joint rotates by at most π."""
+
+    def equations(q0: SX, q1: SX) -> SX:
+        return _sum(difference(robot, entries(q0), entries(q1)))
+
+    return _trace("difference", robot, ("q0", "q1"), ("qd", (robot.n,), ""), equations)
+
+
+def trace_normalised(robot: Robot) -> TracedFunction:
+    """``q (nq,)`` with quaternions of length 1."""
+
+    def equations(q: SX) -> SX:
+        return _sum(normalised(robot, entries(q)))
+
+    return _trace("normalised", robot, ("q",), ("q", (robot.nq,), ""), equations)
+
+
 TRACES: Mapping[str, Callable[[Robot], TracedFunction]] = {
     "fkine": trace_fkine,
     "link_poses": trace_link_poses,
@@ -261,6 +315,10 @@ TRACES: Mapping[str, Callable[[Robot], TracedFunction]] = {
     "kinetic_energy": trace_kinetic_energy,
     "potential_energy": trace_potential_energy,
     "centre_of_mass": trace_centre_of_mass,
+    "position_rates": trace_position_rates,
+    "integrate": trace_integrate,
+    "difference": trace_difference,
+    "normalised": trace_normalised,
 }
 """The trace functions by name: ``TRACES["rne"](robot)``."""
 
@@ -276,7 +334,7 @@ def _trace(
         raise RobotError(
             f"no joint moves, so there is no {name}",
             where=f"robot '{robot.name}'",
-            allowed="at least one revolute or prismatic joint",
+            allowed="at least one joint that is not fixed",
             fix="give the robot a joint that moves",
         )
     return TracedFunction.trace(name, _inputs(robot, inputs), signature(output), equations)
@@ -284,12 +342,14 @@ def _trace(
 
 def _inputs(robot: Robot, names: Sequence[str]) -> Signature:
     """Slots of the named inputs; joint quantities have a unit if it is the same for all joints."""
-    units = set(robot.joint_units)
+    units = {entry.unit for entry in robot.speeds}
     unit = units.pop() if len(units) == 1 else ""
     force = {"rad": "N m", "m": "N"}.get(unit, "")
     n = (robot.n,)
+    position_unit = unit if robot.nq == robot.nv else ""
     slots = {
-        "q": Slot("q", n, unit),
+        **{name: Slot(name, (robot.nq,), position_unit) for name in ("q", "q0", "q1")},
+        "dt": Slot("dt", (), "s"),
         "qd": Slot("qd", n, f"{unit}/s" if unit else ""),
         "qdd": Slot("qdd", n, f"{unit}/s2" if unit else ""),
         "tau": Slot("tau", n, force),
@@ -299,11 +359,11 @@ def _inputs(robot: Robot, names: Sequence[str]) -> Signature:
     return Signature(tuple(slots[name] for name in names))
 
 
-def _body_of_joint(tree: KinematicTree) -> list[int]:
-    """For each joint in the order of q, the index of its body."""
+def _body_of_speed(tree: KinematicTree) -> list[int]:
+    """For each entry of qd, the index of its body."""
     indices = [0] * tree.n
     for i, body in enumerate(tree.bodies):
-        indices[body.joint] = i
+        indices[body.speed] = i
     return indices
 
 

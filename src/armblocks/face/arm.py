@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 
 class ConfigurationFunction(Protocol):
-    """``f(q)``: ``q`` (n,) or (N, n); one result, or N of them stacked. ``out`` receives the result."""
+    """``f(q)``: ``q`` (nq,) or (N, nq); one result, or N of them stacked. ``out`` receives the result."""
 
     def __call__(self, q: ArrayLike, *, out: Array | None = None, threads: int = 1) -> Array: ...
 
@@ -39,10 +39,26 @@ class SpeedFunction(Protocol):
 
 
 class StateFunction(Protocol):
-    """``f(q, qd)``: each (n,) or (N, n)."""
+    """``f(q, qd)``: ``q`` (nq,) or (N, nq), ``qd`` (n,) or (N, n)."""
 
     def __call__(
         self, q: ArrayLike, qd: ArrayLike, *, out: Array | None = None, threads: int = 1
+    ) -> Array: ...
+
+
+class IntegrateFunction(Protocol):
+    """``f(q, qd, dt)``: ``q`` (nq,) or (N, nq), ``qd`` (n,) or (N, n), ``dt`` a number or (N,)."""
+
+    def __call__(
+        self, q: ArrayLike, qd: ArrayLike, dt: ArrayLike, *, out: Array | None = None, threads: int = 1
+    ) -> Array: ...
+
+
+class DifferenceFunction(Protocol):
+    """``f(q0, q1)``: each (nq,) or (N, nq)."""
+
+    def __call__(
+        self, q0: ArrayLike, q1: ArrayLike, *, out: Array | None = None, threads: int = 1
     ) -> Array: ...
 
 
@@ -95,6 +111,11 @@ class Arm:
     results. The first call of a method compiles it (a fraction of a second; cached on disk for later
     processes).
 
+    ``q`` has the shape ``(nq,)``, which differs from ``(n,)`` for robots with spherical or free joints: their
+    coordinates contain quaternions w x y z. Results depend only on the direction of a quaternion, and are NaN
+    for a quaternion of zeros. :meth:`neutral`, :meth:`integrate` and :meth:`difference` replace zeros, sums
+    and differences of coordinates.
+
     Units are SI: rad or m, N m or N. Frames: world, unless stated otherwise.
     """
 
@@ -115,8 +136,22 @@ class Arm:
 
     @property
     def n(self) -> int:
-        """Number of moving joints."""
+        """Number of degrees of freedom: the length of ``qd``, ``qdd`` and ``tau`` (``nv``)."""
         return self.robot.n
+
+    @property
+    def nq(self) -> int:
+        """Number of joint coordinates: the length of ``q``. It exceeds ``n`` by one for each ball joint."""
+        return self.robot.nq
+
+    @property
+    def nv(self) -> int:
+        """Number of joint speeds, ``n``."""
+        return self.robot.nv
+
+    def neutral(self) -> Array:
+        """The coordinates q (nq,) without joint motion: 0, and the quaternion 1 0 0 0 of a ball joint."""
+        return self.robot.neutral
 
     def nofriction(self, which: str = "coulomb") -> Arm:
         """The arm without ``"coulomb"``, ``"viscous"`` or ``"all"`` friction (toolbox: ``nofriction``)."""
@@ -162,6 +197,29 @@ class Arm:
     def manipulability(self) -> ConfigurationFunction:
         """``manipulability(q)`` → one number, Yoshikawa's sqrt(det(J J')): 0 at a singularity."""
         return self._entry("manipulability")
+
+    @cached_property
+    def integrate(self) -> IntegrateFunction:
+        """``integrate(q, qd, dt)`` → q (nq,) after ``dt`` s at constant speeds; quaternions have length 1.
+
+        A ball rotates about a fixed axis by the angle ``|w| dt``; all other coordinates are ``q + qd dt``.
+        """
+        return self._entry("integrate")
+
+    @cached_property
+    def difference(self) -> DifferenceFunction:
+        """``difference(q0, q1)`` → qd (n,) with ``integrate(q0, qd, 1) = q1``; balls rotate by at most π."""
+        return self._entry("difference")
+
+    @cached_property
+    def normalised(self) -> ConfigurationFunction:
+        """``normalised(q)`` → q (nq,) with quaternions of length 1."""
+        return self._entry("normalised")
+
+    @cached_property
+    def position_rates(self) -> StateFunction:
+        """``position_rates(q, qd)`` → dq/dt (nq,): ``qd`` itself, and the rates of quaternions."""
+        return self._entry("position_rates")
 
     # ---- dynamics ----------------------------------------------------------------------------------------
     @cached_property
@@ -275,7 +333,7 @@ class Arm:
         return kernel.entry_with_fallback(call, maker=(Arm, (self.robot,)))
 
     def __repr__(self) -> str:
-        return f"<Arm {self.name}: {self.n} joints {self.robot.joint_letters}>"
+        return f"<Arm {self.name}: {len(self.robot.joints)} joints {self.robot.joint_letters}>"
 
     def __str__(self) -> str:
         """The text for ``print``: the D-H table, or a table of links and joints."""

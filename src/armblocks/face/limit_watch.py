@@ -22,7 +22,7 @@ class LimitWatch:
     def __init__(self, diagram: Diagram, result: SimulationResult) -> None:
         self._arms = [(arm, *_limits(arm)) for arm in moving_arms(diagram, result)]
         self._is_revolute = [
-            np.array([unit == "rad" for unit in arm[0].robot.joint_units]) for arm in self._arms
+            np.array([entry.unit == "rad" for entry in arm[0].robot.positions]) for arm in self._arms
         ]
         _warn_of_angles(diagram)
 

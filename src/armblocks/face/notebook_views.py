@@ -18,4 +18,4 @@ def robot_view(robot: Robot) -> str:
     """The arm with all joints at zero, and its table."""
     from armblocks.rendering import arm_picture_svg
 
-    return robot_html(robot, arm_picture_svg(robot, [0.0] * robot.n))
+    return robot_html(robot, arm_picture_svg(robot, robot.neutral.tolist()))

@@ -28,7 +28,7 @@ def robot_html(robot: Robot, picture_svg: str) -> str:
     rows = "".join(_row("td", _cells(link)) for link in robot.links)
     return (
         f'<div class="ab-robot"><style>{STYLE}</style>{picture_svg}<div>'
-        f"<h3>{escape(robot.name)}</h3><p>{robot.n} joints {robot.joint_letters}"
+        f"<h3>{escape(robot.name)}</h3><p>{len(robot.joints)} joints {robot.joint_letters}"
         f"{' · ' + escape(about) if about else ''}</p>"
         f"<table>{_row('th', HEADINGS)}{rows}</table></div></div>"
     )
@@ -39,11 +39,14 @@ def _row(kind: str, cells: Sequence[str]) -> str:
 
 
 def _cells(link: Link) -> list[str]:
-    is_revolute = link.joint.unit == "rad"
-    scale, unit = (180 / np.pi, "°") if is_revolute else (1.0, " m")
-    limits = link.joint.limits
-    span = "" if limits.position is None else " … ".join(f"{end * scale:g}" for end in limits.position) + unit
-    speed = "" if limits.speed is None else f"{limits.speed * scale:g}{unit}/s"
+    spans: list[str] = []
+    speeds: list[str] = []
+    for coordinate, limits in zip(link.joint.speeds, link.joint.coordinate_limits):
+        scale, unit = (180 / np.pi, "°") if coordinate.unit == "rad" else (1.0, " m")
+        ends = () if limits.position is None else limits.position
+        spans.append(" … ".join(f"{end * scale:g}" for end in ends) + unit if ends else "")
+        speeds.append("" if limits.speed is None else f"{limits.speed * scale:g}{unit}/s")
+    span, speed = ("; ".join(filter(None, texts)) for texts in (spans, speeds))
     gear = "" if link.motor is None else f"{link.motor.gear_ratio:g}"
     return [link.name, link.joint.letter, *_dh_cells(link), span, speed, f"{link.mass:g}", gear]
 

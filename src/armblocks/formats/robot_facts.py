@@ -24,7 +24,7 @@ from typing import Any, cast
 
 from armblocks.formats.json_document import Node, closed_members, read_document
 from armblocks.formats.shipped import ROBOT_FILE, shipped_folder
-from armblocks.robot import JOINT_TYPES
+from armblocks.robot import JOINT_TYPES, Fixed
 
 MAX_BYTES = 16 * 2**20
 
@@ -99,7 +99,7 @@ def shipped_summary(name: str) -> RobotSummary:
     """A summary of a shipped robot, which is not built: lists show many robots."""
     path = shipped_folder("robots") / name / ROBOT_FILE
     document = cast("dict[str, Any]", json.loads(path.read_bytes()))
-    letters = {kind.__name__.lower(): kind.letter if kind().moves else "" for kind in JOINT_TYPES}
+    letters = {kind.__name__.lower(): "" if kind is Fixed else kind.letter for kind in JOINT_TYPES}
     kinds = (
         link["dh"].get("joint", "revolute") if "dh" in link else link.get("joint", {}).get("type", "revolute")
         for link in document["links"]

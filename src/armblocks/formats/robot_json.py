@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -31,7 +32,7 @@ from armblocks.robot import (
     JointLimits,
     Link,
     Motor,
-    Prismatic,
+    Revolute,
     Robot,
     link_from_dh,
 )
@@ -149,12 +150,12 @@ def _link_from_json(node: Node) -> Link:
     motor = _motor_from_json(members["motor"]) if "motor" in members else None
     if "dh" in members:
         dh = _dh_from_json(members["dh"])
-        limits = _limits_from_json(members["limits"], angular=not dh.sigma) if "limits" in members else None
+        joint = _with_limits(dh.joint(), members.get("limits"))
         return link_from_dh(
             name,
             dh,
             parent=parent,
-            limits=limits,
+            limits=joint.coordinate_limits[0],
             mass=mass,
             centre_of_mass=centre,
             inertia=inertia,
@@ -202,14 +203,43 @@ def _joint_from_json(node: Node | None, limits: Node | None) -> Joint:
     if node is None:
         kind, members = _JOINTS["revolute"], dict[str, Node]()
     else:
-        members = closed_members(node, ("type", "axis", "offset"), required=("type",))
-        kind = _JOINTS[members["type"].choice(_JOINTS)]
-    angular = kind.unit != Prismatic.unit
-    offset = members.get("offset")
-    return kind(
-        axis=_vector_from_json(members["axis"]) if "axis" in members else (0.0, 0.0, 1.0),
-        offset=0.0 if offset is None else _angle_from_json(offset) if angular else offset.number(),
-        limits=_limits_from_json(limits, angular=angular) if limits is not None else JointLimits(),
+        kind = _JOINTS[node.members()["type"].choice(_JOINTS)] if "type" in node.members() else Revolute
+        members = closed_members(node, ("type", *kind.parameters), required=("type",))
+    values: dict[str, object] = {}
+    for name in kind.parameters:
+        if name in members and name != "offset":
+            is_axis = name.endswith("axis")
+            values[name] = _vector_from_json(members[name]) if is_axis else members[name].number()
+    try:
+        joint = kind(**values)  # pyright: ignore[reportArgumentType] - parameters by name
+        if "offset" in members:
+            offset, angular = members["offset"], _is_angle(joint)
+            joint = replace(joint, offset=_angle_from_json(offset) if angular else offset.number())
+        return _with_limits(joint, limits)
+    except RobotError as error:
+        place = limits if node is None else node
+        assert place is not None
+        raise place.error(error.what, allowed=error.allowed, fix=error.fix) from error
+
+
+def _is_angle(joint: Joint) -> bool:
+    """Whether the offset of a joint is an angle."""
+    return not joint.moves or joint.speeds[0].unit == "rad"
+
+
+def _with_limits(joint: Joint, node: Node | None) -> Joint:
+    """The joint with the limits of a member: an object, or a list of them with one for each speed."""
+    if node is None:
+        return joint
+    if not isinstance(node.value, list):
+        return replace(joint, limits=_limits_from_json(node, angular=_is_angle(joint)))
+    entries = node.elements()
+    angular = [entry.unit == "rad" for entry in joint.speeds]
+    if len(entries) != len(angular):
+        raise node.error(f"{len(entries)} limits are given", allowed=f"{len(angular)}, one for each speed")
+    return replace(
+        joint,
+        limits=tuple(_limits_from_json(entry, angular=unit) for entry, unit in zip(entries, angular)),
     )
 
 
@@ -291,21 +321,16 @@ def _angle_from_json(node: Node, *, per_second: bool = False) -> float:
 
 
 def _link_to_json(link: Link) -> dict[str, object]:
-    angular = link.joint.unit != Prismatic.unit
     entry: dict[str, object] = {"name": link.name, "parent": link.parent, "mass": link.mass}
     if link.dh is not None:
         entry["dh"] = _dh_to_json(link.dh)
     else:
-        entry["joint"] = {
-            "type": type(link.joint).__name__.lower(),
-            "axis": link.joint.axis,
-            "offset": _angle_to_json(link.joint.offset) if angular else link.joint.offset,
-        }
+        entry["joint"] = _joint_to_json(link.joint)
         for key in ("before", "after"):
             if not getattr(link, key).is_identity:
                 entry[key] = _transform_to_json(getattr(link, key))
     if link.joint.limits != JointLimits():
-        entry["limits"] = _limits_to_json(link.joint.limits, angular=angular)
+        entry["limits"] = _all_limits_to_json(link.joint)
     if any(link.centre_of_mass):
         entry["centre_of_mass"] = link.centre_of_mass
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = link.inertia
@@ -352,6 +377,25 @@ def _dh_to_json(dh: DhRow) -> dict[str, object]:
         "theta": _angle_to_json(dh.theta),
         "offset": dh.offset if dh.sigma else _angle_to_json(dh.offset),
     }
+
+
+def _joint_to_json(joint: Joint) -> dict[str, object]:
+    entry: dict[str, object] = {"type": type(joint).__name__.lower()}
+    for name in joint.parameters:
+        is_angle = name == "offset" and _is_angle(joint)
+        entry[name] = _angle_to_json(joint.offset) if is_angle else getattr(joint, name)
+    return entry
+
+
+def _all_limits_to_json(joint: Joint) -> object:
+    """The limits as one object if they hold for all coordinates of the same unit, else a list."""
+    entries = [
+        _limits_to_json(limits, angular=coordinate.unit == "rad")
+        for coordinate, limits in zip(joint.speeds, joint.coordinate_limits)
+    ]
+    if not isinstance(joint.limits, tuple) and len({entry.unit for entry in joint.speeds}) <= 1:
+        return _limits_to_json(joint.limits, angular=_is_angle(joint))
+    return entries
 
 
 def _limits_to_json(limits: JointLimits, *, angular: bool) -> dict[str, object]:

@@ -57,13 +57,13 @@ def _robot_findings(robot: Robot, file: str, context: FileContext) -> Iterator[F
     if light and len(light) == robot.n:
         yield finding(NO_MASS, "", "no link that moves has a mass or an inertia: joint torques are zero")
     else:
-        for link in light:
+        for link in dict.fromkeys(light):
             what = "the joint moves no mass and no inertia: its acceleration is undefined"
             yield finding(NO_MASS, link, what)
 
 
 def _weightless_joints(robot: Robot) -> list[str]:
-    """The links whose joints move neither mass nor inertia."""
+    """The link of each degree of freedom that moves neither mass nor inertia."""
     bodies = KinematicTree.of(robot).bodies
     heavy = [
         bool(body.inertia.mass) or any(body.inertia.second) or body.reflected_inertia > 0 for body in bodies

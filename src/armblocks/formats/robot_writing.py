@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
 from armblocks.errors import ArmblocksWarning, FormatError
-from armblocks.robot import Fixed, Link, Prismatic, Revolute, Robot, with_tip
+from armblocks.robot import Joint, JointLimits, Link, Robot, with_tip
 from armblocks.robot.shapes import Shape
 from armblocks.spatial import Transform
 
@@ -24,15 +24,24 @@ class JointFriction(NamedTuple):
     friction: float = 0.0
 
 
-def check_joint(robot: Robot, link: Link, format: str) -> None:
-    """Raise ``FormatError`` for joints other than revolute, prismatic and fixed."""
-    if type(link.joint) not in (Revolute, Prismatic, Fixed):
+def check_joint(robot: Robot, link: Link, kinds: Collection[type[Joint]], format: str) -> None:
+    """Raise ``FormatError`` for a joint of a type that the format does not have; warn of left-out limits."""
+    if type(link.joint) not in kinds:
         raise FormatError(
             f"the joint of link '{link.name}' is a {type(link.joint).__name__}, which {format} does not have",
             where=f"robot '{robot.name}'",
-            allowed="revolute, prismatic and fixed joints",
+            allowed=", ".join(kind.__name__ for kind in kinds),
             fix="save the robot as .json",
         )
+    if link.joint.nv > 1 and link.joint.limits != JointLimits():
+        kind = type(link.joint).__name__.lower()
+        what = f"the limits of its {kind} joint are not part of the {format} file"
+        warn(f"robot '{robot.name}', link '{link.name}'", what)
+
+
+def limits_of(link: Link) -> JointLimits:
+    """The limits of the coordinate of a joint; of a joint with several coordinates, none."""
+    return link.joint.coordinate_limits[0] if link.joint.nv == 1 else JointLimits()
 
 
 def joint_friction(robot: Robot, link: Link, format: str) -> JointFriction:

@@ -153,11 +153,13 @@ def _joints(motion: Motion) -> Picture:
         ("speed", "/s", motion.qd, "speed"),
         ("acceleration", "/s2", motion.qdd, ""),
     ]
-    units = sorted(set(robot.joint_units), reverse=True)  # rad before m
+    units = sorted({entry.unit for entry in robot.speeds}, reverse=True)  # rad before m
     for quantity, suffix, values, limit in quantities:
         for unit in units:
             name = {"rad": "angle", "m": "position"}[unit] if quantity == "position" else quantity
-            panels.append(_joint_panel(motion, f"Joint {name}", unit, unit + suffix, values, limit))
+            panel = _joint_panel(motion, f"Joint {name}", unit, unit + suffix, values, limit)
+            if panel.traces:
+                panels.append(panel)
     if motion.tau is not None:
         for unit in units:
             torque, shown = ("Joint torque", "N m") if unit == "rad" else ("Joint force", "N")
@@ -175,12 +177,18 @@ def _joint_panel(
     motion: Motion, quantity: str, joint_unit: str, unit: str, values: _Array, limit: str
 ) -> Panel:
     robot = motion.robot
-    joints = [j for j, entry_unit in enumerate(robot.joint_units) if entry_unit == joint_unit]
-    shown, shown_unit = in_display_unit(values[:, joints], unit)
-    factor = _factor(unit, shown_unit, values[:, joints])
+    joints = [j for j, entry in enumerate(robot.speeds) if entry.unit == joint_unit]
+    columns = joints
+    if limit == "position":
+        indices = [(j, robot.position_of_speed[j]) for j in joints]
+        joints = [j for j, index in indices if index is not None]
+        columns = [index for _, index in indices if index is not None]
+    values = values[:, columns]
+    shown, shown_unit = in_display_unit(values, unit)
+    factor = _factor(unit, shown_unit, values)
     traces: list[Trace] = []
     for column, j in enumerate(joints):
-        limits = robot.joints[j].limits
+        limits = robot.limits[j]
         bounds: tuple[float, float] | None = None
         if limit == "position":
             bounds = limits.position
@@ -189,7 +197,7 @@ def _joint_panel(
         elif limit == "torque" and limits.torque is not None:
             bounds = (-limits.torque, limits.torque)
         scaled = None if bounds is None else (bounds[0] * factor, bounds[1] * factor)
-        traces.append(Trace(label=robot.joint_names[j], values=shown[:, column], index=j, limits=scaled))
+        traces.append(Trace(label=robot.speeds[j].name, values=shown[:, column], index=j, limits=scaled))
     return Panel(quantity=quantity, unit=shown_unit, traces=tuple(traces))
 
 

@@ -21,7 +21,7 @@ _Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Motion:
-    """One arm's motion: ``q``, ``qd``, ``qdd``, ``tau`` (N, n), ``poses`` (N, L+2, 4, 4) in the world.
+    """One arm's motion: ``q`` (N, nq), ``qd``, ``qdd``, ``tau`` (N, n), world ``poses`` (N, L+2, 4, 4).
 
     ``notes`` list the quantities that are not in the diagram and come from differences between samples.
     """
@@ -77,7 +77,7 @@ def moving_arms(diagram: Diagram, result: SimulationResult) -> tuple[MovingArm, 
     for name, block in diagram.blocks.items():
         robot = robot_of(block)
         path = _path(result, name, "q")
-        if robot is not None and path is not None and result[path].shape[1:] == (robot.n,):
+        if robot is not None and path is not None and result[path].shape[1:] == (robot.nq,):
             groups.setdefault((robot, path), []).append(name)
     arms: list[MovingArm] = []
     robots_with_views = {
@@ -110,7 +110,7 @@ def _sources_first(diagram: Diagram, names: list[str]) -> list[str]:
 
 
 def _moving_arm(robot: Robot, path: str, names: list[str], result: SimulationResult) -> MovingArm:
-    owner, shape = path.rpartition("/")[0], result[path].shape
+    owner, shape = path.rpartition("/")[0], (len(result.time), robot.n)
 
     def signal_of(port: str) -> str | None:
         # The source of q (a trajectory, an integrator) precedes the blocks that q is connected to.
@@ -144,6 +144,8 @@ def _motion(arm: MovingArm, result: SimulationResult) -> Motion:
         return np.gradient(values, time, axis=0) if len(time) > 1 else np.zeros_like(values)
 
     qd = rate(arm.qd, q, "qd")
+    if arm.qd is None:
+        qd = _speeds(arm.robot, q, qd)
     qdd = rate(arm.qdd, qd, "qdd")
     poses = (
         np.stack([link_frames(arm.robot, [float(v) for v in row]) for row in q])
@@ -161,3 +163,24 @@ def _motion(arm: MovingArm, result: SimulationResult) -> Motion:
         poses=poses,
         notes=tuple(notes),
     )
+
+
+def _speeds(robot: Robot, q: _Array, rates: _Array) -> _Array:
+    """The speeds (N, n) of coordinates ``q`` with the ``rates`` dq/dt, both (N, nq).
+
+    The angular velocity of a ball joint is the vector part of ``2 conj(Q) dQ/dt / Q²`` for its quaternion Q.
+    """
+    columns: list[_Array] = []
+    position = 0
+    for joint in robot.joints:
+        for motion in joint.motions:
+            count = len(motion.positions)
+            Q, Qd = q[:, position : position + count], rates[:, position : position + count]
+            position += count
+            if motion.speeds == motion.positions:
+                columns.append(Qd)
+            else:
+                w, v = Q[:, :1], Q[:, 1:]
+                vector = w * Qd[:, 1:] - Qd[:, :1] * v - np.cross(v, Qd[:, 1:])
+                columns.append(2.0 * vector / (Q * Q).sum(axis=1, keepdims=True))
+    return np.concatenate(columns, axis=1)

@@ -61,8 +61,8 @@ class JointSummary:
 
     name: str
     unit: str
-    position_min: float
-    position_max: float
+    position_min: float | None
+    position_max: float | None
     position_limits: tuple[float, float] | None
     position_margin: float | None
     speed_peak: float
@@ -105,13 +105,13 @@ class MotionSummary:
 def summarise(
     robot: Robot, time: _Array, q: _Array, qd: _Array, qdd: _Array, tau: _Array | None, tool: _Array
 ) -> MotionSummary:
-    """The summary of a motion: ``time`` (N,) s, ``q``, ``qd``, ``qdd``, ``tau`` (N, n), ``tool`` (N, 3) m."""
+    """The summary of a motion: ``time`` (N,) s, ``q`` (N, nq), the others (N, n), ``tool`` (N, 3) m."""
     power = None if tau is None else tau * qd
     joints: list[JointSummary] = []
-    for j, (name, joint, motor) in enumerate(zip(robot.joint_names, robot.joints, robot.motors)):
-        limits = joint.limits
+    for j, (entry, limits, motor) in enumerate(zip(robot.speeds, robot.limits, robot.motors)):
         k = int(np.argmax(np.abs(qd[:, j])))
-        low, high = float(q[:, j].min()), float(q[:, j].max())
+        index = robot.position_of_speed[j]
+        span = None if index is None else (float(q[:, index].min()), float(q[:, index].max()))
         ends = limits.position
         torque = None if tau is None else tau[:, j]
         peak = None if torque is None else float(np.abs(torque).max())
@@ -121,12 +121,14 @@ def summarise(
         speed_peak = float(abs(qd[k, j]))
         joints.append(
             JointSummary(
-                name=name,
-                unit=joint.unit,
-                position_min=low,
-                position_max=high,
+                name=entry.name,
+                unit=entry.unit,
+                position_min=None if span is None else span[0],
+                position_max=None if span is None else span[1],
                 position_limits=ends,
-                position_margin=None if ends is None else min(low - ends[0], ends[1] - high),
+                position_margin=None
+                if ends is None or span is None
+                else min(span[0] - ends[0], ends[1] - span[1]),
                 speed_peak=speed_peak,
                 speed_peak_time=float(time[k]),
                 speed_limit=limits.speed,
@@ -199,17 +201,17 @@ def limit_findings(
 ) -> tuple[LimitFinding, ...]:
     """Every limit that a motion exceeds, in the order of joints; arrays as in :func:`summarise`."""
     findings: list[LimitFinding] = []
-    for j, (name, joint) in enumerate(zip(robot.joint_names, robot.joints)):
-        limits = joint.limits
-        if limits.position is not None:
+    for j, ((name, unit), limits) in enumerate(zip(robot.speeds, robot.limits)):
+        index = robot.position_of_speed[j]
+        if limits.position is not None and index is not None:
             low, high = limits.position
-            findings += _exceeded(name, LimitKind.POSITION, joint.unit, time, q[:, j], low, high)
+            findings += _exceeded(name, LimitKind.POSITION, unit, time, q[:, index], low, high)
         for kind, values, limit in (
             (LimitKind.SPEED, qd, limits.speed),
             (LimitKind.TORQUE, tau, limits.torque),
         ):
             if values is not None and limit is not None:
-                findings += _exceeded(name, kind, joint.unit, time, values[:, j], -limit, limit)
+                findings += _exceeded(name, kind, unit, time, values[:, j], -limit, limit)
     return tuple(findings)
 
 

@@ -39,7 +39,7 @@ def limits_table(summary: MotionSummary) -> str:
             allowed = _span(joint.position_limits[0] * factor, joint.position_limits[1] * factor)
         share = None if joint.speed_share is None else 100 * joint.speed_share
         cells = [
-            _cell(_span(joint.position_min * factor, joint.position_max * factor) + unit_html),
+            _cell(_range(joint.position_min, joint.position_max, factor) + unit_html),
             _cell(allowed),
             _limit_cell(joint.position_margin, factor, exceeded.get((joint.name, LimitKind.POSITION))),
             _limit_cell(joint.speed_peak, factor, exceeded.get((joint.name, LimitKind.SPEED))),
@@ -55,7 +55,7 @@ def limits_table(summary: MotionSummary) -> str:
 def loads_table(motion: Motion, summary: MotionSummary) -> str:
     """Each joint's torque (N m, or force in N), also at its motor, power (W) and work (J)."""
     exceeded = {(finding.joint, finding.kind): finding for finding in summary.findings}
-    torque = "N m" if set(motion.robot.joint_units) == {"rad"} else "N m or N"
+    torque = "N m" if {entry.unit for entry in motion.robot.speeds} == {"rad"} else "N m or N"
     heads = [
         ("Joint", ""), ("Peak torque", torque), ("RMS torque", torque), ("Motor peak", "N m"),
         ("Motor RMS", "N m"), ("Motor speed", "rev/min"), ("Peak power", "W"), ("Work done", "J"),
@@ -151,6 +151,11 @@ def _limit_cell(value: float | None, factor: float, finding: LimitFinding | None
 
 def _optional(value: float | None, factor: float = 1.0) -> str:
     return "" if value is None else table_number(value * factor)
+
+
+def _range(low: float | None, high: float | None, factor: float) -> str:
+    """The range of a coordinate; empty for the speeds of ball joints, which have none."""
+    return "" if low is None or high is None else _span(low * factor, high * factor)
 
 
 def _span(low: float, high: float) -> str:

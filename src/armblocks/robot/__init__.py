@@ -2,7 +2,20 @@
 
 from armblocks.robot.dh import DhConvention, DhRow, link_from_dh, modified_dh, serial_chain, standard_dh
 from armblocks.robot.friction_model import FrictionModel
-from armblocks.robot.joints import JOINT_TYPES, Fixed, Joint, JointLimits, Prismatic, Revolute
+from armblocks.robot.joints import (
+    JOINT_TYPES,
+    Cylindrical,
+    Fixed,
+    Free,
+    Joint,
+    JointLimits,
+    Planar,
+    Prismatic,
+    Revolute,
+    Screw,
+    Spherical,
+    Universal,
+)
 from armblocks.robot.link import Link, Motor, inertia_matrix
 from armblocks.robot.physicality import InertiaFinding, inertia_findings, warn_of_inertias
 from armblocks.robot.plausibility import (
@@ -15,19 +28,25 @@ from armblocks.robot.tips import deepest_tip, with_tip
 
 __all__ = [
     "JOINT_TYPES",
+    "Cylindrical",
     "DhConvention",
     "DhRow",
     "Fixed",
+    "Free",
     "FrictionModel",
     "InertiaFinding",
     "Joint",
     "JointLimits",
     "Link",
     "Motor",
+    "Planar",
     "PlausibilityFinding",
     "Prismatic",
     "Revolute",
     "Robot",
+    "Screw",
+    "Spherical",
+    "Universal",
     "deepest_tip",
     "inertia_findings",
     "inertia_matrix",

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from armblocks.errors import ArmblocksWarning, RobotError
 from armblocks.robot.fields import check_kind
-from armblocks.robot.joints import Joint
+from armblocks.robot.joints import AxisMotion, Joint, JointLimits
 from armblocks.robot.link import Link, Motor
 from armblocks.spatial import Transform, Vector3
 
@@ -89,18 +89,22 @@ def _check_tree(robot: str, links: Sequence[Link]) -> None:
 
 
 def _check_joint(where: str, joint: Joint) -> None:
-    if joint.moves and not any(joint.axis):
+    if not all(any(motion.axis) for motion in joint.motions if isinstance(motion, AxisMotion)):
         raise RobotError(
             "the joint's axis is zero",
             where=where,
             allowed="a direction such as (0, 0, 1)",
             fix="set the axis of the motion",
         )
-    limits = joint.limits
+    for coordinate, limits in zip(joint.speeds, joint.coordinate_limits):
+        _check_limits(where, coordinate.unit, limits)
+
+
+def _check_limits(where: str, unit: str, limits: JointLimits) -> None:
     if limits.position is not None and limits.position[0] > limits.position[1]:
         low, high = limits.position
         raise RobotError(
-            f"the position limits are reversed: from {low:g} to {high:g} {joint.unit}",
+            f"the position limits are reversed: from {low:g} to {high:g} {unit}",
             where=where,
             allowed="the lower limit first",
             fix="exchange the two limits",
@@ -181,12 +185,15 @@ def _link_numbers(link: Link) -> Iterator[tuple[str, float]]:
     yield from (("inertia", number) for row in link.inertia for number in row)
     yield from (("joint axis", number) for number in link.joint.axis)
     yield "joint offset", link.joint.offset
-    limits = link.joint.limits
-    if limits.position is not None:
-        yield from (("position limit", number) for number in limits.position)
-    for name, value in (("speed limit", limits.speed), ("torque limit", limits.torque)):
-        if value is not None:
-            yield name, value
+    for motion in link.joint.motions:
+        if isinstance(motion, AxisMotion):
+            yield from (("joint axis", number) for number in (*motion.axis, motion.angular, motion.linear))
+    for limits in link.joint.coordinate_limits:
+        if limits.position is not None:
+            yield from (("position limit", number) for number in limits.position)
+        for name, value in (("speed limit", limits.speed), ("torque limit", limits.torque)):
+            if value is not None:
+                yield name, value
     if link.motor is not None:
         yield "motor inertia", link.motor.inertia
         yield "gear ratio", link.motor.gear_ratio

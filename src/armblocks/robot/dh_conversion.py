@@ -97,7 +97,7 @@ def _with_row(link: Link, row: DhRow, T_new_old: Transform) -> Link:
         link.name,
         row,
         parent=link.parent,
-        limits=link.joint.limits,
+        limits=link.joint.coordinate_limits[0],
         mass=link.mass,
         centre_of_mass=T_new_old.apply(link.centre_of_mass),
         inertia=(inertia + inertia.T) / 2,

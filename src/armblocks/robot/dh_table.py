@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from armblocks.robot.joints import Joint
 from armblocks.robot.link import Link
 from armblocks.robot.robot import Robot
 
@@ -37,6 +38,13 @@ def _cells(link: Link) -> Sequence[str]:
     return [theta, d, f"{row.a:.4g}", f"{row.alpha:.4g}", f"{row.offset:.4g}"]
 
 
+def axis_text(joint: Joint) -> str:
+    """The axis of a joint; empty for joints without one."""
+    if not joint.moves or "axis" not in joint.parameters:
+        return ""
+    return " ".join(f"{part:.3g}" for part in joint.axis)
+
+
 def kinematics_text(robot: Robot) -> str:
     """The D-H table; without D-H rows a line for each link with its parent, joint, axis and position."""
     table = dh_table(robot)
@@ -44,8 +52,8 @@ def kinematics_text(robot: Robot) -> str:
         return "\n".join([*table, "theta and alpha in rad, d and a in m"])
     rows = [("link", "parent", "joint", "axis", "at q = 0: x, y, z m")]
     for link in robot.links:
-        x, y, z = link.pose(0.0).translation
-        axis = " ".join(f"{part:.3g}" for part in link.joint.axis) if link.joint.moves else ""
+        x, y, z = link.pose().translation
+        axis = axis_text(link.joint)
         kind = type(link.joint).__name__.lower()
         rows.append((link.name, link.parent or "(base)", kind, axis, f"{x:.5g}, {y:.5g}, {z:.5g}"))
     widths = [max(map(len, column)) for column in zip(*rows)]

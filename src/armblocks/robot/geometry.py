@@ -63,7 +63,7 @@ def robot_shapes(robot: Robot) -> tuple[tuple[Shape, ...], ...]:
     row_of = {link.name: row for row, link in enumerate(robot.links, start=1)}
     for link in robot.links:
         carrier = row_of[link.parent] if link.parent is not None else 0
-        if link.joint.linear and link.geometry is None:
+        if link.joint.translations == 1 and link.geometry is None:
             rows[carrier].append(_rail(link, plan))
     return tuple(tuple(shapes) for shapes in rows)
 
@@ -79,8 +79,7 @@ def reach(robot: Robot) -> float:
     length: dict[str, float] = {}
     for link in _parents_first(robot):
         link_length = math.hypot(*link.before.translation) + math.hypot(*link.after.translation)
-        if link.joint.linear and link.joint.limits.position:
-            link_length += max(abs(value + link.joint.offset) for value in link.joint.limits.position)
+        link_length += max(map(abs, link.joint.travel or (0.0,)))
         length[link.name] = link_length + (length[link.parent] if link.parent is not None else 0.0)
     return max(0.1, *length.values()) + math.hypot(*robot.tool.translation)
 
@@ -99,15 +98,19 @@ def _parents_first(robot: Robot) -> tuple[Link, ...]:
 
 
 def link_frames(robot: Robot, q: Sequence[float]) -> NDArray[np.float64]:
-    """Poses of base, every link and tool in the world at joint coordinates ``q``, (L+2, 4, 4), rad and m.
+    """Poses of base, every link and tool in the world, (L+2, 4, 4), at coordinates ``q`` (nq,), rad and m.
 
     They are the rows of ``dynamics.trace_link_poses``, computed without compilation, for drawings.
     ``q`` is not checked.
     """
     frames: dict[str | None, Transform] = {None: robot.base}
-    coordinates = {link.name: float(value) for link, value in zip(robot.moving_links, q)}
+    coordinates: dict[str, Sequence[float]] = {}
+    first = 0
+    for link in robot.moving_links:
+        coordinates[link.name] = q[first : first + link.joint.nq]
+        first += link.joint.nq
     for link in _parents_first(robot):
-        frames[link.name] = frames[link.parent] @ link.pose(coordinates.get(link.name, 0.0))
+        frames[link.name] = frames[link.parent] @ link.pose(coordinates.get(link.name))
     tip = frames[robot.links[-1].name] @ robot.tool
     rows = [robot.base, *(frames[link.name] for link in robot.links), tip]
     return np.stack([row.matrix for row in rows])
@@ -139,7 +142,12 @@ class _Plan:
     def is_column(self, link: Link) -> bool:
         """Whether the link is a column on the base: a vertical joint and a body that begins upwards."""
         upright = link.before.R @ np.array(link.joint.axis)
-        if link.parent is not None or not link.joint.angular or upright[2] < 0.99:
+        if (
+            link.parent is not None
+            or not link.joint.rotates
+            or link.joint.translations > 1
+            or upright[2] < 0.99
+        ):
             return False
         T = link.after.inverse().matrix
         axis = T[:3, :3] @ np.array(link.joint.axis)
@@ -155,7 +163,7 @@ class _Plan:
     def shares_centre(self, link: Link) -> bool:
         """Whether the link's joint and its parent's joint have the same centre and different axes."""
         parent = self.links.get(link.parent) if link.parent is not None else None
-        if parent is None or not (parent.joint.angular and link.joint.angular):
+        if parent is None or not (parent.joint.rotates and link.joint.rotates):
             return False
         T = parent.after.inverse()
         distance = np.array(link.before.translation) - T.p
@@ -203,11 +211,13 @@ def _link_shapes(robot: Robot, link: Link, plan: _Plan) -> list[Shape]:
     if plan.is_column(link):
         # The column rises from the base plate: the drum is a ring in the column, above the floor.
         shapes += _drum(start + 1.35 * r * axis, axis, r, length=1.5 * r)
-    elif link.joint.angular:
+    elif link.joint.translations > 1:
+        pass  # a floating body has no joint to draw
+    elif link.joint.rotates:
         # If two joints share their centre (shoulder, wrist), the inner drum passes through the outer collar.
         inside = plan.shares_centre(link)
         shapes += _drum(start, axis, r, length=2.15 * plan.radius[link.parent or ""] if inside else 2.0 * r)
-    elif link.joint.linear:
+    elif link.joint.translations:
         side = 1.7 * r
         shapes.append(Box(size=(side, side, 1.3 * side), pose=_aligned(start, axis)))
     children = plan.children.get(link.name, [])
@@ -316,6 +326,8 @@ def _base_shapes(robot: Robot, plan: _Plan) -> list[Shape]:
     """A foot under each joint on the base, and a beam to joints beside the base frame."""
     shapes: list[Shape] = []
     for link in plan.children.get(None, []):
+        if link.joint.translations > 1:
+            continue
         r = plan.radius[link.name]
         foot = np.array(link.before.translation)
         axis = link.before.R @ np.array(link.joint.axis)
@@ -347,9 +359,9 @@ def _base_shapes(robot: Robot, plan: _Plan) -> list[Shape]:
 def _rail(link: Link, plan: _Plan) -> Shape:
     """The rail of a prismatic joint over its whole range, in the frame of the body that carries the joint."""
     r = plan.radius[link.name]
-    low, high = link.joint.limits.position or (0.0, 0.3 * plan.reach)
+    low, high = link.joint.travel or (link.joint.offset, 0.3 * plan.reach + link.joint.offset)
     # The rail includes the joint itself for every range, so that the rail is connected to the body.
-    low, high = min(low + link.joint.offset, 0.0) - 1.2 * r, high + link.joint.offset + 1.2 * r
+    low, high = min(low, 0.0) - 1.2 * r, high + 1.2 * r
     axis = link.before.R @ np.array(link.joint.axis)
     centre = np.array(link.before.translation) + axis * (low + high) / 2
     return Box(size=(0.9 * r, 0.9 * r, high - low), material=Material.JOINT, pose=_aligned(centre, axis))

@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armblocks.errors import RobotError, check_arguments
+from armblocks.errors import InputError, RobotError, check_arguments
 from armblocks.robot.dh_row import DhRow
 from armblocks.robot.fields import check_kind, number, numbers, pose
 from armblocks.robot.joints import Joint, Revolute
@@ -61,14 +61,15 @@ class Link:
     """A rigid body, and the joint that connects it to ``parent``.
 
     ``parent`` is the name of a link; ``None`` is the robot's base. Pose in the parent's frame:
-    ``T_parent_link = before joint.motion(q + offset) after``. ``dh`` is the Denavit-Hartenberg row from which
+    ``T_parent_link = before joint.motion(q) after``. ``dh`` is the Denavit-Hartenberg row from which
     ``before``, ``joint`` and ``after`` were computed, if there is one, and must agree with them
     (:func:`armblocks.robot.dh.standard_dh` builds all four).
 
     ``mass`` kg; ``centre_of_mass`` m in the link's frame; ``inertia`` kg m2 about the centre of mass in the
     link's axes: a (3, 3) array, or Ixx Iyy Izz, or Ixx Iyy Izz Ixy Iyz Ixz. These are the matrix entries, so
-    Ixy is minus the integral of x y dm. ``motor`` drives the link's joint. ``geometry`` are the shapes of the
-    drawing; ``None``: they are derived from the kinematics.
+    Ixy is minus the integral of x y dm. ``motor`` drives the link's joint; each speed of a joint with several
+    has such a motor. ``geometry`` are the shapes of the drawing; ``None``: they are derived from the
+    kinematics.
 
     Raises RobotError for wrong shapes. :class:`armblocks.robot.Robot` checks the values, because its messages
     name the robot and the link.
@@ -116,9 +117,22 @@ class Link:
         """The centre of mass in the link's frame, a new (3,) array, m."""
         return np.array(self.centre_of_mass)
 
-    def pose(self, q: float = 0.0) -> Transform:
-        """``T_parent_link`` at the joint coordinate ``q`` (rad or m; ignored for a fixed joint)."""
-        return self.before @ self.joint.motion(q + self.joint.offset) @ self.after
+    def pose(self, q: ArrayLike | None = None) -> Transform:
+        """``T_parent_link`` at the joint coordinates ``q`` (nq,), rad or m; a number for one coordinate.
+
+        Without ``q`` it is the pose at ``joint.neutral``. Raises InputError for a wrong number of values.
+        """
+        if q is None:
+            return self.before @ self.joint.motion(self.joint.neutral) @ self.after
+        values = numbers(q, where=f"q of link '{self.name}'").ravel().tolist()
+        if len(values) != self.joint.nq:
+            raise InputError(
+                f"{len(values)} coordinates are given",
+                where=f"link '{self.name}'",
+                allowed=f"{self.joint.nq} for a {type(self.joint).__name__} joint",
+                fix="give one number for each coordinate of the joint",
+            )
+        return self.before @ self.joint.motion(values) @ self.after
 
 
 def inertia_matrix(value: ArrayLike, *, link: str = "") -> Matrix3:

@@ -71,14 +71,16 @@ def warn_of_implausible_values(robot: Robot) -> None:
 
 def _findings(robot: Robot) -> Iterator[PlausibilityFinding]:
     for link in robot.links:
-        low, high = link.joint.limits.position or (0.0, 0.0)
-        if link.joint.angular and not link.joint.linear and max(abs(low), abs(high)) > FULL_TURN:
-            yield PlausibilityFinding(
-                robot=robot.name,
-                link=link.name,
-                what=f"the joint turns from {low:g} to {high:g} rad, more than a full turn",
-                question="Is this in degrees? It is used as given.",
-            )
+        for coordinate, limits in zip(link.joint.speeds, link.joint.coordinate_limits):
+            low, high = limits.position or (0.0, 0.0)
+            is_screw = link.joint.nv == 1 and link.joint.translations == 1
+            if coordinate.unit == "rad" and not is_screw and max(abs(low), abs(high)) > FULL_TURN:
+                yield PlausibilityFinding(
+                    robot=robot.name,
+                    link=link.name,
+                    what=f"the joint turns from {low:g} to {high:g} rad, more than a full turn",
+                    question="Is this in degrees? It is used as given.",
+                )
     reach = max(_reaches(robot).values())
     if reach > MAX_REACH:
         yield PlausibilityFinding(
@@ -121,5 +123,5 @@ def _reaches(robot: Robot) -> dict[str | None, float]:
 
 
 def _length(link: Link) -> float:
-    travel = max(map(abs, link.joint.limits.position or (0.0,))) if link.joint.linear else 0.0
-    return math.hypot(*link.before.translation) + math.hypot(*link.after.translation) + travel
+    lengths = (math.hypot(*link.before.translation), math.hypot(*link.after.translation))
+    return sum(lengths) + max(map(abs, link.joint.travel or (0.0,)))

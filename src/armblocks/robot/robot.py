@@ -14,7 +14,7 @@ from armblocks.lazy_exports import display_method
 from armblocks.robot.checks import check_robot
 from armblocks.robot.fields import pose
 from armblocks.robot.friction_model import FrictionModel
-from armblocks.robot.joints import Joint
+from armblocks.robot.joints import Coordinate, Joint, JointLimits
 from armblocks.robot.link import Link, Motor
 from armblocks.spatial import Transform, Vector3, vector3
 
@@ -28,7 +28,8 @@ class Robot:
     ``base`` pose of the base frame in the world; ``tool`` pose of the tool in the frame of the tip, which is
     the last link; both accept a (4, 4) matrix. ``gravity`` m/s2 in the world frame, the acceleration
     of a falling body (toolbox files have the opposite sign); ``friction_model`` see :class:`FrictionModel`.
-    The joint coordinates q are in the order of the moving links. A joint has the name of its link.
+    The joint coordinates q (nq,) and speeds qd (nv,) are in the order of the moving links. A joint has the
+    name of its link.
 
     Robots are values: two robots are equal and have the same hash if all their numbers and names are equal.
     ``source`` (the origin of the numbers) is not compared.
@@ -76,8 +77,18 @@ class Robot:
 
     @property
     def n(self) -> int:
-        """Number of joint coordinates."""
-        return len(self.moving_links)
+        """Number of degrees of freedom: ``nv``, the length of qd, qdd and tau."""
+        return self.nv
+
+    @cached_property
+    def nq(self) -> int:
+        """Number of joint coordinates: the length of q. A quaternion has four for three speeds."""
+        return sum(joint.nq for joint in self.joints)
+
+    @cached_property
+    def nv(self) -> int:
+        """Number of joint speeds: the length of qd, qdd and tau."""
+        return sum(joint.nv for joint in self.joints)
 
     @property
     def joints(self) -> tuple[Joint, ...]:
@@ -85,44 +96,81 @@ class Robot:
         return tuple(link.joint for link in self.moving_links)
 
     @property
-    def motors(self) -> tuple[Motor | None, ...]:
-        """The motors of the joints that move, in the order of q."""
-        return tuple(link.motor for link in self.moving_links)
-
-    @property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints, in the order of q: those of the links that they carry."""
         return tuple(link.name for link in self.moving_links)
 
     @property
-    def joint_units(self) -> tuple[str, ...]:
-        """SI unit of each joint coordinate: rad or m."""
-        return tuple(joint.unit for joint in self.joints)
-
-    @property
     def joint_letters(self) -> str:
-        """The letters R (revolute) and P (prismatic) in the order of q, as in ``RRRRRR``."""
+        """The letters of the joint types in the order of q, as in ``RRRRRR``."""
         return "".join(joint.letter for joint in self.joints)
 
     @property
+    def positions(self) -> tuple[Coordinate, ...]:
+        """The entries of q: ``arm`` for the only coordinate of joint arm, ``ball.qw`` for one of several."""
+        return tuple(_of_link(link, entry) for link in self.moving_links for entry in link.joint.positions)
+
+    @property
+    def speeds(self) -> tuple[Coordinate, ...]:
+        """The entries of qd, qdd and tau with the names of their joints; the unit is that of the integral."""
+        return tuple(_of_link(link, entry) for link in self.moving_links for entry in link.joint.speeds)
+
+    @property
+    def position_of_speed(self) -> tuple[int | None, ...]:
+        """For each entry of qd the index in q of the coordinate whose rate it is; None for ball joints."""
+        indices: list[int | None] = []
+        position = 0
+        for joint in self.joints:
+            for motion in joint.motions:
+                is_rate = motion.speeds == motion.positions
+                indices += [position + k if is_rate else None for k in range(len(motion.speeds))]
+                position += len(motion.positions)
+        return tuple(indices)
+
+    @property
+    def limits(self) -> tuple[JointLimits, ...]:
+        """The limits of each entry of qd."""
+        return tuple(limits for joint in self.joints for limits in joint.coordinate_limits)
+
+    @property
+    def motors(self) -> tuple[Motor | None, ...]:
+        """The motor of each entry of qd."""
+        return tuple(link.motor for link in self.moving_links for _ in link.joint.speeds)
+
+    @property
+    def neutral(self) -> NDArray[np.float64]:
+        """The coordinates without joint motion, a new (nq,) array: 0, and 1 0 0 0 for quaternions.
+
+        Offsets are added to them, as to all coordinates.
+        """
+        return np.array([value for joint in self.joints for value in joint.neutral])
+
+    @property
     def qlim(self) -> NDArray[np.float64]:
-        """Lowest and highest joint coordinates, a new (n, 2) array, rad or m; infinite without a limit."""
-        unlimited = (-np.inf, np.inf)
-        return np.array([joint.limits.position or unlimited for joint in self.joints]).reshape(-1, 2)
+        """Lowest and highest coordinates, a new (nq, 2) array, rad or m; infinite without a limit."""
+        rows: list[tuple[float, float]] = []
+        for joint in self.joints:
+            limits = iter(joint.coordinate_limits)
+            for motion in joint.motions:
+                positions = [next(limits).position for _ in motion.speeds]
+                # A quaternion has more coordinates than speeds, and no limits.
+                positions += [None] * (len(motion.positions) - len(positions))
+                rows += [(-np.inf, np.inf) if entry is None else entry for entry in positions]
+        return np.array(rows).reshape(-1, 2)
 
     @property
     def speed_limits(self) -> NDArray[np.float64]:
-        """Maximum joint speeds, a new (n,) array, rad/s or m/s; infinite without a limit."""
-        return _or_infinite([joint.limits.speed for joint in self.joints])
+        """Maximum joint speeds, a new (nv,) array, rad/s or m/s; infinite without a limit."""
+        return _or_infinite([limits.speed for limits in self.limits])
 
     @property
     def torque_limits(self) -> NDArray[np.float64]:
-        """Maximum joint torques, a new (n,) array, N m or N; infinite without a limit."""
-        return _or_infinite([joint.limits.torque for joint in self.joints])
+        """Maximum joint torques, a new (nv,) array, N m or N; infinite without a limit."""
+        return _or_infinite([limits.torque for limits in self.limits])
 
     @property
     def gear_ratios(self) -> NDArray[np.float64]:
-        """G of each joint, a new (n,) array; 1 without a motor."""
+        """G of each entry of qd, a new (nv,) array; 1 without a motor."""
         return np.array([motor.gear_ratio if motor else 1.0 for motor in self.motors])
 
     def link(self, name: str) -> Link:
@@ -158,6 +206,11 @@ class Robot:
                 for link in self.links
             ),
         )
+
+
+def _of_link(link: Link, coordinate: Coordinate) -> Coordinate:
+    name = f"{link.name}.{coordinate.name}" if coordinate.name else link.name
+    return coordinate._replace(name=name)
 
 
 def _or_infinite(values: list[float | None]) -> NDArray[np.float64]:

@@ -19,13 +19,13 @@ def with_tip(robot: Robot, tip: str) -> Robot:
 
 
 def deepest_tip(links: Sequence[Link]) -> str:
-    """The link without children that has the most moving joints between the base and itself.
+    """The link without children that has the most degrees of freedom between the base and itself.
 
     Of several such links it is the last one. ``links``: parents before their children.
     """
     joints: dict[str | None, int] = {None: 0}
     for link in links:
-        joints[link.name] = joints[link.parent] + (1 if link.joint.moves else 0)
+        joints[link.name] = joints[link.parent] + link.joint.nv
     parents = {link.parent for link in links}
     ends = [link.name for link in links if link.name not in parents]
     return max(reversed(ends), key=lambda name: joints[name])

@@ -1,12 +1,16 @@
-"""The robot in a form for algorithms: only moving bodies, parents before children, every joint axis is z."""
+"""The robot in a form for algorithms: bodies with one degree of freedom each, every joint axis is z.
+
+A joint with several degrees of freedom becomes a series of bodies, of which only the last one has mass.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from armblocks.robot.joints import AxisMotion
 from armblocks.robot.link import Link, Motor
 from armblocks.robot.robot import Robot
 from armblocks.rounded_functions import hypot
@@ -19,21 +23,35 @@ BASE = -1
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Body:
-    """A link that moves relative to its parent, with all links that are fixed to it.
+    """A body that moves relative to its parent with one degree of freedom, with all links fixed to it.
 
-    ``T_parent_body(q) = placement Rz(angular (q + offset)) Tz(linear (q + offset))``: the z axis of the body
-    frame is the joint axis. ``parent``: index of another body, or BASE. ``joint``: index in q. ``inertia``:
-    of all lumped links, in the body frame. ``motor``: the motor of the joint.
+    ``T_parent_body(q) = placement displacement(q)``, and the velocity relative to the parent is a rotation by
+    ``angular qd`` about the z axis of the body and a translation by ``linear qd`` along it, with
+    ``qd = qd[speed]``. The displacement of
+
+    - a body on an axis (``ball`` is None) is ``Rz(angular (q + offset)) Tz(linear (q + offset))``, with
+      ``q = q[position]``;
+    - the first body of a ball joint (``ball`` is 0) is the rotation by the quaternion ``q[position … + 3]``;
+    - the second and the third body of a ball joint (``ball`` is 1 or 2) is none.
+
+    The axes of the three bodies of a ball joint are those of the joint's last side in cyclic order, so that
+    their z axes are its x, y and z axes. These axes rotate with the joint; the axis of a second or third body
+    is therefore not fixed in the body before it (:mod:`armblocks.dynamics.ball_joints`).
+
+    ``parent``: index of another body, or BASE. ``inertia``: of all lumped links, in the body frame.
+    ``motor``: the motor of this degree of freedom.
     """
 
     link: str
     parent: int
-    joint: int
+    position: int
+    speed: int
     placement: Transform
     angular: float
     linear: float
-    offset: float
-    inertia: RigidInertia
+    offset: float = 0.0
+    ball: int | None = None
+    inertia: RigidInertia = field(default_factory=RigidInertia)
     motor: Motor | None
 
     @property
@@ -69,30 +87,22 @@ class KinematicTree:
     @classmethod
     def of(cls, robot: Robot) -> KinematicTree:
         """Number the robot's joints, merge fixed links, and rotate every joint axis to z."""
-        joint_of = {link.name: index for index, link in enumerate(robot.moving_links)}
+        first_of: dict[str, tuple[int, int]] = {}
+        position = speed = 0
+        for link in robot.moving_links:
+            first_of[link.name] = position, speed
+            position, speed = position + link.joint.nq, speed + link.joint.nv
         frames: dict[str | None, Frame] = {None: Frame(body=BASE, pose=Transform())}
         bodies: list[Body] = []
         grounded = RigidInertia()
         for link in _parents_first(robot.links):
-            parent = frames[link.parent]
-            at_joint = parent.pose @ link.before
-            if link.joint.moves:
-                align, sign = _axis_to_z(link.joint.axis)
-                body = Body(
-                    link=link.name,
-                    parent=parent.body,
-                    joint=joint_of[link.name],
-                    placement=at_joint @ align,
-                    angular=sign * link.joint.angular,
-                    linear=sign * link.joint.linear,
-                    offset=link.joint.offset,
-                    inertia=RigidInertia(),
-                    motor=link.motor,
-                )
-                frame = Frame(body=len(bodies), pose=align.inverse() @ link.after)
-                bodies.append(body)
-            else:
-                frame = Frame(body=parent.body, pose=at_joint @ link.after)
+            frame = frames[link.parent]
+            frame = Frame(body=frame.body, pose=frame.pose @ link.before)
+            for body, to_joint in _bodies(link, *first_of.get(link.name, (0, 0))):
+                placement = frame.pose @ body.placement
+                bodies.append(replace(body, parent=frame.body, placement=placement))
+                frame = Frame(body=len(bodies) - 1, pose=to_joint)
+            frame = Frame(body=frame.body, pose=frame.pose @ link.after)
             frames[link.name] = frame
             inertia = RigidInertia.about_centre(link.mass, link.centre_of_mass, link.inertia)
             inertia = inertia.moved(frame.pose)
@@ -113,7 +123,7 @@ class KinematicTree:
 
     @property
     def n(self) -> int:
-        """Number of joint coordinates, which is the number of bodies."""
+        """Number of degrees of freedom, which is the number of bodies."""
         return len(self.bodies)
 
     @property
@@ -134,6 +144,50 @@ class KinematicTree:
             path.append(body)
             body = self.bodies[body].parent
         return tuple(path)
+
+
+_CYCLE = Transform(rotation=((0, 0, 1), (1, 0, 0), (0, 1, 0)))
+"""The rotation of x to y, y to z, and z to x."""
+
+
+def _bodies(link: Link, position: int, speed: int) -> Iterator[tuple[Body, Transform]]:
+    """The bodies of a link's joint, placed in the frame before them, and the pose of the joint frame in each.
+
+    ``position`` and ``speed``: the indices of the joint's first entries in q and qd.
+    """
+    for motion in link.joint.motions:
+        if isinstance(motion, AxisMotion):
+            align, sign = _axis_to_z(motion.axis)
+            yield (
+                Body(
+                    link=link.name,
+                    parent=BASE,
+                    position=position,
+                    speed=speed,
+                    placement=align,
+                    angular=sign * motion.angular,
+                    linear=sign * motion.linear,
+                    offset=motion.offset,
+                    motor=link.motor,
+                ),
+                align.inverse(),
+            )
+        else:
+            for k in range(3):
+                body = Body(
+                    link=link.name,
+                    parent=BASE,
+                    position=position,
+                    speed=speed + k,
+                    placement=_CYCLE,
+                    angular=1.0,
+                    linear=0.0,
+                    ball=k,
+                    motor=link.motor,
+                )
+                # Three cycles are the identity: the axes of the last body are those of the link's side.
+                yield body, Transform()
+        position, speed = position + len(motion.positions), speed + len(motion.speeds)
 
 
 def _parents_first(links: Sequence[Link]) -> list[Link]:

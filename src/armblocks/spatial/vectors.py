@@ -109,6 +109,10 @@ class RotationZ(NamedTuple):
     c: Scalar
     s: Scalar
 
+    def matrix(self) -> Matrix:
+        """The rotation matrix, as three rows."""
+        return (self.c, -self.s, 0.0), (self.s, self.c, 0.0), (0.0, 0.0, 1.0)
+
     def rotate(self, a: Vector) -> Vector:
         """The product Rz a."""
         return self.c * a[0] - self.s * a[1], self.s * a[0] + self.c * a[1], a[2]
@@ -132,6 +136,28 @@ class RotationZ(NamedTuple):
             yz=s * S.xz + c * S.yz,
             xz=c * S.xz - s * S.yz,
         )
+
+
+class Rotation(NamedTuple):
+    """A rotation by its matrix."""
+
+    R: Matrix
+
+    def matrix(self) -> Matrix:
+        """The rotation matrix, as three rows."""
+        return self.R
+
+    def rotate(self, a: Vector) -> Vector:
+        """The product R a."""
+        return rotate(self.R, a)
+
+    def rotate_back(self, a: Vector) -> Vector:
+        """The product R' a."""
+        return rotate_back(self.R, a)
+
+    def rotate_symmetric(self, S: Symmetric) -> Symmetric:
+        """The product R S R'."""
+        return rotate_symmetric(self.R, S)
 
 
 def _column(A: Matrix, j: int) -> Vector:

@@ -82,7 +82,7 @@ def robot_widget(robot: Arm | Robot, q: ArrayLike | None = None, *, height: int 
 
 
 def _arm(path: str, robot: Robot, q: ArrayLike | None = None) -> dict[str, Any]:
-    q_list = [0.0] * len(robot.moving_links) if q is None else np.asarray(q, dtype=np.float64).tolist()
+    q_list = robot.neutral.tolist() if q is None else np.asarray(q, dtype=np.float64).tolist()
     return {
         "path": path,
         "scene": asdict(scene_of(robot)),

@@ -11,9 +11,19 @@ from typing import ClassVar
 
 import numpy as np
 from casadi import SX, dot, fmax, fmin, if_else, logic_and, logic_not, logic_or, vertcat
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from armblocks.blocks.robots.ports import check_joint_values, q_port, qd_port, qdd_port, tau_port
+from armblocks.blocks.robots.ports import (
+    check_joint_values,
+    check_start,
+    coordinate_rates,
+    normalised_coordinates,
+    q_port,
+    qd_port,
+    qdd_port,
+    start_coordinates,
+    tau_port,
+)
 from armblocks.blocks.robots.robot_field import RobotField
 from armblocks.blocks.switching import THRESHOLD_OFFSET
 from armblocks.diagram import (
@@ -112,10 +122,12 @@ class ArmPlant(Block):
     wrench_input: bool = parameter(False, doc="whether the block has an input for a force at the tip")
 
     def check(self) -> None:
-        for name in ("q0", "qd0", "breakaway", "stiffness", "damping"):
+        check_start(self, self.robot, "q0")
+        for name in ("qd0", "breakaway", "stiffness", "damping"):
             check_joint_values(self, self.robot, name)
         friction = DryFriction.of(self.robot)
-        for k, name in enumerate(self.robot.joint_names):
+        starts = self.robot.neutral + np.asarray(self.q0) if np.ndim(self.q0) == 0 else np.asarray(self.q0)
+        for k, (name, _) in enumerate(self.robot.speeds):
             if friction.forward[k] < 0.0 or friction.backward[k] > 0.0:
                 raise InputError(
                     f"the Coulomb friction of joint '{name}' has the direction of the motion",
@@ -123,8 +135,8 @@ class ArmPlant(Block):
                     allowed="friction opposite to the motion: forwards >= 0 >= backwards",
                     fix="correct the robot's Coulomb friction, or choose the friction model squared-gear",
                 )
-            low, high = self.robot.qlim[k]
-            q0 = np.broadcast_to(np.asarray(self.q0), (self.robot.n,))[k]
+            (low, high), index = self._ranges()[k], self.robot.position_of_speed[k]
+            q0 = 0.0 if index is None else starts[index]
             if self.stops == "hard" and not low <= q0 <= high:
                 raise InputError(
                     f"joint '{name}' starts at {q0:g}, beyond its stop",
@@ -132,6 +144,9 @@ class ArmPlant(Block):
                     allowed=f"{low:g} … {high:g}",
                     fix="start within the limits, or choose elastic stops",
                 )
+
+    def output_rate(self, port: str) -> str | None:
+        return None if port == "q" and self.robot.nq != self.robot.nv else super().output_rate(port)
 
     # -- ports, states, modes and guards
 
@@ -154,9 +169,8 @@ class ArmPlant(Block):
         )
 
     def states(self, inputs: Shapes) -> tuple[State, ...]:
-        return tuple(
-            State(port.name, (self.robot.n,), port.doc, port.unit) for port in self.output_ports()[:2]
-        )
+        q, qd = q_port(self.robot), qd_port(self.robot)
+        return tuple(State(port.name, (len(port.names),), port.doc, port.unit) for port in (q, qd))
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         shape = (self.robot.n,)
@@ -194,7 +208,7 @@ class ArmPlant(Block):
         friction = if_else(mode == 0.0, holding, dry.sliding(mode))
         rigid = if_else(logic_and(mode == 0.0, contact != 0.0), holding - holding_torque, 0.0)
         return {
-            "q": x["q"],
+            "q": normalised_coordinates(self.robot, x["q"]),
             "qd": x["qd"],
             "qdd": qdd,
             "friction": friction + SX(viscous_friction(self.robot)) * x["qd"],
@@ -202,13 +216,16 @@ class ArmPlant(Block):
         }
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"q": x["qd"], "qd": self._motion(x, u, p)[2]}
+        return {
+            "q": coordinate_rates(self.robot, x["q"], x["qd"]),
+            "qd": self._motion(x, u, p)[2],
+        }
 
     def initial_states(self, p: Signals) -> Signals:
-        return {"q": p["q0"], "qd": p["qd0"]}
+        return {"q": start_coordinates(self.robot, p["q0"]), "qd": p["qd0"]}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        mode, contact, q, qd = self._mode(x), self._contact(x), x["q"], x["qd"]
+        mode, contact, q, qd = self._mode(x), self._contact(x), self._axis_positions(x), x["qd"]
         values: dict[str, SX] = {"rest": if_else(mode == 0.0, 1.0, mode * qd)}
         if self._lockable_joints():
             equations, torque, qdd = self._motion(x, u, p)
@@ -235,7 +252,7 @@ class ArmPlant(Block):
         return {name: values[name][list(self._joints_of(name))] for name in names}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        q, qd = x["q"], x["qd"]
+        q, qd = self._axis_positions(x), x["qd"]
         if self.stops == "hard":
             resting = qd == 0.0
             upper, lower = self._joint_mask("upper"), self._joint_mask("lower")
@@ -267,7 +284,11 @@ class ArmPlant(Block):
             )
             inconsistent["mode"] = logic_or(reversed_joints, started)
         if self._lower_stop_joints() or self._upper_stop_joints():
-            contact = self._elastic_contact(x["q"], x["qd"], p) if self.stops == "elastic" else x["contact"]
+            contact = (
+                self._elastic_contact(self._axis_positions(x), x["qd"], p)
+                if self.stops == "elastic"
+                else x["contact"]
+            )
             inconsistent["contact"] = contact != x["contact"]
         return inconsistent
 
@@ -294,7 +315,8 @@ class ArmPlant(Block):
                 qd, resting
             )
             qd = if_else(dot(impact, impact) > 0.0, after, qd)
-            q = if_else(hits_upper, self._limits(1), if_else(hits_lower, self._limits(0), q))
+            at_stop = if_else(hits_upper, self._limits(1), self._limits(0))
+            q = self._with_axis_positions(q, impact, at_stop)
             stopping = logic_or(stopping, impact)
         start_direction = (fired["forwards"] > 0.0) - (fired["backwards"] < 0.0)
         guess = if_else(stopping, 0.0, if_else(start_direction != 0.0, start_direction, mode))
@@ -318,10 +340,32 @@ class ArmPlant(Block):
         return DryFriction.of(self.robot).joints
 
     def _upper_stop_joints(self) -> tuple[int, ...]:
-        return tuple(np.flatnonzero(np.isfinite(self.robot.qlim[:, 1])).tolist()) if self._has_stops() else ()
+        return tuple(np.flatnonzero(np.isfinite(self._ranges()[:, 1])).tolist()) if self._has_stops() else ()
 
     def _lower_stop_joints(self) -> tuple[int, ...]:
-        return tuple(np.flatnonzero(np.isfinite(self.robot.qlim[:, 0])).tolist()) if self._has_stops() else ()
+        return tuple(np.flatnonzero(np.isfinite(self._ranges()[:, 0])).tolist()) if self._has_stops() else ()
+
+    def _ranges(self) -> NDArray[np.float64]:
+        """The position limits that belong to each entry of qd (n, 2); infinite without a limit."""
+        ranges = [limits.position or (-np.inf, np.inf) for limits in self.robot.limits]
+        return np.array(ranges).reshape(-1, 2)
+
+    def _axis_positions(self, x: Signals) -> SX:
+        """The coordinates whose rates are the entries of qd (n,); 0 for ball joints, which have no stops."""
+        q, indices = x["q"], self.robot.position_of_speed
+        if self.robot.nq == self.robot.nv:
+            return q
+        return SX(vertcat(*(SX(0.0) if index is None else q[index] for index in indices)))
+
+    def _with_axis_positions(self, q: SX, changed: SX, values: SX) -> SX:
+        """The coordinates with some of :meth:`_axis_positions` replaced by ``values``."""
+        if self.robot.nq == self.robot.nv:
+            return if_else(changed, values, q)
+        result = SX(q)
+        for k, index in enumerate(self.robot.position_of_speed):
+            if index is not None:
+                result[index] = if_else(changed[k], values[k], q[index])
+        return result
 
     def _has_stops(self) -> bool:
         return self.stops != "none"
@@ -354,7 +398,7 @@ class ArmPlant(Block):
 
     def _limits(self, side: int) -> SX:
         """Lower (0) or upper (1) limits (n,); 0 for joints without a limit."""
-        limits = self.robot.qlim[:, side]
+        limits = self._ranges()[:, side]
         return SX(np.where(np.isfinite(limits), limits, 0.0))
 
     def _mode(self, x: Signals) -> SX:
@@ -376,7 +420,7 @@ class ArmPlant(Block):
             return SX.zeros(self.robot.n)
         contact = self._contact(x)
         limit = if_else(contact > 0.0, self._limits(1), self._limits(0))
-        push = p["stiffness"] * (limit - x["q"]) - p["damping"] * x["qd"]
+        push = p["stiffness"] * (limit - self._axis_positions(x)) - p["damping"] * x["qd"]
         return if_else(contact != 0.0, push, 0.0)
 
     def _elastic_contact(self, q: SX, qd: SX, p: Signals) -> SX:

@@ -17,9 +17,13 @@ from armblocks.blocks.example_signals import position_of
 from armblocks.blocks.robots.ports import (
     apply_traced,
     check_joint_values,
+    check_start,
+    coordinate_rates,
+    normalised_coordinates,
     q_port,
     qd_port,
     qdd_port,
+    start_coordinates,
     tau_port,
 )
 from armblocks.blocks.robots.robot_field import RobotField
@@ -303,8 +307,11 @@ class ForwardDynamics(Block):
     )
 
     def check(self) -> None:
-        for name in ("q0", "qd0"):
-            check_joint_values(self, self.robot, name)
+        check_start(self, self.robot, "q0")
+        check_joint_values(self, self.robot, "qd0")
+
+    def output_rate(self, port: str) -> str | None:
+        return None if port == "q" and self.robot.nq != self.robot.nv else super().output_rate(port)
 
     def input_ports(self) -> tuple[Port, ...]:
         return (tau_port(self.robot, "torque or force at the joints"),)
@@ -313,18 +320,19 @@ class ForwardDynamics(Block):
         return (q_port(self.robot), qd_port(self.robot), qdd_port(self.robot))
 
     def states(self, inputs: Shapes) -> tuple[State, ...]:
-        return tuple(
-            State(port.name, (self.robot.n,), port.doc, port.unit) for port in self.output_ports()[:2]
-        )
+        q, qd = q_port(self.robot), qd_port(self.robot)
+        return tuple(State(port.name, (len(port.names),), port.doc, port.unit) for port in (q, qd))
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {**x, "qdd": apply_traced(dynamics.trace_accel(self.robot), x["q"], x["qd"], u["tau"])}
+        qdd = apply_traced(dynamics.trace_accel(self.robot), x["q"], x["qd"], u["tau"])
+        return {"q": normalised_coordinates(self.robot, x["q"]), "qd": x["qd"], "qdd": qdd}
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"q": x["qd"], "qd": apply_traced(dynamics.trace_accel(self.robot), x["q"], x["qd"], u["tau"])}
+        qdd = apply_traced(dynamics.trace_accel(self.robot), x["q"], x["qd"], u["tau"])
+        return {"q": coordinate_rates(self.robot, x["q"], x["qd"]), "qd": qdd}
 
     def initial_states(self, p: Signals) -> Signals:
-        return {"q": p["q0"], "qd": p["qd0"]}
+        return {"q": start_coordinates(self.robot, p["q0"]), "qd": p["qd0"]}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,14 @@ from casadi import SX
 from numpy.typing import ArrayLike
 
 from armblocks import dynamics
-from armblocks.blocks.robots.ports import apply_traced, q_port, qd_port, qdd_port, tau_port
+from armblocks.blocks.robots.ports import (
+    apply_traced,
+    check_speeds_are_rates,
+    q_port,
+    qd_port,
+    qdd_port,
+    tau_port,
+)
 from armblocks.blocks.robots.robot_field import RobotField
 from armblocks.diagram import (
     Block,
@@ -32,6 +39,7 @@ from armblocks.robot import Robot
 
 
 def _check_gains(block: Block, robot: Robot) -> None:
+    check_speeds_are_rates(block, robot)
     for name in ("Kp", "Kd"):
         shape = shape_of(block.parameter_value(name))
         if shape not in ((), (robot.n,)):

@@ -14,7 +14,7 @@ from casadi import SX, floor, if_else
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.random_streams import SEED_BITS, draw, normal_quantile, stream_start, stream_states
-from armblocks.blocks.robots.ports import check_joint_values, q_port, qd_port
+from armblocks.blocks.robots.ports import check_joint_values, check_speeds_are_rates, q_port, qd_port
 from armblocks.blocks.robots.robot_field import RobotField
 from armblocks.diagram import (
     Block,
@@ -76,6 +76,7 @@ class JointSensor(Block):
     sample_time: ArrayLike = sample_time_parameter(1e-3)
 
     def check(self) -> None:
+        check_speeds_are_rates(self, self.robot)
         for name in ("q_deviation", "qd_deviation"):
             check_joint_values(self, self.robot, name)
 

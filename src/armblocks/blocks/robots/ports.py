@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 from casadi import SX
+from numpy.typing import NDArray
 
+from armblocks import dynamics
 from armblocks.diagram import Block, Port, rate_unit, shape_of
 from armblocks.equations import TracedFunction, flatten, unflatten
 from armblocks.errors import InputError
@@ -18,19 +21,25 @@ def apply_traced(traced: TracedFunction, *values: SX) -> SX:
 
 
 def coordinate_unit(robot: Robot) -> str:
-    """The unit of the coordinates: rad or m, or ``""`` if the robot has joints of both types."""
-    units = set(robot.joint_units)
+    """The unit of the integral of the speeds: rad or m, or ``""`` if the robot has joints of both types."""
+    units = {entry.unit for entry in robot.speeds}
     return units.pop() if len(units) == 1 else ""
 
 
+def speed_names(robot: Robot) -> tuple[str, ...]:
+    """The names of the entries of qd."""
+    return tuple(entry.name for entry in robot.speeds)
+
+
 def q_port(robot: Robot, name: str = "q") -> Port:
-    """A port of joint coordinates (n,)."""
-    return Port(name, "joint coordinates", coordinate_unit(robot), (robot.n,), robot.joint_names)
+    """A port of joint coordinates (nq,)."""
+    unit = coordinate_unit(robot) if robot.nq == robot.nv else ""
+    return Port(name, "joint coordinates", unit, (robot.nq,), tuple(entry.name for entry in robot.positions))
 
 
 def qd_port(robot: Robot, name: str = "qd") -> Port:
     """A port of joint speeds (n,)."""
-    return Port(name, "joint speeds", rate_unit(coordinate_unit(robot)), (robot.n,), robot.joint_names)
+    return Port(name, "joint speeds", rate_unit(coordinate_unit(robot)), (robot.n,), speed_names(robot))
 
 
 def qdd_port(robot: Robot, name: str = "qdd") -> Port:
@@ -40,18 +49,18 @@ def qdd_port(robot: Robot, name: str = "qdd") -> Port:
         "joint accelerations",
         rate_unit(rate_unit(coordinate_unit(robot))),
         (robot.n,),
-        robot.joint_names,
+        speed_names(robot),
     )
 
 
 def tau_port(robot: Robot, doc: str) -> Port:
     """A port of joint torques or forces (n,)."""
     unit = {"rad": "N m", "m": "N"}.get(coordinate_unit(robot), "")
-    return Port("tau", doc, unit, (robot.n,), robot.joint_names)
+    return Port("tau", doc, unit, (robot.n,), speed_names(robot))
 
 
 def check_joint_values(block: Block, robot: Robot, name: str) -> None:
-    """Raise ``InputError`` unless a parameter has one number, or one for each joint."""
+    """Raise ``InputError`` unless a parameter has one number, or one for each entry of qd."""
     shape = shape_of(block.parameter_value(name))
     if shape not in ((), (robot.n,)):
         raise InputError(
@@ -59,4 +68,73 @@ def check_joint_values(block: Block, robot: Robot, name: str) -> None:
             where=f"{block.type_name()}.{name}",
             allowed=f"{robot.n}, one for each joint of '{robot.name}', or one number for all",
             fix="give one number for each joint of the robot",
+        )
+
+
+def check_start(block: Block, robot: Robot, name: str) -> None:
+    """Raise ``InputError`` unless a parameter has values of q.
+
+    They are one number for each entry of q, or one number for all. With ball joints this number is 0 and
+    stands for the neutral coordinates, because a quaternion of zeros is no rotation.
+    """
+    if robot.nq == robot.nv:
+        check_joint_values(block, robot, name)
+        return
+    value = np.asarray(block.parameter_value(name))
+    where, allowed = f"{block.type_name()}.{name}", f"{robot.nq}, one for each coordinate, or 0 for all"
+    if value.shape not in ((), (robot.nq,)) or (value.shape == () and value != 0.0):
+        raise InputError(
+            f"{name} is {value:g} for all" if value.shape == () else f"{name} has {value.size} coordinates",
+            where=where,
+            allowed=allowed,
+            fix=f"begin with the neutral coordinates {robot.neutral.tolist()}",
+        )
+    if value.shape and not (np.abs(norms := ball_norms(robot, value)) > 0.0).all():
+        raise InputError(
+            f"{name} has a quaternion of zeros ({norms.tolist()} are the lengths of all quaternions)",
+            where=where,
+            allowed="quaternions w x y z other than zero",
+            fix=f"begin with the neutral coordinates {robot.neutral.tolist()}",
+        )
+
+
+def start_coordinates(robot: Robot, given: SX) -> SX:
+    """The initial q (nq,) of a parameter that :func:`check_start` accepted."""
+    if robot.nq == robot.nv or given.numel() == robot.nq:
+        return given
+    return SX(robot.neutral) + given
+
+
+def coordinate_rates(robot: Robot, q: SX, qd: SX) -> SX:
+    """dq/dt (nq,): ``qd`` itself without ball joints."""
+    return qd if robot.nq == robot.nv else apply_traced(dynamics.trace_position_rates(robot), q, qd)
+
+
+def normalised_coordinates(robot: Robot, q: SX) -> SX:
+    """``q`` with quaternions of length 1: integration keeps their length only up to its errors."""
+    return q if robot.nq == robot.nv else apply_traced(dynamics.trace_normalised(robot), q)
+
+
+def ball_norms(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The length of each quaternion in ``q``."""
+    norms: list[float] = []
+    position = 0
+    for joint in robot.joints:
+        for motion in joint.motions:
+            count = len(motion.positions)
+            if motion.positions != motion.speeds:
+                norms.append(float(np.linalg.norm(q[position : position + count])))
+            position += count
+    return np.array(norms)
+
+
+def check_speeds_are_rates(block: Block, robot: Robot) -> None:
+    """Raise ``InputError`` for a robot with ball joints, if the equations of a block subtract coordinates."""
+    if robot.nq != robot.nv:
+        names = [link.name for link in robot.moving_links if link.joint.nq != link.joint.nv]
+        raise InputError(
+            f"joint '{names[0]}' of robot '{robot.name}' has a quaternion as coordinates",
+            where=block.type_name(),
+            allowed="robots whose joint speeds are the rates of the joint coordinates",
+            fix="replace the joint by revolute joints, or build the controller from other blocks",
         )

@@ -10,10 +10,15 @@ from armblocks.formats.file_findings import FileContext
 from armblocks.formats.mjcf.rules import FRICTION, LIMIT, STIFFNESS, TENDON
 from armblocks.formats.mjcf.settings import Defaults, Settings, sections
 from armblocks.formats.xml_elements import Element, note, shortened
-from armblocks.robot import Joint, JointLimits, Motor, Prismatic, Revolute
+from armblocks.robot import Free, Joint, JointLimits, Motor, Prismatic, Revolute, Spherical
 from armblocks.spatial import Vector3
 
-_KINDS: Mapping[str, type[Joint]] = {"hinge": Revolute, "slide": Prismatic}
+_KINDS: Mapping[str, type[Joint]] = {
+    "hinge": Revolute,
+    "slide": Prismatic,
+    "ball": Spherical,
+    "free": Free,
+}
 _TRANSMISSIONS_OF_TENDONS = ("tendon", "cranksite", "slidersite")
 
 
@@ -28,32 +33,39 @@ class PlacedJoint(NamedTuple):
 def joint_of(
     element: Element, settings: Settings, torques: Mapping[str, float], context: FileContext
 ) -> PlacedJoint:
-    """The joint of an element with its defaults. Raises ``FormatError`` for other kinds than hinge and slide.
+    """The joint of an element with its defaults. Raises ``FormatError`` for unknown types.
 
-    In MJCF the pose of a body is that at the joint coordinate ``ref``, so the offset is ``-ref``.
+    In MJCF the pose of a body is that at the joint coordinate ``ref``, so the offset is ``-ref``. The pose of
+    a body with a ball or free joint is that at ``neutral``.
     """
-    kind = element.attributes.get("type", "hinge").strip()
+    kind = "free" if element.tag == "freejoint" else element.attributes.get("type", "hinge").strip()
     if kind not in _KINDS:
-        freedoms = " with 3 degrees of freedom" if kind == "ball" else ""
         raise element.error(
-            f"the joint is of type '{shortened(kind)}'{freedoms}, which is not supported",
-            allowed="hinge, slide; free joints of bodies in the world",
-            fix="replace it by hinges",
+            f"the joint is of type '{shortened(kind)}', which MJCF does not have",
+            allowed=", ".join(_KINDS),
+            fix="correct the type",
         )
+    if _first(element, "stiffness") != 0.0:
+        note(context, STIFFNESS, element, "the spring of the joint is left out")
+    if kind == "free":
+        return PlacedJoint(Free(), (0.0, 0.0, 0.0), _motor_of(element, context))
+    position = element.vector("pos", (0.0, 0.0, 0.0))
+    if kind == "ball":
+        if _range(element, 1.0, settings, context) is not None:
+            note(context, LIMIT, element, "the range of the ball joint is left out")
+        return PlacedJoint(Spherical(), position, _motor_of(element, context))
     axis = element.vector("axis", (0.0, 0.0, 1.0))
     if not 1e-10 < math.hypot(*axis) < math.inf:
         raise element.error(
             "the axis of the joint is zero", allowed="a direction such as 0 0 1", fix="set the axis"
         )
     unit = settings.angle_unit if kind == "hinge" else 1.0
-    if _first(element, "stiffness") != 0.0:
-        note(context, STIFFNESS, element, "the spring of the joint is left out")
     limits = JointLimits(
         position=_range(element, unit, settings, context),
         torque=torques.get(element.attributes.get("name", ""), _force_limit(element, "actuatorfrcrange")),
     )
     joint = _KINDS[kind](axis=axis, offset=-unit * element.number("ref", 0.0), limits=limits)
-    return PlacedJoint(joint, element.vector("pos", (0.0, 0.0, 0.0)), _motor_of(element, context))
+    return PlacedJoint(joint, position, _motor_of(element, context))
 
 
 def _first(element: Element, attribute: str) -> float:

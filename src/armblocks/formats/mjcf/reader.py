@@ -1,8 +1,8 @@
 """Robots from MJCF: the tree of the bodies of ``<worldbody>``.
 
 A body with several joints becomes a series of links: one without mass for each joint but the last. Each of
-them has the name of its joint; the last one has the name of the body. A body whose joint is free is fixed at
-its initial pose. Shapes of the world itself are surroundings and not part of the robot.
+them has the name of its joint; the last one has the name of the body. A free body is at its initial pose at
+the neutral coordinates. Shapes of the world itself are surroundings and not part of the robot.
 
 Source: MuJoCo documentation, *XML reference* and *Modeling* (versions 3.x).
 """
@@ -20,11 +20,11 @@ from armblocks.formats.mjcf.inertials import mass_properties
 from armblocks.formats.mjcf.joints import joint_of, torque_limits
 from armblocks.formats.mjcf.meshes import MeshAssets
 from armblocks.formats.mjcf.poses import pose_of
-from armblocks.formats.mjcf.rules import EQUALITY, FREE, NAME, STIFFNESS, TENDON, UNREAD
+from armblocks.formats.mjcf.rules import EQUALITY, NAME, STIFFNESS, TENDON, UNREAD
 from armblocks.formats.mjcf.settings import MAIN, Defaults, Settings, sections, settings_of
 from armblocks.formats.mjcf.shapes import Geom, drawn, geom_of, is_collision_only
 from armblocks.formats.xml_elements import Element, note, read_elements, shortened
-from armblocks.robot import Fixed, Link, Robot, deepest_tip, with_tip
+from armblocks.robot import Fixed, Free, Link, Robot, deepest_tip, with_tip
 from armblocks.robot.checks import MAX_LINKS
 from armblocks.robot.robot import STANDARD_GRAVITY
 from armblocks.robot.shapes import Material, Shape
@@ -39,7 +39,7 @@ def read_mjcf(data: bytes, file: str, context: FileContext) -> Robot:
     """The robot of an MJCF file. ``file`` is its name in messages; findings are added to ``context``.
 
     Raises ``FormatError`` with file and line for XML that cannot be read, for numbers that are not finite,
-    for included files that cannot be read, and for ball joints.
+    and for included files that cannot be read.
     """
     root = read_elements(data, file)
     if root.tag not in ("mujoco", "mujocoinclude"):
@@ -150,18 +150,25 @@ class _Model:
         self.context.lines[name] = body.line
         series: list[Link] = []
         parent, before, offset = place.parent, pose, transl(0.0, 0.0, 0.0)
-        joints = [*self._joints(inside, body)]
-        for index, (element, around) in enumerate(joints):
+        for index, (element, around) in enumerate(inside.joints):
             placed = joint_of(element, self.settings, self.torques, self.context)
             at = transl(*around.apply(placed.position))
-            axis = Transform(rotation=around.rotation).apply(placed.joint.axis)
-            is_last = index == len(joints) - 1
+            joint = placed.joint
+            if isinstance(joint, Free) and place.parent is not None:
+                raise element.error(
+                    "a body inside another body has a free joint",
+                    allowed="free joints of bodies in the world",
+                    fix="move the body into <worldbody>",
+                )
+            if "axis" in joint.parameters:
+                joint = replace(joint, axis=Transform(rotation=around.rotation).apply(joint.axis))
+            is_last = index == len(inside.joints) - 1
             link = name if is_last else self._free_name(element.attributes.get("name", ""), f"{name} joint")
             series.append(
                 Link(
                     name=link,
                     parent=parent,
-                    joint=replace(placed.joint, axis=axis),
+                    joint=joint,
                     before=before @ at,
                     after=at.inverse(),
                     motor=placed.motor,
@@ -203,15 +210,6 @@ class _Model:
             elif child.tag in _NOT_READ:
                 note(self.context, UNREAD, child, f"the element <{child.tag}> is not read", element.label)
         return contents
-
-    def _joints(self, inside: _Contents, body: Element) -> Iterator[tuple[Element, Transform]]:
-        """The joints that move the body; a free joint is left out with a finding."""
-        for element, around in inside.joints:
-            if element.tag == "freejoint" or element.attributes.get("type", "").strip() == "free":
-                what = "the body moves freely; here it is fixed at its initial pose"
-                note(self.context, FREE, element, what, body.label)
-            else:
-                yield element, around
 
     def _drawing(self, body: Element, geoms: list[Geom]) -> tuple[Shape, ...]:
         """The shapes of a body for drawings: collision shapes only where there are no others."""

@@ -4,11 +4,6 @@ from __future__ import annotations
 
 from armblocks.formats.file_findings import Rule
 
-FREE = Rule(
-    code="mjcf-free",
-    allowed="bodies that are connected to the base by hinges and slides",
-    remedy="fix the body to the base, or model the motion of the base by hinges and slides",
-)
 STIFFNESS = Rule(
     code="mjcf-stiffness",
     allowed="joints without springs, and no surrounding medium",
@@ -51,7 +46,7 @@ SHAPE = Rule(
 )
 UNREAD = Rule(
     code="mjcf-not-read",
-    allowed="a tree of bodies with hinges and slides",
+    allowed="a tree of bodies",
     remedy="write the part out as bodies",
 )
 NAME = Rule(
@@ -60,5 +55,5 @@ NAME = Rule(
     remedy="rename one of the bodies",
 )
 
-MJCF_RULES = (*(FREE, STIFFNESS, EQUALITY, TENDON, LIMIT, FRICTION, INERTIA, MESH, SHAPE, UNREAD, NAME),)
+MJCF_RULES = (*(STIFFNESS, EQUALITY, TENDON, LIMIT, FRICTION, INERTIA, MESH, SHAPE, UNREAD, NAME),)
 """All rules of this format."""

@@ -24,6 +24,7 @@ from armblocks.formats.robot_writing import (
     free_name,
     inertial_in,
     joint_friction,
+    limits_of,
     numbers,
     quoted,
     warn,
@@ -31,10 +32,17 @@ from armblocks.formats.robot_writing import (
     warn_of_shapes,
 )
 from armblocks.formats.xml_elements import MAX_DEPTH
-from armblocks.robot import Link, Revolute, Robot
+from armblocks.robot import Fixed, Free, Joint, Link, Prismatic, Revolute, Robot, Spherical
 from armblocks.robot.shapes import Box, Cylinder, Mesh, Shape, Sphere
 from armblocks.spatial import IDENTITY3, Matrix3, Transform
 
+_KINDS: Mapping[type[Joint], str] = {
+    Revolute: "hinge",
+    Prismatic: "slide",
+    Fixed: "",
+    Spherical: "ball",
+    Free: "free",
+}
 _MOST_JOINTS = 6
 """Maximum number of joints of a body in MuJoCo."""
 
@@ -55,14 +63,16 @@ class _Body:
 def write_mjcf(robot: Robot) -> bytes:
     """The MJCF of a robot. Reading it gives the same kinematics and dynamics up to rounding.
 
-    Raises ``FormatError`` for joints that are neither revolute, prismatic nor fixed, and for chains of more
+    Raises ``FormatError`` for joint types that MJCF does not have, and for chains of more
     bodies than XML files may be deep. Warns of data that MJCF does not have: gear ratios (rotor inertia and
     friction are written at the joint), speed limits, the tip and the order of the coordinates of some trees,
     Coulomb friction that depends on the direction, friction that accelerates, housings. MuJoCo does not
     accept moving bodies without mass or with physically impossible inertias; they are written as they are.
     """
     for link in robot.links:
-        check_joint(robot, link, "MJCF")
+        check_joint(robot, link, _KINDS, "MJCF")
+        if link.joint.nq != link.joint.nv:
+            _check_quaternions(robot, link)
     _warn_of_losses(robot)
     names = file_names(robot, _is_changed, "MJCF")
     meshes: list[str] = []
@@ -93,14 +103,28 @@ def _warn_of_losses(robot: Robot) -> None:
     moving = [link for link in robot.links if link.joint.moves]
     if any(link.motor is not None and link.motor.gear_ratio != 1.0 for link in moving):
         warn(where, "gear ratios are not part of an MJCF file; inertia and friction are those at the joint")
-    if any(link.joint.limits.speed is not None for link in moving):
+    if any(limits.speed is not None for limits in robot.limits):
         warn(where, "speed limits are not part of an MJCF file")
     for link in moving:
-        low, high = link.joint.limits.position or (0.0, 1.0)
+        low, high = limits_of(link).position or (0.0, 1.0)
         if low == high:
             warn(
                 f"{where}, link '{link.name}'", f"a range of zero width, {low:g}, is not part of an MJCF file"
             )
+
+
+def _check_quaternions(robot: Robot, link: Link) -> None:
+    """Check that a link with a quaternion has the same coordinates in the file: its frame is in its joint."""
+    where = f"robot '{robot.name}', link '{link.name}'"
+    if isinstance(link.joint, Free) and link.parent is not None:
+        raise FormatError(
+            "the free joint is not at the base",
+            where=where,
+            allowed="free joints of links at the base: MuJoCo has no others",
+            fix="save the robot as .json",
+        )
+    if link.after.rotation != IDENTITY3 or (isinstance(link.joint, Free) and not link.after.is_identity):
+        warn(where, "the coordinates of its joint are relative to the axes of the link in the MJCF file")
 
 
 def _tool_name(robot: Robot, names: Mapping[str | None, str]) -> str:
@@ -119,7 +143,7 @@ def _bodies(robot: Robot) -> tuple[dict[str, _Body], list[str]]:
     while waiting:
         link = waiting.pop()
         inside = children.get(link.name, [])
-        pose = link.before @ link.joint.motion(link.joint.offset) if link.joint.moves else link.before
+        pose = link.before @ link.joint.motion(link.joint.neutral)
         if link.parent in series:
             body, parent = series[link.parent]
         else:
@@ -144,8 +168,8 @@ def _only_carries_a_joint(robot: Robot, link: Link, children: Sequence[Link]) ->
     """Whether a link has no other purpose than to connect two joints."""
     return (
         len(children) == 1
-        and children[0].joint.moves
-        and link.joint.moves
+        and children[0].joint.nv == 1
+        and link.joint.nv == 1
         and inertial_in(link, Transform()) is None
         and not link.geometry
         and link is not robot.links[-1]
@@ -209,11 +233,13 @@ def _body_lines(robot: Robot, body: _Body, names: Mapping[str | None, str], mesh
 def _joint(robot: Robot, link: Link, after: Transform, names: Mapping[str | None, str]) -> str:
     """The joint of a link in a body; ``after``: the pose of the body in the frame of the joint."""
     joint, frame = link.joint, after.inverse()
-    axis = Transform(rotation=frame.rotation).apply(joint.axis)
-    kind = "hinge" if isinstance(joint, Revolute) else "slide"
-    words = [f'<joint name={quoted(names[link.name], robot)} type="{kind}"']
-    words += [f'pos="{numbers(frame.translation)}"', f'axis="{numbers(axis)}"']
-    limits = joint.limits
+    words = [f'<joint name={quoted(names[link.name], robot)} type="{_KINDS[type(joint)]}"']
+    if not isinstance(joint, Free):
+        words.append(f'pos="{numbers(frame.translation)}"')
+    if "axis" in joint.parameters:
+        axis = Transform(rotation=frame.rotation).apply(joint.axis)
+        words.append(f'axis="{numbers(axis)}"')
+    limits = limits_of(link)
     if limits.position is not None and limits.position[0] < limits.position[1]:
         words.append(f'range="{numbers(limits.position)}"')
     if limits.torque is not None:

@@ -9,7 +9,7 @@ from armblocks.formats.sdf.frames import MODEL_FRAME, Frame, Frames
 from armblocks.formats.sdf.rules import AXIS, COUPLING, DAMPING, LIMIT, SPRING
 from armblocks.formats.sdf.values import flag_in, number_in, unbounded_number_in
 from armblocks.formats.xml_elements import Element, note, shortened
-from armblocks.robot import Joint, JointLimits, Motor, Prismatic, Revolute
+from armblocks.robot import Joint, JointLimits, Motor, Prismatic, Revolute, Screw, Spherical
 from armblocks.spatial import Transform, Vector3
 
 AXES: dict[str, tuple[str, ...]] = {
@@ -19,14 +19,11 @@ AXES: dict[str, tuple[str, ...]] = {
     "fixed": (),
     "revolute2": ("axis", "axis2"),
     "universal": ("axis", "axis2"),
+    "screw": ("axis",),
+    "ball": (),
 }
 """The types of joints that are supported, with their axes from the parent to the child."""
 GEARBOX = "gearbox"
-_DESCRIBED = {
-    "ball": "ball joint, with three degrees of freedom",
-    "screw": "screw joint",
-    "gearbox": "gearbox",
-}
 UNIT_LENGTH = 1e-3
 """Maximum deviation of an axis's length from 1 without a finding."""
 UNLIMITED = 1e9
@@ -37,31 +34,52 @@ def joint_type_of(joint: Frame) -> str:
     """The type of a joint. Raises ``FormatError`` for types that are not supported."""
     kind = joint.element.required("type", ", ".join(AXES))
     if kind not in AXES and kind != GEARBOX:
-        described = f" ({_DESCRIBED[kind]})" if kind in _DESCRIBED else ""
         raise joint.element.error(
-            f"the joint is of type '{kind[:40]}'{described}, which is not supported",
+            f"the joint is of type '{kind[:40]}', which is not supported",
             allowed=", ".join(AXES),
-            fix="replace it by a fixed joint, or by a chain of joints with one degree of freedom each",
+            fix="replace it by a fixed joint, or by a chain of these joints",
         )
     return kind
 
 
-def axes_of(joint: Frame, frames: Frames, reverse: bool) -> list[tuple[Joint, Motor | None]]:
-    """The joints with one degree of freedom that a joint consists of, from its parent to its child.
+def joints_of(joint: Frame, frames: Frames, reverse: bool) -> list[tuple[Joint, Motor | None]]:
+    """The joints that a joint consists of, from its parent to its child: one for each axis; none if fixed.
 
-    Their axes are in the frame of the joint. ``reverse``: the result describes the motion of the parent
-    relative to the child: the order is reversed, and the axes are negated, so that the coordinates remain.
+    Each axis has its own limits and friction. The axes are in the frame of the joint. ``reverse``: the result
+    describes the motion of the parent relative to the child: the order is reversed, and the axes are negated,
+    so that the coordinates remain. The quaternion of a ball joint is then the inverse one.
     """
     kind = joint_type_of(joint)
+    if kind == "ball":
+        return [(Spherical(), None)]
     axes: list[tuple[Joint, Motor | None]] = []
     for tag in AXES[kind]:
         axis = joint.element.first(tag)
         x, y, z = _direction(joint, axis, tag, frames)
         limits = _limits(joint, axis, kind == "continuous", frames.context)
-        joint_type = Prismatic if kind == "prismatic" else Revolute
         direction = (-x, -y, -z) if reverse else (x, y, z)
-        axes.append((joint_type(axis=direction, limits=limits), motor_of(joint, axis, frames.context)))
+        if kind == "screw":
+            described: Joint = Screw(axis=direction, limits=limits, pitch=_pitch(joint.element))
+        elif kind == "prismatic":
+            described = Prismatic(axis=direction, limits=limits)
+        else:
+            described = Revolute(axis=direction, limits=limits)
+        axes.append((described, motor_of(joint, axis, frames.context)))
     return axes[::-1] if reverse else axes
+
+
+def _pitch(joint: Element) -> float:
+    """The translation per turn, m. ``screw_thread_pitch`` is this number, with the default 1.
+
+    The older ``thread_pitch`` is in rad/m and positive for a left-handed thread.
+    """
+    older = number_in(joint, "thread_pitch", 0.0)
+    pitch = number_in(joint, "screw_thread_pitch", -2.0 * math.pi / older if older else 1.0)
+    if pitch == 0.0:
+        raise joint.error(
+            "the pitch of the thread is 0", allowed="m per turn, other than 0", fix="use a revolute joint"
+        )
+    return pitch
 
 
 def _direction(joint: Frame, axis: Element | None, tag: str, frames: Frames) -> Vector3:

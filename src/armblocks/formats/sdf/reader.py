@@ -23,7 +23,7 @@ from armblocks.errors import ArmblocksError, FormatError, RobotError
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.sdf.frames import WORLD, Frame, Frames, Scope
 from armblocks.formats.sdf.inertials import inertial_of
-from armblocks.formats.sdf.joints import GEARBOX, axes_of, joint_type_of
+from armblocks.formats.sdf.joints import GEARBOX, joint_type_of, joints_of
 from armblocks.formats.sdf.models import Models, source_of
 from armblocks.formats.sdf.rules import COUPLING, FREE_LINK, GRAVITY, UNKNOWN
 from armblocks.formats.sdf.shapes import shapes_of
@@ -256,19 +256,19 @@ def _links(edge: Edge, model: Frame, frames: Frames, used: set[str]) -> Iterator
     link, joint = edge.link, edge.joint
     carrier = edge.carrier or model
     parent = None if edge.carrier is None else edge.carrier.name
-    axes = axes_of(joint, frames, edge.reverse) if joint is not None else []
-    if joint is None or not axes:
+    series = joints_of(joint, frames, edge.reverse) if joint is not None else []
+    if joint is None or not series:
         before, after, moving, motor = frames.between(carrier, link), Transform(), Fixed(), None
     else:
         before, after = frames.between(carrier, joint), frames.between(joint, link)
-        for moving, motor in axes[:-1]:
+        for moving, motor in series[:-1]:
             name = joint.name
             while name in used:
                 name += "_"
             used.add(name)
             yield Link(name=name, parent=parent, joint=moving, before=before, motor=motor, geometry=())
             before, parent = Transform(), name
-        moving, motor = axes[-1]
+        moving, motor = series[-1]
     moves = joint is not None and not link.scope.fixed
     inertial = inertial_of(link, frames, moves)
     if (

@@ -21,17 +21,26 @@ from armblocks.formats.robot_writing import (
     free_name,
     inertial_in,
     joint_friction,
+    limits_of,
     numbers,
     quoted,
+    warn,
     warn_of_order,
     warn_of_shapes,
 )
 from armblocks.formats.sdf.reader import read_sdf
-from armblocks.robot import Link, Revolute, Robot
+from armblocks.robot import Fixed, Joint, Link, Prismatic, Revolute, Robot, Screw, Spherical
 from armblocks.robot.robot import STANDARD_GRAVITY
 from armblocks.robot.shapes import Box, Cylinder, Shape, Sphere
 from armblocks.spatial import Transform
 
+_KINDS: Mapping[type[Joint], str] = {
+    Revolute: "revolute",
+    Prismatic: "prismatic",
+    Fixed: "fixed",
+    Screw: "screw",
+    Spherical: "ball",
+}
 _VERSION = "1.9"
 _DRAKE = "http://drake.mit.edu"
 
@@ -41,7 +50,7 @@ def write_sdf(robot: Robot) -> bytes:
 
     A robot with another gravity than -9.81 m/s2 along z is written as the model of a world with this gravity.
 
-    Raises ``FormatError`` for joints that are neither revolute, prismatic nor fixed. Warns of data that SDF
+    Raises ``FormatError`` for joint types that SDF does not have. Warns of data that SDF
     does not have: the tip and the order of the coordinates of some trees, Coulomb friction that depends on
     the direction, friction that accelerates, meshes and housings, names that SDF reserves.
     """
@@ -110,12 +119,12 @@ def _geometry(shape: Shape) -> str:
 
 
 def _joint_lines(robot: Robot, link: Link, names: Mapping[str | None, str], name: str) -> list[str]:
-    check_joint(robot, link, "SDF")
+    check_joint(robot, link, _KINDS, "SDF")
     joint = link.joint
-    kind = type(joint).__name__.lower()
-    if isinstance(joint, Revolute) and joint.limits.position is None:
+    kind = _KINDS[type(joint)]
+    if isinstance(joint, Revolute) and limits_of(link).position is None:
         kind = "continuous"
-    before = link.before @ joint.motion(joint.offset) if joint.moves else link.before
+    before = link.before @ joint.motion(joint.neutral)
     parent = "world" if link.parent is None else names[link.parent]
     lines = [
         f'  <joint name={quoted(name, robot)} type="{kind}">',
@@ -123,7 +132,12 @@ def _joint_lines(robot: Robot, link: Link, names: Mapping[str | None, str], name
         f"    <parent>{escape(parent)}</parent>",
         f"    <child>{escape(names[link.name])}</child>",
     ]
-    if joint.moves:
+    if isinstance(joint, Screw):
+        lines.append(f"    <screw_thread_pitch>{joint.pitch!r}</screw_thread_pitch>")
+    if isinstance(joint, Spherical) and link.motor is not None:
+        what = "friction and rotor inertia of its ball joint are not part of the SDF file"
+        warn(f"robot '{robot.name}', link '{link.name}'", what)
+    if joint.nv == 1:
         lines += ["    <axis>", f"      <xyz>{numbers(joint.axis)}</xyz>"]
         lines += [f"      {line}" for line in (_limit(link), _dynamics(robot, link)) if line]
         lines.append("    </axis>")
@@ -150,7 +164,7 @@ def _tool_lines(robot: Robot, last: str, tool: str, joint: str) -> list[str]:
 
 
 def _limit(link: Link) -> str:
-    limits = link.joint.limits
+    limits = limits_of(link)
     low, high = limits.position or (None, None)
     values = {"lower": low, "upper": high, "effort": limits.torque, "velocity": limits.speed}
     inner = "".join(f"<{key}>{value!r}</{key}>" for key, value in values.items() if value is not None)

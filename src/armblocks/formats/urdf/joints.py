@@ -10,15 +10,19 @@ from armblocks.formats.file_findings import FileContext
 from armblocks.formats.urdf.origins import origin_of
 from armblocks.formats.urdf.rules import AXIS, DAMPING, LIMIT, MIMIC, NO_LIMIT, TRANSMISSION
 from armblocks.formats.xml_elements import Element, note
-from armblocks.robot import Fixed, Joint, JointLimits, Motor, Prismatic, Revolute
-from armblocks.spatial import Transform, Vector3
+from armblocks.robot import Fixed, Free, Joint, JointLimits, Motor, Planar, Prismatic, Revolute, Spherical
+from armblocks.spatial import Matrix3, Transform, Vector3, rotation_about, rotation_x
 
 JOINT_KINDS: dict[str, type[Joint]] = {
     "revolute": Revolute,
     "continuous": Revolute,
     "prismatic": Prismatic,
     "fixed": Fixed,
+    "planar": Planar,
+    "floating": Free,
+    "spherical": Spherical,
 }
+"""The types of URDF, and that of the ball joints of Bullet."""
 UNIT_LENGTH = 1e-3
 """Maximum deviation of an axis's length from 1 without a finding."""
 UNLIMITED = 1e9
@@ -37,28 +41,53 @@ def joint_type_of(element: Element) -> str:
     """The type of a joint. Raises ``FormatError`` for types that are not supported."""
     kind = element.required("type", ", ".join(JOINT_KINDS))
     if kind not in JOINT_KINDS:
-        freedoms_of_types = {"floating": 6, "planar": 3, "spherical": 3, "ball": 3}
-        freedoms = f" with {freedoms_of_types[kind]} degrees of freedom" if kind in freedoms_of_types else ""
         raise element.error(
-            f"the joint is of type '{kind[:40]}'{freedoms}, which is not supported",
+            f"the joint is of type '{kind[:40]}', which is not a type of URDF",
             allowed=", ".join(JOINT_KINDS),
-            fix="replace it by a fixed joint, or by a chain of joints with one degree of freedom each",
+            fix="replace it by one of these types, or by a chain of them",
         )
     return kind
 
 
-def joint_of(element: Element, context: FileContext) -> tuple[Joint, Transform]:
-    """The joint of an element, and the pose of its frame in the parent link's frame."""
+class PlacedJoint(NamedTuple):
+    """A joint; ``before``: its frame in the parent link's frame; ``after``: the child link's frame in it."""
+
+    joint: Joint
+    before: Transform
+    after: Transform = Transform()
+
+
+def joint_of(element: Element, context: FileContext) -> PlacedJoint:
+    """The joint of an element, with its place.
+
+    A planar joint of URDF moves in the plane normal to its axis. The x and y axes of the plane are those of
+    the joint frame, rotated by the smallest rotation of z to the axis. A floating joint has no limits here.
+    """
     kind = joint_type_of(element)
     before = origin_of(element, context)
     if kind == "fixed":
-        return Fixed(), before
+        return PlacedJoint(Fixed(), before)
+    if kind in ("floating", "spherical"):
+        return PlacedJoint(JOINT_KINDS[kind](), before)
+    if kind == "planar":
+        to_axis = Transform(rotation=_z_to(_axis(element, context)))
+        return PlacedJoint(Planar(), before @ to_axis, to_axis.inverse())
     mimic = element.first("mimic")
     if mimic is not None:
         leader = mimic.attributes.get("joint", "")
         what = f"it mimics joint '{leader[:40]}'; here its coordinate is independent"
         note(context, MIMIC, mimic, what, element.label)
-    return JOINT_KINDS[kind](axis=_axis(element, context), limits=_limits(element, kind, context)), before
+    joint = JOINT_KINDS[kind](axis=_axis(element, context), limits=_limits(element, kind, context))
+    return PlacedJoint(joint, before)
+
+
+def _z_to(axis: Vector3) -> Matrix3:
+    """The smallest rotation of the z axis to a direction; about x for the opposite direction."""
+    x, y, z = Revolute(axis=axis).axis
+    sine = math.hypot(x, y)
+    if sine == 0.0:
+        return rotation_x(0.0 if z > 0 else math.pi)
+    return rotation_about((-y / sine, x / sine, 0.0), math.atan2(sine, z))
 
 
 def _axis(element: Element, context: FileContext) -> Vector3:

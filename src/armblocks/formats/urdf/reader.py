@@ -1,9 +1,9 @@
-"""Robots from URDF: a tree of links with joints of one degree of freedom.
+"""Robots from URDF: a tree of links.
 
 The frame of a URDF link is the frame of its joint. Therefore ``before`` of a link is the origin of the joint
-that carries it, and ``after`` is the identity. The root link is fixed to the base of the robot. Links are in
-depth-first order, the children of a link in the order of the joints in the file, so that the coordinates of a
-chain are consecutive.
+that carries it, and ``after`` is the identity; only a planar joint has another ``after``, if its axis is not
+z. The root link is fixed to the base of the robot. Links are in depth-first order, the children of a link in
+the order of the joints in the file, so that the coordinates of a chain are consecutive.
 
 Source: wiki.ros.org/urdf/XML, versions 1.0 to 1.2.
 """
@@ -17,7 +17,7 @@ from pathlib import PurePath
 from armblocks.errors import FormatError, RobotError, UnknownNameError
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.urdf.inertials import inertial_of
-from armblocks.formats.urdf.joints import Transmission, joint_of, motor_of, transmissions_of
+from armblocks.formats.urdf.joints import PlacedJoint, Transmission, joint_of, motor_of, transmissions_of
 from armblocks.formats.urdf.names import free_joint_name
 from armblocks.formats.urdf.rules import NAME, UNKNOWN
 from armblocks.formats.urdf.shapes import shapes_of
@@ -51,7 +51,7 @@ def read_urdf(data: bytes, file: str, context: FileContext) -> Robot:
     """The robot of a URDF file. ``file`` is its name in messages; findings are added to ``context``.
 
     Raises ``FormatError`` with file and line for XML that cannot be read, for numbers that are not finite,
-    for joints with several degrees of freedom, and for links that do not form one tree.
+    and for links that do not form one tree.
     """
     root = read_elements(data, file)
     return robot_of(expanded(data, file, context) if uses_xacro(root) else root, context)
@@ -207,16 +207,17 @@ def _link(
     transmissions: Mapping[str, Transmission],
     context: FileContext,
 ) -> Link:
-    kind, before = joint_of(joint, context) if joint is not None else (Fixed(), Transform())
+    placed = joint_of(joint, context) if joint is not None else PlacedJoint(Fixed(), Transform())
     motor = None
-    if joint is not None and kind.moves:
+    if joint is not None and placed.joint.moves:
         motor = motor_of(joint, transmissions.get(joint.attributes["name"].strip()), context)
     inertial = inertial_of(element, context)
     return Link(
         name=element.attributes["name"].strip(),
         parent=parent,
-        joint=kind,
-        before=before,
+        joint=placed.joint,
+        before=placed.before,
+        after=placed.after,
         mass=inertial.mass,
         centre_of_mass=inertial.centre,
         inertia=inertial.inertia,

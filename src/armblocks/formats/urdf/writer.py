@@ -8,6 +8,8 @@ pose of the base becomes the origin of the first joints, and offsets of coordina
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from armblocks.formats.file_findings import FileContext
@@ -16,6 +18,7 @@ from armblocks.formats.robot_writing import (
     free_name,
     inertial_in,
     joint_friction,
+    limits_of,
     numbers,
     quoted,
     warn,
@@ -24,16 +27,24 @@ from armblocks.formats.robot_writing import (
 )
 from armblocks.formats.urdf.joints import UNLIMITED
 from armblocks.formats.urdf.reader import read_urdf
-from armblocks.robot import Fixed, Link, Revolute, Robot
+from armblocks.robot import Fixed, Free, Joint, Link, Planar, Prismatic, Revolute, Robot
 from armblocks.robot.robot import STANDARD_GRAVITY
 from armblocks.robot.shapes import Box, Cylinder, Shape, Sphere
 from armblocks.spatial import Transform
+
+_KINDS: Mapping[type[Joint], str] = {
+    Revolute: "revolute",
+    Prismatic: "prismatic",
+    Fixed: "fixed",
+    Planar: "planar",
+    Free: "floating",
+}
 
 
 def write_urdf(robot: Robot) -> bytes:
     """The URDF of a robot. Reading it gives the same kinematics and dynamics up to rounding.
 
-    Raises ``FormatError`` for joints that are neither revolute, prismatic nor fixed. Warns of data that URDF
+    Raises ``FormatError`` for joint types that URDF does not have. Warns of data that URDF
     does not have: another gravity, the tip and the order of the coordinates of some trees, Coulomb friction
     that depends on the direction, friction that accelerates, meshes and housings.
     """
@@ -108,21 +119,21 @@ def _geometry(shape: Shape) -> str:
 
 
 def _joint_lines(robot: Robot, link: Link, root: str) -> list[str]:
-    check_joint(robot, link, "URDF")
+    check_joint(robot, link, _KINDS, "URDF")
     joint = link.joint
     parent = next((other for other in robot.links if other.name == link.parent), None)
     carried = robot.base if parent is None else parent.after
-    origin = carried @ link.before @ joint.motion(joint.offset)
-    kind = type(joint).__name__.lower()
-    if kind == "revolute" and joint.limits.position is None:
+    origin = carried @ link.before @ joint.motion(joint.neutral)
+    kind = _KINDS[type(joint)]
+    if kind == "revolute" and joint.coordinate_limits[0].position is None:
         kind = "continuous"
-    if not joint.moves:
-        origin = carried @ link.before
     name = quoted(f"{link.name}_joint", robot)
     lines = [f'  <joint name={name} type="{kind}">', *_ends(link.parent or root, link.name, robot)]
     lines.append(f"    {_origin(origin)}")
     if joint.moves:
-        lines += [f'    <axis xyz="{numbers(joint.axis)}"/>', f"    {_limit(link)}", *_dynamics(robot, link)]
+        axis = [] if kind == "floating" else [f'    <axis xyz="{numbers(joint.axis)}"/>']
+        limit = [f"    {_limit(link)}"] if joint.nv == 1 else []
+        lines += [*axis, *limit, *_dynamics(robot, link)]
     lines.append("  </joint>")
     motor = link.motor
     if joint.moves and motor is not None and (motor.gear_ratio, motor.inertia) != (1.0, 0.0):
@@ -139,7 +150,7 @@ def _joint_lines(robot: Robot, link: Link, root: str) -> list[str]:
 
 
 def _limit(link: Link) -> str:
-    limits = link.joint.limits
+    limits = limits_of(link)
     speed, torque = (UNLIMITED if value is None else value for value in (limits.speed, limits.torque))
     text = f'effort="{torque!r}" velocity="{speed!r}"'
     if limits.position is None and isinstance(link.joint, Revolute):

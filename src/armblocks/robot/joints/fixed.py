@@ -6,19 +6,15 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armblocks.robot.joints.joint import Joint
+from armblocks.robot.joints.motions import Motion
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fixed(Joint):
-    """A rigid connection to the parent, without a joint coordinate."""
+    """A rigid connection to the parent (a weld), without a joint coordinate."""
 
     letter: ClassVar[str] = "F"
-    unit: ClassVar[str] = ""
 
     @property
-    def angular(self) -> float:
-        return 0.0
-
-    @property
-    def linear(self) -> float:
-        return 0.0
+    def motions(self) -> tuple[Motion, ...]:
+        return ()

@@ -1,106 +1,161 @@
-"""The base class of joints: rotation about an axis, translation along it, or both."""
+"""The base class of joints."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar, Self
-
-import numpy as np
+from typing import ClassVar, Self, cast
 
 from armblocks.errors import RobotError, check_arguments
-from armblocks.robot.fields import check_kind, number, numbers
+from armblocks.robot.fields import check_kind, number
+from armblocks.robot.joints.limits import JointLimits
+from armblocks.robot.joints.motions import AxisMotion, Coordinate, Motion
 from armblocks.rounded_functions import hypot
-from armblocks.spatial import Transform, Vector3, rotation_about, vector3
-
-
-@dataclass(frozen=True, kw_only=True)
-class JointLimits:
-    """The limits of a joint; ``None`` if unknown.
-
-    ``position``: lowest and highest joint coordinate (rad or m). ``speed``: maximum magnitude (rad/s or m/s).
-    ``torque``: maximum magnitude at the joint side (N m or N).
-    """
-
-    position: tuple[float, float] | None = None
-    speed: float | None = None
-    torque: float | None = None
-
-    def __new__(cls, *values: object, **named: object) -> Self:
-        check_arguments(cls, values, named)
-        return super().__new__(cls)
-
-    def __post_init__(self) -> None:
-        if self.position is not None:
-            ends = np.atleast_1d(numbers(self.position, where="position limits of a joint"))
-            position = tuple(ends.ravel().tolist())
-            if len(position) != 2:
-                raise RobotError(
-                    f"the position limits are {len(position)} numbers",
-                    allowed="a pair, or None where unknown",
-                    where="joint limits",
-                    fix="give (lowest, highest)",
-                )
-            object.__setattr__(self, "position", position)
-        for name in ("speed", "torque"):
-            value = getattr(self, name)
-            if value is not None:
-                object.__setattr__(self, name, number(value, where=f"{name} limit of a joint"))
+from armblocks.spatial import Transform, Vector3, vector3
 
 
 @dataclass(frozen=True, kw_only=True)
 class Joint(ABC):
-    """A joint with at most one degree of freedom.
+    """A joint: a sequence of elementary motions from the parent to the link.
 
-    With ``s = q + offset`` the distal side rotates by ``angular s`` rad about ``axis`` and translates by
-    ``linear s`` m along it. ``axis`` is a unit vector in the joint frame; it is normalised here, and the
-    robot rejects a zero axis. ``offset`` (rad or m) is added to the joint coordinate.
+    Its coordinates q (nq,) are those of its motions, one after the other, and its speeds qd (nv,) as well.
+
+    ``axis``: the axis of its motion in the joint frame, a unit vector; it is normalised here, and the robot
+    rejects a zero axis. ``offset`` (rad or m) is added to the coordinate. ``limits``: those of every
+    coordinate, or a sequence with one entry for each entry of qd. A type has the parameters that
+    ``parameters`` lists; the others must keep their defaults. Raises RobotError.
     """
 
     axis: Vector3 = (0.0, 0.0, 1.0)
     offset: float = 0.0
-    limits: JointLimits = field(default_factory=JointLimits)
+    limits: JointLimits | tuple[JointLimits, ...] = field(default_factory=JointLimits)
 
     letter: ClassVar[str] = ""
-    """R, P or F, as in the toolbox's ``RRRRRR``."""
-    unit: ClassVar[str] = ""
-    """SI unit of the joint coordinate."""
+    """The letter of the type, as in the toolbox's ``RRRRRR``."""
+    parameters: ClassVar[tuple[str, ...]] = ("axis", "offset")
+    """The parameters of the type beside the limits, which are also its members in files."""
 
     def __new__(cls, *values: object, **named: object) -> Self:
         check_arguments(cls, values, named)
         return super().__new__(cls)
 
     def __post_init__(self) -> None:
-        axis = vector3(self.axis, where="axis of a joint")
-        length = hypot(*axis)
-        # An axis of unit length up to rounding is unchanged, so that an axis read from a file is the same.
-        if length > 0 and abs(length - 1) > 1e-15 and math.isfinite(length):
-            axis = (axis[0] / length, axis[1] / length, axis[2] / length)
-        object.__setattr__(self, "axis", axis)
+        object.__setattr__(self, "axis", unit_axis(self.axis))
         object.__setattr__(self, "offset", number(self.offset, where="offset of a joint"))
-        check_kind(self.limits, JointLimits, where="limits of a joint")
+        for name, default in (("axis", (0.0, 0.0, 1.0)), ("offset", 0.0)):
+            if name not in self.parameters and getattr(self, name) != default:
+                raise RobotError(
+                    f"a {type(self).__name__} joint has no {name}",
+                    where="joint",
+                    allowed=", ".join(self.parameters) or "no parameters",
+                    fix="put the constant rotation or translation into 'before' or 'after' of the link",
+                )
+        self._check_limits()
+
+    def _check_limits(self) -> None:
+        """Check the limits. A tuple of equal limits for all coordinates becomes that limit."""
+        given = cast("object", self.limits)
+        if not isinstance(given, JointLimits):
+            entries = cast("Sequence[JointLimits]", given if isinstance(given, tuple | list) else (given,))
+            for entry in entries:
+                check_kind(entry, JointLimits, where="limits of a joint")
+            if len(entries) != self.nv:
+                raise RobotError(
+                    f"{len(entries)} limits are given",
+                    where="limits of a joint",
+                    allowed=f"{self.nv} for a {type(self).__name__} joint, or one for all coordinates",
+                    fix="give JointLimits(), where nothing is known",
+                )
+            object.__setattr__(self, "limits", entries[0] if len(set(entries)) == 1 else tuple(entries))
+        axes = [isinstance(motion, AxisMotion) for motion in self.motions for _ in motion.speeds]
+        for coordinate, limits, has_axis in zip(self.speeds, self.coordinate_limits, axes):
+            if limits.position is not None and not has_axis:
+                raise RobotError(
+                    f"coordinate {coordinate.name} of a {type(self).__name__} joint has position limits",
+                    where="limits of a joint",
+                    allowed="limits of speed and torque: its position is a quaternion",
+                    fix="leave out the position limits",
+                )
 
     @property
     @abstractmethod
-    def angular(self) -> float:
-        """Angular part of the motion subspace: rotation (rad) about the axis per unit of the coordinate."""
+    def motions(self) -> tuple[Motion, ...]:
+        """The elementary motions, from the parent to the link; none for a rigid connection."""
 
     @property
-    @abstractmethod
-    def linear(self) -> float:
-        """Linear part of the motion subspace: translation (m) along the axis per unit of the coordinate."""
+    def positions(self) -> tuple[Coordinate, ...]:
+        """The entries of q."""
+        return tuple(entry for motion in self.motions for entry in motion.positions)
+
+    @property
+    def speeds(self) -> tuple[Coordinate, ...]:
+        """The entries of qd; their unit is that of the integral of the speed."""
+        return tuple(entry for motion in self.motions for entry in motion.speeds)
+
+    @property
+    def coordinate_limits(self) -> tuple[JointLimits, ...]:
+        """The limits that belong to each entry of qd."""
+        return self.limits if isinstance(self.limits, tuple) else (self.limits,) * self.nv
+
+    @property
+    def nq(self) -> int:
+        """Number of coordinates."""
+        return len(self.positions)
+
+    @property
+    def nv(self) -> int:
+        """Number of speeds: the degrees of freedom."""
+        return len(self.speeds)
+
+    @property
+    def neutral(self) -> tuple[float, ...]:
+        """Zero for each coordinate, 1 0 0 0 for a quaternion: the pose ``motion(neutral)`` has no offset."""
+        return tuple(value for motion in self.motions for value in motion.neutral)
 
     @property
     def moves(self) -> bool:
         """Whether the joint has a coordinate."""
-        return self.angular != 0 or self.linear != 0
+        return bool(self.motions)
 
-    def motion(self, s: float) -> Transform:
-        """The pose of the distal side in the joint frame at ``s = q + offset``."""
-        x, y, z = self.axis
-        shift = self.linear * s
-        return Transform(
-            rotation=rotation_about(self.axis, self.angular * s),
-            translation=(x * shift, y * shift, z * shift),
-        )
+    @property
+    def rotates(self) -> bool:
+        """Whether a motion of the joint changes the orientation."""
+        return any(not isinstance(motion, AxisMotion) or motion.angular != 0.0 for motion in self.motions)
+
+    @property
+    def translations(self) -> int:
+        """Number of motions that translate."""
+        return sum(isinstance(motion, AxisMotion) and motion.linear != 0.0 for motion in self.motions)
+
+    @property
+    def travel(self) -> tuple[float, float] | None:
+        """Lowest and highest translation along the axis within the limits, m, or None without limits.
+
+        The offset is included. Of several translations it is the first one with limits.
+        """
+        motions = [motion for motion in self.motions for _ in motion.speeds]
+        for motion, limits in zip(motions, self.coordinate_limits):
+            if isinstance(motion, AxisMotion) and motion.linear and limits.position is not None:
+                low, high = (motion.linear * (end + motion.offset) for end in limits.position)
+                return min(low, high), max(low, high)
+        return None
+
+    def motion(self, q: Sequence[float]) -> Transform:
+        """The pose of the distal side in the joint frame at the coordinates ``q`` (nq,), offset included."""
+        pose, first = Transform(), 0
+        for motion in self.motions:
+            count = len(motion.positions)
+            pose = pose @ motion.pose(q[first : first + count])
+            first += count
+        return pose
+
+
+def unit_axis(value: object) -> Vector3:
+    """An axis as a unit vector. An axis of unit length up to rounding is unchanged, zero as well."""
+    axis = vector3(value, where="axis of a joint")  # pyright: ignore[reportArgumentType] - checked there
+    length = hypot(*axis)
+    if length > 0 and abs(length - 1) > 1e-15 and math.isfinite(length):
+        axis = (axis[0] / length, axis[1] / length, axis[2] / length)
+    return axis

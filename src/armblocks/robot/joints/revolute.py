@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armblocks.robot.joints.joint import Joint
+from armblocks.robot.joints.motions import AxisMotion, Motion
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -13,12 +14,7 @@ class Revolute(Joint):
     """Rotation by q rad about the axis."""
 
     letter: ClassVar[str] = "R"
-    unit: ClassVar[str] = "rad"
 
     @property
-    def angular(self) -> float:
-        return 1.0
-
-    @property
-    def linear(self) -> float:
-        return 0.0
+    def motions(self) -> tuple[Motion, ...]:
+        return (AxisMotion(axis=self.axis, angular=1.0, offset=self.offset),)

@@ -48,7 +48,8 @@ class RobotScene:
     """Bodies, joints and size of a robot.
 
     ``reach`` (m) of the arm; ``foot`` (m): distance by which the bodies of the base extend below its frame.
-    ``rows`` is the number of poses: base, links and tool.
+    ``rows`` is the number of poses: base, links and tool. ``joints`` are those with one axis. ``rest``: the
+    coordinates q of the pose that is shown without motion.
     """
 
     name: str
@@ -57,3 +58,4 @@ class RobotScene:
     rows: int
     bodies: list[SceneBody]
     joints: list[SceneJoint]
+    rest: list[float]

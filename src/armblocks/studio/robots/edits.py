@@ -56,7 +56,7 @@ def _set_cell(edit: SetCell, robot: Robot) -> Robot:
     where = f"link '{link.name}', {column.title}"
     if why := column.locked(link):
         raise InputError("this cell cannot be edited", where=where, allowed=why, fix="edit another cell")
-    changed = column.write(link, _typed_value(column, link, edit, where, turns=bool(link.joint.angular)))
+    changed = column.write(link, _typed_value(column, link, edit, where, turns=link.joint.rotates))
     return replace(robot, links=tuple(changed if other is link else other for other in robot.links))
 
 

@@ -26,6 +26,18 @@ def _fixed_joint_reason(link: Link) -> str:
     return "" if link.joint.moves else _FIXED
 
 
+def _several_coordinates_reason(link: Link) -> str:
+    """Why a number that belongs to one coordinate cannot be edited in the table."""
+    if link.joint.nv > 1:
+        return f"a {type(link.joint).__name__.lower()} joint has several coordinates; edit its file"
+    return _fixed_joint_reason(link)
+
+
+def limits_of(link: Link) -> JointLimits:
+    """The limits of the joint's coordinate; of a joint with several coordinates, none."""
+    return link.joint.coordinate_limits[0] if link.joint.nv == 1 else JointLimits()
+
+
 def variable_of(link: Link) -> str:
     """The D-H parameter that is the joint coordinate: ``"theta"`` or ``"d"``; ``""`` without a D-H row."""
     return "" if link.dh is None else "d" if link.dh.sigma else "theta"
@@ -45,7 +57,7 @@ def with_row(link: Link, limits: JointLimits | None = None, **changes: object) -
         link.name,
         row,
         parent=link.parent,
-        limits=link.joint.limits if limits is None else limits,
+        limits=limits_of(link) if limits is None else limits,
         mass=link.mass,
         centre_of_mass=link.centre_of_mass,
         inertia=link.inertia,
@@ -91,19 +103,19 @@ def _with_offset(link: Link, value: Value) -> Link:
 
 
 def _with_limits(link: Link, **changes: object) -> Link:
-    limits = replace(link.joint.limits, **changes)  # pyright: ignore[reportArgumentType] - fields by name
+    limits = replace(limits_of(link), **changes)  # pyright: ignore[reportArgumentType] - fields by name
     return replace(link, joint=replace(link.joint, limits=limits))
 
 
 def _range_end(index: int, name: str, title: str, doc: str) -> Column[Link]:
     def read(link: Link) -> Value:
-        position = link.joint.limits.position
+        position = limits_of(link).position
         return None if position is None else position[index]
 
     def write(link: Link, value: Value) -> Link:
         if value is None:
             return _with_limits(link, position=None)
-        ends = list(link.joint.limits.position or (-abs(number_of(value)), abs(number_of(value))))
+        ends = list(limits_of(link).position or (-abs(number_of(value)), abs(number_of(value))))
         ends[index] = number_of(value)
         return _with_limits(link, position=tuple(ends))
 
@@ -117,7 +129,7 @@ def _range_end(index: int, name: str, title: str, doc: str) -> Column[Link]:
         group="Range",
         read=read,
         write=write,
-        locked=_fixed_joint_reason,
+        locked=_several_coordinates_reason,
     )
 
 
@@ -145,7 +157,7 @@ KINEMATICS: tuple[Column[Link], ...] = (
         group="D-H row",
         read=lambda link: link.joint.offset,
         write=_with_offset,
-        locked=_fixed_joint_reason,
+        locked=_several_coordinates_reason,
     ),
     _range_end(0, "lowest", "from", "lowest joint coordinate; empty if unknown"),
     _range_end(1, "highest", "to", "highest joint coordinate; empty if unknown"),
@@ -157,9 +169,9 @@ KINEMATICS: tuple[Column[Link], ...] = (
         unit="rad/s, m/s",
         optional=True,
         group="Maximum",
-        read=lambda link: link.joint.limits.speed,
+        read=lambda link: limits_of(link).speed,
         write=lambda link, value: _with_limits(link, speed=value),
-        locked=_fixed_joint_reason,
+        locked=_several_coordinates_reason,
     ),
     Column(
         name="torque",
@@ -168,9 +180,9 @@ KINEMATICS: tuple[Column[Link], ...] = (
         unit="N m",
         optional=True,
         group="Maximum",
-        read=lambda link: link.joint.limits.torque,
+        read=lambda link: limits_of(link).torque,
         write=lambda link, value: _with_limits(link, torque=value),
-        locked=_fixed_joint_reason,
+        locked=_several_coordinates_reason,
     ),
 )
 

@@ -24,8 +24,9 @@ _NAMED_FRACTION = 0.1
 
 def readings(arm: Arm, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> Readings:
     """Compute all read-outs at ``q, qd, qdd`` (rad, m and per second) with the compiled kernels."""
-    for name, values in (("q", q), ("qd", qd), ("qdd", qdd)):
-        _check_count(arm.robot, name, values)
+    n = arm.robot.n
+    for name, values, count in (("q", q, arm.robot.nq), ("qd", qd, n), ("qdd", qdd, n)):
+        _check_count(arm.robot, name, values, count)
     T, J = arm.fkine(q), arm.jacob0(q)
     pose = Transform.from_matrix(T)
     return Readings(
@@ -36,17 +37,17 @@ def readings(arm: Arm, q: Sequence[float], qd: Sequence[float], qdd: Sequence[fl
         manipulability=float(arm.manipulability(q)),
         gravload=arm.gravload(q).tolist(),
         torque=arm.rne(q, qd, qdd).tolist(),
-        singular=singularity(J, arm.robot.joint_names, reach(arm.robot)),
+        singular=singularity(J, [entry.name for entry in arm.robot.speeds], reach(arm.robot)),
         limits=limit_warnings(arm.robot, q, qd, arm.rne(q, qd, qdd)),
     )
 
 
-def _check_count(robot: Robot, name: str, values: Sequence[float]) -> None:
-    if len(values) != robot.n:
+def _check_count(robot: Robot, name: str, values: Sequence[float], count: int) -> None:
+    if len(values) != count:
         raise InputError(
             f"{len(values)} numbers were given for {name}",
             where=f"robot '{robot.name}'",
-            allowed=f"{robot.n}, one for each joint",
+            allowed=f"{count}, one for each joint",
             fix="give one number for each joint",
         )
 
@@ -98,12 +99,12 @@ def limit_warnings(
 ) -> list[str]:
     """Describe the joints outside their range, or beyond their speed or torque limits."""
     texts: list[str] = []
-    for link, position, speed, torque in zip(robot.moving_links, q, qd, tau.tolist()):
-        limits = link.joint.limits
-        if limits.position and not limits.position[0] <= position <= limits.position[1]:
-            texts.append(f"{link.name} is outside its range")
+    entries = zip(robot.speeds, robot.limits, robot.position_of_speed, qd, tau.tolist())
+    for (name, _), limits, index, speed, torque in entries:
+        if limits.position and index is not None and not limits.position[0] <= q[index] <= limits.position[1]:
+            texts.append(f"{name} is outside its range")
         if limits.speed is not None and abs(speed) > limits.speed:
-            texts.append(f"{link.name} exceeds its speed limit")
+            texts.append(f"{name} exceeds its speed limit")
         if limits.torque is not None and abs(torque) > limits.torque:
-            texts.append(f"{link.name} exceeds its torque limit")
+            texts.append(f"{name} exceeds its torque limit")
     return texts

@@ -41,8 +41,8 @@ def scene_of(robot: Robot) -> RobotScene:
             SceneJoint(
                 name=link.name,
                 row=rows[link.name],
-                turns=bool(link.joint.angular),
-                limits=link.joint.limits.position,
+                turns=link.joint.rotates,
+                limits=link.joint.coordinate_limits[0].position,
                 carrier=rows[link.parent],
                 frame=(link.before @ _z_along_axis(link)).matrix.ravel().tolist(),
                 moving=(link.after.inverse() @ _z_along_axis(link)).matrix.ravel().tolist(),
@@ -50,8 +50,16 @@ def scene_of(robot: Robot) -> RobotScene:
                 radius=radii[link.name],
             )
             for link in robot.moving_links
+            if link.joint.nv == 1
         ],
+        rest=_rest(robot),
     )
+
+
+def _rest(robot: Robot) -> list[float]:
+    """The neutral coordinates, moved into the joint limits."""
+    low, high = robot.qlim.T
+    return np.clip(robot.neutral, low, high).tolist()
 
 
 def _z_along_axis(link: Link) -> Transform:
@@ -65,12 +73,12 @@ def _z_along_axis(link: Link) -> Transform:
 
 def link_frames_of(robot: Robot, q: Sequence[float]) -> list[list[list[float]]]:
     """Poses of base, links and tool at ``q``, (L+2, 4, 4); raises ``InputError`` for a wrong length."""
-    if len(q) != len(robot.moving_links):
+    if len(q) != robot.nq:
         raise InputError(
             f"{len(q)} joint coordinates were given",
             where=f"robot '{robot.name}'",
-            allowed=f"{len(robot.moving_links)}, one for each joint",
-            fix="give one number for each joint",
+            allowed=f"{robot.nq}, one for each coordinate",
+            fix="give one number for each coordinate",
         )
     return link_frames(robot, q).tolist()
 

@@ -60,7 +60,7 @@ def _row(link: Link) -> robot_messages.LinkRow:
     return robot_messages.LinkRow(
         name=link.name,
         parent=link.parent,
-        turns=bool(link.joint.angular),
+        turns=link.joint.rotates,
         moves=link.joint.moves,
         variable=variable_of(link),
         cells={name: column.read(link) for name, column in LINK_COLUMNS.items()},

@@ -1,0 +1,45 @@
+"""The limits of a joint coordinate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from armblocks.errors import RobotError, check_arguments
+from armblocks.robot.fields import number, numbers
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointLimits:
+    """The limits of a joint coordinate; ``None`` if unknown.
+
+    ``position``: lowest and highest joint coordinate (rad or m). ``speed``: maximum magnitude (rad/s or m/s).
+    ``torque``: maximum magnitude at the joint side (N m or N).
+    """
+
+    position: tuple[float, float] | None = None
+    speed: float | None = None
+    torque: float | None = None
+
+    def __new__(cls, *values: object, **named: object) -> Self:
+        check_arguments(cls, values, named)
+        return super().__new__(cls)
+
+    def __post_init__(self) -> None:
+        if self.position is not None:
+            ends = np.atleast_1d(numbers(self.position, where="position limits of a joint"))
+            position = tuple(ends.ravel().tolist())
+            if len(position) != 2:
+                raise RobotError(
+                    f"the position limits are {len(position)} numbers",
+                    allowed="a pair, or None where unknown",
+                    where="joint limits",
+                    fix="give (lowest, highest)",
+                )
+            object.__setattr__(self, "position", position)
+        for name in ("speed", "torque"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, number(value, where=f"{name} limit of a joint"))
