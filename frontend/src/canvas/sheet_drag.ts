@@ -148,6 +148,8 @@ export function dropHandlers(
     const type = event.dataTransfer.getData(BLOCK_TYPE)
     if (!type) return
     event.preventDefault()
+    // The next keys, such as undo, belong to the sheet, not to the search field of the library.
+    if (document.activeElement instanceof HTMLInputElement) document.activeElement.blur()
     const point = flow.screenToFlowPosition({ x: event.clientX, y: event.clientY }, { snapToGrid: false })
     const segment = wireAt(point, edges, wires)
     setTargetWire(null)
