@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -13,47 +12,13 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
+from browsers import FIREFOX_NAMES, SCRIPTS, SharedBrowser, allow_clipboard, installed
 from crashed_disk import Disk
-from firefox_bidi import firefox_path
 from playwright._impl._api_structures import SetCookieParam
-from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, expect
 
 from interruptible import start_interruptible
 
-DISABLED_FEATURES = (
-    # The browser's own address bar: Chromium loads two pages for its suggestions into every new window, which
-    # takes as much processor time as the front end of the studio.
-    "WebUIOmniboxPopup",
-    "WebUIOmniboxAimPopup",
-    # The features that Playwright disables; Chromium reads only the last of two lists.
-    "AvoidUnnecessaryBeforeUnloadCheckSync",
-    "DestroyProfileOnBrowserClose",
-    "HttpsUpgrades",
-    "HttpsFirstBalancedModeAutoEnable",
-    "LensOverlay",
-    "MediaRouter",
-    "PaintHolding",
-    "ThirdPartyStoragePartitioning",
-    "AvoidCorsURLLoaderRestartOnRedirect",
-    "OptimizationHints",
-    "NetworkTimeServiceQuerying",
-    "AimEnabled",
-    "PreconnectToSearch",
-)
-"""Features of Chromium that no journey needs."""
-FLAGS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    f"--disable-features={','.join(DISABLED_FEATURES)}",
-]
 TOUR_SEEN = "if (location.protocol === 'http:') localStorage.setItem('armblocks-tour-seen', 'yes')"
 """Disables the tour; pages outside the studio (about:blank) have no local storage."""
 NO_RENDERING = """
@@ -65,7 +30,6 @@ work. Shaders are compiled, and a shader error is reported on the console."""
 TIMEOUT_MS = 180_000
 """Time limit of waiting for the page, ms; sufficient for a busy computer."""
 expect.set_options(timeout=TIMEOUT_MS)
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
 class Studio:
@@ -119,29 +83,6 @@ class Studio:
         finally:
             assert self.process.stdout is not None
             self.process.stdout.close()
-
-
-class SharedBrowser:
-    """One browser for all journeys of a process, because a start takes seconds."""
-
-    def __init__(self) -> None:
-        self._browser: Browser | None = None
-        self._stack = ExitStack()
-
-    def opened(self) -> Browser:
-        """Return the browser; start it if it is not running."""
-        if self._browser is None:
-            path = next((command for name in BROWSERS if (command := shutil.which(name))), None)
-            assert path is not None, f"install one of {', '.join(BROWSERS)} (apt-get install chromium)"
-            playwright = self._stack.enter_context(sync_playwright())
-            self._browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
-            self._stack.callback(self._browser.close)
-        return self._browser
-
-    def close(self) -> None:
-        """Close the browser and its event loop."""
-        self._browser = None
-        self._stack.close()
 
 
 SHARED_BROWSER = SharedBrowser()
@@ -222,7 +163,7 @@ def new_context(browser: Browser) -> BrowserContext:
         viewport={"width": 1280, "height": 720}, color_scheme="light", reduced_motion="reduce"
     )
     context.set_default_timeout(TIMEOUT_MS)
-    for script in (TOUR_SEEN, NO_RENDERING):
+    for script in (TOUR_SEEN, NO_RENDERING, *SCRIPTS):
         context.add_init_script(script)
     return context
 
@@ -232,7 +173,7 @@ def watched(browser: Browser, address: str) -> Generator[Page]:
     """A page of the shared studio whose console must not report errors."""
     context = new_context(browser)
     SHARED_STUDIO.log_in(context)
-    context.grant_permissions(["clipboard-read", "clipboard-write"])
+    allow_clipboard(context)
     page = context.new_page()
     faults: list[str] = []
 
@@ -274,6 +215,7 @@ def sheet(shared: Page) -> Page:
     """The shared page with a fresh copy of the example."""
     from building import open_fresh_example
 
+    shared.bring_to_front()  # in Firefox only the page in front has the focus
     open_fresh_example(shared)
     return shared
 
@@ -287,5 +229,5 @@ def pytest_sessionfinish() -> None:
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Firefox is optional, but the summary reports that its tests were skipped."""
-    if firefox_path() is None:
+    if installed(FIREFOX_NAMES) is None:
         terminalreporter.write_line("Firefox is not installed: its tests were skipped.", yellow=True)

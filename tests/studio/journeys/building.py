@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable
 
+from browsers import IN_FIREFOX
 from playwright.sync_api import Locator, Page, expect
 
 from conftest import TIMEOUT_MS
@@ -27,6 +28,15 @@ VIEW_IS_STILL = """async () => {
     const before = view()
     for (let k = 0; k < 3; k++) await new Promise((resolve) => requestAnimationFrame(resolve))
     return view() === before
+}"""
+DROP_ENTRY = """(entry, [target, x, y]) => {
+    const dataTransfer = new DataTransfer()
+    const { left, top } = target.getBoundingClientRect()
+    const values = { dataTransfer, bubbles: true, cancelable: true, clientX: left + x, clientY: top + y }
+    entry.dispatchEvent(new DragEvent('dragstart', values))
+    const below = document.elementFromPoint(left + x, top + y)
+    for (const kind of ['dragenter', 'dragover', 'drop']) below.dispatchEvent(new DragEvent(kind, values))
+    entry.dispatchEvent(new DragEvent('dragend', values))
 }"""
 IS_UPPERMOST = """(element) => {
     const { x, y, width, height } = element.getBoundingClientRect()
@@ -94,12 +104,30 @@ def add(page: Page, typed: str, *, by_key: bool = True) -> None:
     expect(box).to_be_hidden()
 
 
+def drop_entry(entry: Locator, target: Locator, x: float, y: float) -> None:
+    """Drop an entry of the library on an element, at a position relative to it, px."""
+    if IN_FIREFOX:  # BiDi starts a drag, but does not end it
+        entry.evaluate(DROP_ENTRY, [target.element_handle(), x, y])
+    else:
+        entry.drag_to(target, target_position={"x": x, "y": y})
+
+
+def double_click(element: Locator, *, force: bool = False) -> None:
+    """Click twice. ``force``: do not wait until the element is uppermost."""
+    if IN_FIREFOX:  # counts the clicks within one command of BiDi only
+        for _ in range(2):
+            element.click(force=force)
+        element.dispatch_event("dblclick", {"bubbles": True, "cancelable": True, "detail": 2})
+    else:
+        element.dblclick(force=force)
+
+
 def drag_from_library(page: Page, kind: str, x: float, y: float) -> None:
     """Drop a block with the mouse at a position of the canvas, px."""
     library = page.locator(".palette")
     library.get_by_role("textbox", name="Search the library").fill(kind)
     target = page.locator(".canvas")  # an empty one has examples on it
-    library.locator(f'.kind[data-type="{kind}"]').drag_to(target, target_position={"x": x, "y": y})
+    drop_entry(library.locator(f'.kind[data-type="{kind}"]'), target, x, y)
     library.get_by_role("button", name="Clear the search").click()
 
 

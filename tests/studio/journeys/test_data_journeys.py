@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from building import double_click
 from playwright.sync_api import Page, expect
 
 from conftest import Studio
@@ -42,7 +43,7 @@ def test_a_dropped_table_and_a_trusted_function(studio: Studio, open_studio: Cal
     page.get_by_placeholder("Add a block: type its name").fill("Python Function")
     page.keyboard.press("Enter")
     block = page.locator(".react-flow__node", has_text="Python Function")
-    block.dblclick()
+    double_click(block)
     dialog.get_by_placeholder("Choose a file").fill("law")
     page.get_by_role("option", name="law.py").click()
     expect(dialog.get_by_label("Source of law.py")).to_contain_text("return u * v")

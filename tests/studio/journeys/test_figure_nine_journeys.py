@@ -12,6 +12,7 @@ from building import (
     DIALOG,
     add,
     block,
+    double_click,
     drag_from_library,
     expect_focus_inside,
     expect_no_faults,
@@ -106,7 +107,7 @@ def test_figure_9_is_built_with_the_mouse(page: Page, folder: Path) -> None:
         drag_from_library(page, kind, x, y)
     expect(page.locator(".react-flow__node")).to_have_count(len(BLOCKS))
     for name, values in VALUES:
-        block(page, name).dblclick()
+        double_click(block(page, name))
         dialog = page.locator(DIALOG)
         for parameter, text in values.items():
             if parameter == "robot":

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from browsers import needs_webgl
 from building import wait_until
 from PIL import Image
 from playwright.sync_api import Browser, ConsoleMessage, FrameLocator, Page, Route, expect
@@ -91,6 +92,7 @@ def shown(point: np.ndarray) -> str:
     return "   ".join(texts).replace("-", "−") + " m"
 
 
+@needs_webgl
 def test_the_widgets_of_a_result_share_their_time_cursor(notebook: Page) -> None:
     notebook.add_init_script(NO_RENDERING)
     diagram = ab.load_diagram("kr180model")
@@ -134,6 +136,7 @@ def test_the_widgets_of_a_result_share_their_time_cursor(notebook: Page) -> None
         expect(page).to_have_attribute("data-mantine-color-scheme", "light")
 
 
+@needs_webgl
 def test_a_robot_widget_shows_the_given_configuration(notebook: Page) -> None:
     notebook.set_viewport_size({"width": 240, "height": 240})  # software rendering
     puma = ab.load_robot("puma560")

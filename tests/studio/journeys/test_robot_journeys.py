@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from accessibility import axe
+from browsers import IN_FIREFOX, needs_webgl
 from playwright.sync_api import Locator, Page, expect
 
 import armblocks as ab
@@ -51,7 +52,8 @@ def open_shipped(page: Page, name: str) -> Locator:
     page.get_by_role("button", name="Menu").click()
     page.get_by_role("menuitem", name=name, exact=True).click()
     editor = page.locator(".robot-editor")
-    expect(editor.locator("canvas")).to_be_visible()
+    if not IN_FIREFOX:  # which has no WebGL without a graphics card
+        expect(editor.locator("canvas")).to_be_visible()
     return editor
 
 
@@ -108,6 +110,7 @@ def test_a_robot_is_edited_marked_undone_saved_and_reopened(page: Page, folder: 
     expect(page.locator(".react-flow__node").first).to_be_visible()
 
 
+@needs_webgl
 def test_the_script_of_the_paper_is_dropped_viewed_and_exported(page: Page) -> None:
     drop(page, "kr180.m", PRINTED.read_bytes())
     editor = page.locator(".robot-editor")
@@ -149,8 +152,7 @@ def test_the_script_of_the_paper_is_dropped_viewed_and_exported(page: Page) -> N
 def test_the_robot_of_a_block_is_edited_and_axe_finds_no_violations(page: Page) -> None:
     page.get_by_role("button", name="Menu").click()
     page.get_by_role("menuitem", name=re.compile("^kr180model (?!not saved)[A-Za-z]")).click()
-    panel = page.get_by_role("toolbar", name="Robot view")
-    panel.get_by_role("button", name="Edit this robot").click()
+    page.get_by_role("button", name="Edit this robot").click()
     editor = page.locator(".robot-editor")
     expect(editor.get_by_role("region", name="Jacobian")).to_be_visible()
     axe(page, ".robot-editor")

@@ -11,6 +11,8 @@ from building import (
     block,
     choose_in_menu,
     copied_names,
+    double_click,
+    drop_entry,
     edge,
     middle,
     run,
@@ -114,13 +116,13 @@ def test_blocks_are_commented_out_and_through_by_key(sheet: Page) -> None:
 
 def test_a_double_click_on_a_wire_names_its_signal(sheet: Page) -> None:
     wire = edge(sheet, "x2/y -> x1/u").locator(".segment").first
-    wire.dblclick(force=True)
+    double_click(wire, force=True)
     field = sheet.get_by_role("textbox", name="Name of the signal of x2/y")
     expect(field).to_be_focused()
     field.fill("PID")
     field.press("Enter")
     expect(sheet.locator(".notices")).to_contain_text("like the block 'PID'")
-    wire.dblclick(force=True)
+    double_click(wire, force=True)
     field.fill("velocity")
     field.press("Enter")
     expect(sheet.locator(".signal-name")).to_have_text("velocity")
@@ -156,9 +158,8 @@ def test_a_block_dropped_on_a_wire_is_inserted_into_it(sheet: Page) -> None:
     x, y = middle(segment)
     pane = sheet.locator(".canvas").bounding_box()
     assert pane is not None
-    sheet.locator('.kind[data-type="Saturation"]').drag_to(
-        sheet.locator(".canvas"), target_position={"x": x - pane["x"], "y": y - pane["y"]}
-    )
+    entry = sheet.locator('.kind[data-type="Saturation"]')
+    drop_entry(entry, sheet.locator(".canvas"), x - pane["x"], y - pane["y"])
     expect(edge(sheet, "x2/y -> Saturation/u")).to_have_count(1)
     expect(edge(sheet, "Saturation/y -> x1/u")).to_have_count(1)
     expect(wires).to_have_count(count + 1)
@@ -274,14 +275,14 @@ def test_a_mask_is_created_used_renamed_and_undone(sheet: Page) -> None:
     dialog.get_by_role("button", name="OK", exact=True).click()
     expect(dialog).to_be_hidden()
     expect(subsystem.locator("svg")).to_contain_text("Viscous")
-    subsystem.dblclick()
+    double_click(subsystem)
     field = dialog.get_by_role("textbox", name="d N s/m")
     expect(field).to_have_value("0.25")
     expect(dialog).to_contain_text("damping coefficient")
     field.fill("0.5")
     dialog.get_by_role("button", name="Apply").click()
     dialog.get_by_role("button", name="Look under the mask").click()
-    block(sheet, "damping").dblclick()
+    double_click(block(sheet, "damping"))
     dialog.get_by_role("textbox", name="gain").fill("2*d")
     expect(dialog.get_by_text("= 1", exact=True)).to_be_visible()
     dialog.get_by_role("button", name="OK", exact=True).click()
@@ -452,7 +453,7 @@ def test_the_value_axis_of_a_scope_is_zoomed_panned_and_reset(sheet: Page) -> No
     sheet.keyboard.press("Control+Enter")
     expect(sheet.locator(".run-state")).to_contain_text("done", ignore_case=True)
     chart = sheet.locator('.chart[data-view="Scope"]')
-    block(sheet, "Scope").dblclick()
+    double_click(block(sheet, "Scope"))
     expect(chart).to_have_class(re.compile("marked"))
     expect(sheet.get_by_role("dialog")).to_be_hidden()
     axis = sheet.locator(".chart .values-axis").first
@@ -480,7 +481,7 @@ def test_the_value_axis_of_a_scope_is_zoomed_panned_and_reset(sheet: Page) -> No
     sheet.mouse.move(x, y)
     sheet.mouse.wheel(0, 100)
     expect(show_all).to_be_visible()
-    axis.dblclick()
+    double_click(axis)
     expect(show_all).to_have_count(0)
 
 
@@ -559,7 +560,7 @@ def test_every_block_of_the_library_is_dropped_opened_and_saved(sheet: Page, sha
     entries = sheet.locator(".palette .kind")
     expect(entries).to_have_count(len(BLOCKS))
     # The first block with mouse input, all others with synthetic events.
-    entries.first.drag_to(sheet.locator(".canvas"), target_position={"x": 300, "y": 200})
+    drop_entry(entries.first, sheet.locator(".canvas"), 300, 200)
     nodes = sheet.locator(".react-flow__node")
     expect(nodes).to_have_count(1)
     sheet.keyboard.press("Control+z")

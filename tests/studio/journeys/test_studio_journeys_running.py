@@ -41,6 +41,7 @@ def opened(open_studio: Callable[[str], Page], studio: Studio) -> Opened:
     def opening(diagram: ab.Diagram) -> Page:
         file = f"{diagram.name}.json"
         ab.save_diagram(diagram, studio.folder / file)
+        page.bring_to_front()
         page.keyboard.press("Escape")
         page.keyboard.press("Control+o")
         dialog = page.locator(DIALOG)
