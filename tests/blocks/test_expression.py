@@ -133,7 +133,7 @@ def test_messages_name_the_position_and_a_fix() -> None:
         evaluate(Expression(formula="u[u]"), U)
     with pytest.raises(DiagramError, match=r"atan2 is called with 1 argument, .*Allowed: 2"):
         evaluate(Expression(formula="atan2(u)"), U)
-    with pytest.raises(DiagramError, match=r"the function 'sin' has no arguments"):
+    with pytest.raises(DiagramError, match=r"the function 'sin' is called without arguments"):
         evaluate(Expression(formula="sin"), U)
     with pytest.raises(InputError, match=r"function handles \('@'\) are not supported"):
         evaluate(Expression(formula="u @ u"), U)

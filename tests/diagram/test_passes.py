@@ -40,7 +40,7 @@ class Junction(Block):
     virtual: ClassVar[bool] = True
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what enters"),)
+        return (Port("u", "the input"),)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("left", "the input"), Port("right", "the input"))

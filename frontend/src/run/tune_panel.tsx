@@ -84,7 +84,7 @@ export function TunePanel() {
       {count > 0 && (
         <Group gap="xs" className="tried">
           <Text size="xs" c="dimmed" flex={1}>
-            {count === 1 ? 'One value is' : `${count} values are`} tried, and not in the model.
+            {count === 1 ? 'One tried value is' : `${count} tried values are`} not saved in the model.
           </Text>
           <Button
             size="compact-xs"

@@ -60,7 +60,7 @@ def own_clock(block: Block) -> SampleClock | None:
 
 @dataclass(frozen=True)
 class Sampling:
-    """The clocks of a diagram, fastest first, and the number of the clock of each sampled block."""
+    """The clocks of a diagram, fastest first, and the index of the clock of each sampled block."""
 
     clocks: tuple[SampleClock, ...]
     clock_of: Mapping[str, int]
@@ -73,8 +73,8 @@ def resolve_sampling(diagram: Diagram, equations: Mapping[str, BlockEquations]) 
     states. Of several clocks it inherits the fastest, if all other periods are multiples of it. If only
     constants are upstream, the block inherits the clock of the sampled blocks downstream.
 
-    Raises ``DiagramError`` for a block without a clock upstream or downstream, and for clocks that are not
-    multiples.
+    Raises ``DiagramError`` for a block without a clock upstream or downstream, and for clocks whose periods
+    are not multiples of the fastest period.
     """
     sampled = [name for name in diagram.blocks if diagram.clocked(name)]
     if not sampled:
@@ -189,7 +189,7 @@ def _on_loops(successors: Mapping[str, Iterable[str]]) -> set[str]:
 def _nearest_sources(
     sources: Mapping[str, Source], successors: Mapping[str, Iterable[str]]
 ) -> Mapping[str, set[tuple[str, Source]]]:
-    """The nearest sources of the sample time of each block; a source hides those upstream of it."""
+    """The nearest sources of the sample time of each block; the search ends at each source."""
     reach: dict[str, set[tuple[str, Source]]] = {name: set() for name in successors}
     queue: deque[str] = deque()
     for name, source in sources.items():

@@ -90,7 +90,7 @@ def linearize(
     :func:`simulate`.
 
     Modes (a limiter at its limit) are constant. A diagram with sample times gives a discrete system with the
-    common period of all clocks and held inputs. Explicit time is constant.
+    common period of all clocks and held inputs. The time t in equations is constant.
 
     Raises ``UnknownNameError`` and ``InputError`` for invalid names, ``SimulationError`` if a signal of the
     run or a derivative is not finite.

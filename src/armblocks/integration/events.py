@@ -24,7 +24,8 @@ ITERATIONS_TOGETHER, MAX_ITERATIONS_PER_MODE = 8, 32
 """Mode iteration changes all inconsistent modes together in the first ``ITERATIONS_TOGETHER`` iterations plus
 one for each mode. It ends after ``MAX_ITERATIONS_PER_MODE`` iterations for each mode."""
 START_ITERATIONS = 400
-"""Resets at the start of a run, beside one for each guard, within which loops of sampled values converge."""
+"""The maximum number of resets at the start of a run is this number plus the number of guards. Loops of
+sampled values converge within it."""
 
 
 class Events:
@@ -57,7 +58,7 @@ class Events:
         """At the start of the run, apply resets without events until states and modes are consistent.
 
         A mode may change a signal on which another mode depends. The reset is therefore repeated until
-        nothing changes, but at most ``START_ITERATIONS`` times and once for each guard.
+        nothing changes. The maximum number is ``START_ITERATIONS`` plus the number of guards.
         """
         f, r, workspace = self.frame, self.frame.r, self.frame.workspace
         counter, fired = Count.AT_START, f.vector(workspace.fired)

@@ -117,7 +117,7 @@ def range_of(first: float, step: float, last: float) -> NDArray[np.float64]:
         return np.zeros((1, 0))
     steps = (last - first) / step
     if not (math.isfinite(step) and math.isfinite(steps)):
-        raise MismatchError("the steps do not lead to the last number")
+        raise MismatchError("the number of steps is not finite")
     # As in MATLAB: a last number within rounding belongs to the range, and the upper half of the elements is
     # counted from the end (MathWorks, "How does the COLON operator work?").
     tolerance = 2.0 * 2.0**-52 * max(abs(first), abs(last))
@@ -249,12 +249,15 @@ FUNCTIONS_OF_ARRAYS: Mapping[str, Function] = {
     "trace": array_function("A", "The sum of the diagonal.", ARRAYS, _trace),
     "numel": array_function("x", "The number of elements.", ARRAYS, _count(lambda m, n: m * n)),
     "length": array_function(
-        "x", "The larger of rows and columns.", ARRAYS, _count(lambda m, n: max(m, n) if m * n else 0)
+        "x",
+        "The larger of the numbers of rows and columns.",
+        ARRAYS,
+        _count(lambda m, n: max(m, n) if m * n else 0),
     ),
     "size": array_function(
         "x, k",
-        "Rows and columns, in formulas those of a column for vectors; `size(A, 1)` is the number of rows, "
-        "`size(A, 2)` that of columns.",
+        "The numbers of rows and columns; in formulas a vector counts as a column. `size(A, 1)` is the "
+        "number of rows, `size(A, 2)` that of columns.",
         ARRAYS,
         _size,
         optional=1,

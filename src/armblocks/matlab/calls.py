@@ -54,7 +54,7 @@ def _check_count(location: Location, name: str, function: Function, count: int) 
         return
     if count == 0:
         raise location.error(
-            f"the function '{name}' has no arguments", allowed=f"{name}({function.arguments})"
+            f"the function '{name}' is called without arguments", allowed=f"{name}({function.arguments})"
         )
     minimum, maximum = function.min_arguments, function.max_arguments
     allowed = f"{minimum}" if minimum == maximum else f"{minimum} to {maximum}"

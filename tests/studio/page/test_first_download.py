@@ -1,4 +1,4 @@
-"""The size of the first download of the page stays below its limit."""
+"""The size of the first download of the front end stays below its limit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The list of keys contains every key that the page handles, under the place where it is handled."""
+"""The list of keys contains every key that the front end handles, under the place where it is handled."""
 
 from __future__ import annotations
 

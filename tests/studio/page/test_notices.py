@@ -1,4 +1,4 @@
-"""The page contains the licences of all its packages."""
+"""The front end contains the licences of all its packages."""
 
 import json
 import re

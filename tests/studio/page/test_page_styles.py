@@ -1,4 +1,4 @@
-"""The page imports the style sheet of each component that it uses."""
+"""The front end imports the style sheet of each component that it uses."""
 
 from __future__ import annotations
 

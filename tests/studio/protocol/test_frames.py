@@ -1,4 +1,4 @@
-"""Samples sent to a page: all of them, or the extreme values of a long run."""
+"""Samples sent to a client: all of them, or the extreme values of a long run."""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ def _translations(point: _Array, directions: _Array) -> _Array:
 class Motion(NamedTuple):
     """The motion that mates leave: ``freedoms``; if there is one, its kind, a point of its axis and the axis.
 
-    ``kind`` is ``None`` for a screw and for other freedoms than 0 and 1.
+    ``kind`` is ``None`` for a screw and for other degrees of freedom than 0 and 1.
     """
 
     freedoms: int
