@@ -33,8 +33,8 @@ export const KEYS: KeyGroup[] = [
     sources: ['canvas/pointer_drag.ts', 'canvas/subsystem_preview.tsx'],
     keys: [
       ['Shift+drag', 'Disconnect a block and connect its neighbours'],
-      ['Ctrl+drag, right drag', 'Duplicate blocks at the pointer; from a line: branch'],
-      ['right click, Menu key', 'Commands on a block, line, port, chart, the sheet or the arm'],
+      ['Ctrl+drag, right drag', 'Duplicate blocks at the pointer; from a wire: branch'],
+      ['right click, Menu key', 'Commands on a block, wire, port, chart, the sheet or the arm'],
       ['Alt while dragging', 'Do not align the block with others'],
       ['drag a corner', 'Resize the selected block'],
       ['drag from a port', 'Draw a wire; on the empty sheet add a block at its end'],
@@ -96,7 +96,7 @@ export const KEYS: KeyGroup[] = [
     ],
   },
   {
-    title: 'Time line',
+    title: 'Timeline',
     sources: ['run/timeline.tsx'],
     keys: [
       ['Space', 'Play or pause the playback'],

@@ -40,7 +40,7 @@ class Placement:
 
     ``width`` and ``height`` ``None``: chosen by the drawing code. ``flipped``: inputs on the right.
     ``rotation``: degrees clockwise, one of 0, 90, 180 and 270, after the flip. ``name_side``: the side of the
-    name, one of ``NAME_SIDES``; ``auto`` chooses a side without ports, also in place of a side with ports.
+    name, one of ``NAME_SIDES``; for ``auto``, or a side with ports, the drawing uses a side without ports.
     ``colour``: the background, one of ``BLOCK_COLOURS``. Raises ``DiagramError`` for other values.
     """
 
@@ -156,7 +156,7 @@ class Diagram:
     logged: tuple[PortRef, ...] = ()
     """Outputs that are logged without a Scope: each gets a separate view."""
     gates: Mapping[str, Gate] = field(default_factory=dict[str, Gate])
-    """For a flat diagram, by block: see :mod:`armblocks.diagram.conditional_equations`."""
+    """The gates of each block of a flat diagram, see :mod:`armblocks.diagram.conditional_equations`."""
     mask: tuple[Parameter, ...] = ()
     mask_values: Mapping[str, Value] = field(default_factory=dict[str, Value])
     link: str = ""

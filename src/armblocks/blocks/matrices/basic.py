@@ -34,7 +34,7 @@ class CrossProduct(Block):
     title: ClassVar[str] = "Cross Product"
     sign: ClassVar[FaceSign] = Words("u × v")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The product of a vector that rotates in the xy plane and the z axis lags by 90 degrees.",
+        shows="A vector rotates in the xy plane. Its product with the z axis lags by 90 degrees.",
         inputs={
             "u": driver("SineWave", amplitude=(1.0, 1.0, 0.0), phase=(pi / 2, 0.0, 0.0)).named("turning"),
             "v": driver("Constant", value=(0.0, 0.0, 1.0)),
