@@ -238,3 +238,18 @@ def test_a_loop_through_the_corner_of_a_norm_is_solved() -> None:
     result = ab.simulate(builder.build(), stop_time=4.0)
     assert set(np.round(result["level"], 12).tolist()) == {-1.0, 0.0, 1.0}
     assert result["norm"] == pytest.approx(np.abs(result["level"]) / np.sqrt(0.91), abs=1e-12)
+
+
+@pytest.mark.parametrize("gain", [0.7, 2.0, 1e3, 1e6])
+def test_a_saturation_in_a_loop_reaches_its_limits(gain: float) -> None:
+    """``y = clip(K (r - y), -1, 1)`` is ``clip(K r / (1 + K), -1, 1)``, also at the limits themselves."""
+    builder = DiagramBuilder("limited follower")
+    sine = builder.add("sine", SineWave(amplitude=2.0 + 2.0 / gain, frequency=3.0))
+    error = builder.add("error", Sum(signs="+-"), sine)
+    amplified = builder.add("K", Gain(gain=gain), error)
+    y = builder.add("y", Saturation(lower=-1.0, upper=1.0), amplified)
+    builder.connect(y, error["u2"])
+    builder.add("integral", Integrator(), y)
+    result = ab.simulate(builder.build(), stop_time=5.0, sample_time=0.01)
+    expected = np.clip(gain / (1.0 + gain) * result["sine"], -1.0, 1.0)
+    np.testing.assert_allclose(result["y"], expected, atol=1e-12)

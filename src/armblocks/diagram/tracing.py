@@ -168,6 +168,8 @@ class Tracing:
         if value.node.group == HELD:
             held = self.symbols.discrete[f"{value.node.block}/{value.name}"]
             return SX.zeros(held.numel()) if value.node.order else held
+        if value in self.unknowns:
+            return self.unknowns[value]
         known = self._values.get(value.node, {}).get((value.kind, value.name))
         if known is not None:
             return known
@@ -181,7 +183,9 @@ class Tracing:
         """The residual of each unknown."""
         return vertcat(
             *[
-                self._residuals[value] if value in self._residuals else self.value(value) - unknown
+                self._residuals[value]
+                if value in self._residuals
+                else self._values[value.node][value.kind, value.name] - unknown
                 for value, unknown in self.unknowns.items()
             ]
         )
