@@ -6,6 +6,7 @@
     ├── InputError            a call was given a wrong shape, dtype, value or option
     ├── UnknownNameError      an unknown name; suggests the nearest known names
     ├── RobotError            a robot description that contradicts itself
+    │   └── AssemblyError     no configuration satisfies the constraints
     ├── DiagramError          a diagram that cannot be built
     │   └── AlgebraicLoopError
     ├── FormatError           a file that cannot be read or written (file:line)
@@ -151,6 +152,28 @@ def check_type(
 
 class RobotError(ArmblocksError):
     """A robot description that is inconsistent, or lacks data that the call needs."""
+
+
+class AssemblyError(RobotError):
+    """No configuration near a guess satisfies the constraints of a robot, as far as the search found.
+
+    ``q`` are the coordinates of the best configuration; ``gaps`` has the remaining gap of each constraint in
+    words.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        where: str,
+        allowed: str,
+        fix: str,
+        q: Sequence[float] = (),
+        gaps: Mapping[str, str] | None = None,
+    ) -> None:
+        super().__init__(what, where=where, allowed=allowed, fix=fix)
+        self.q = tuple(q)
+        self.gaps = dict(gaps or {})
 
 
 class DiagramError(ArmblocksError):

@@ -56,30 +56,39 @@ def _in_parent(inertia: RigidInertia, joint: JointMotion) -> RigidInertia:
     return RigidInertia(inertia.mass, joint.to_parent(inertia.first), second).shifted(joint.p)
 
 
-def solve_factored(tree: KinematicTree, M: SquareMatrix, right: Sequence[Scalar]) -> list[SX]:
-    """``x`` with ``M x = right``, all in the order of the bodies; ``M`` is symmetric positive definite.
+class FactoredInertia:
+    """The factors of the inertia matrix: ``M = L' D L``, in the order of the bodies.
 
-    ``M = L' D L``, factored from the tips to the base, so that entries that are zero between branches stay
-    zero. Source: Featherstone, *Rigid Body Dynamics Algorithms*, 6.5 (tables 6.3 and 6.4).
+    They are computed from the tips to the base, so that entries that are zero between branches stay zero.
+    Source: Featherstone, *Rigid Body Dynamics Algorithms*, 6.5 (tables 6.3 and 6.4).
     """
-    n = tree.n
-    H = [list(row) for row in M]
-    inverse_pivots: list[SX] = [SX(0.0)] * n
-    x = [SX(entry) for entry in right]
-    for k in reversed(range(n)):
-        ancestors = tree.ancestors(k)
-        # This is 1 / H[k][k]. With that expression CasADi would replace every product with it by a division.
-        inverse_pivots[k] = 2.0 / (SX(H[k][k]) + H[k][k])
-        factors = {i: H[k][i] * inverse_pivots[k] for i in ancestors}
-        for i in ancestors:
-            for j in (i, *tree.ancestors(i)):
-                H[i][j] = H[i][j] - factors[i] * H[k][j]
-            # Forward substitution with L' as soon as its row is known.
-            x[i] = x[i] - factors[i] * x[k]
-        for i in ancestors:
-            H[k][i] = factors[i]
-    for i in range(n):
-        x[i] = x[i] * inverse_pivots[i]
-        for j in tree.ancestors(i):
-            x[i] = x[i] - H[i][j] * x[j]
-    return x
+
+    def __init__(self, tree: KinematicTree, M: SquareMatrix) -> None:
+        n = tree.n
+        H = [list(row) for row in M]
+        self._ancestors = [tree.ancestors(k) for k in range(n)]
+        self._inverse_pivots: list[SX] = [SX(0.0)] * n
+        self._factors = H
+        for k in reversed(range(n)):
+            # This is 1 / H[k][k]. With that expression CasADi would replace every product with it by a
+            # division.
+            self._inverse_pivots[k] = 2.0 / (SX(H[k][k]) + H[k][k])
+            factors = {i: H[k][i] * self._inverse_pivots[k] for i in self._ancestors[k]}
+            for i in self._ancestors[k]:
+                for j in (i, *self._ancestors[i]):
+                    H[i][j] = H[i][j] - factors[i] * H[k][j]
+            for i in self._ancestors[k]:
+                H[k][i] = factors[i]
+
+    def solve(self, right: Sequence[Scalar]) -> list[SX]:
+        """``x`` with ``M x = right``, both in the order of the bodies."""
+        n = len(right)
+        x = [SX(entry) for entry in right]
+        for k in reversed(range(n)):
+            for i in self._ancestors[k]:
+                x[i] = x[i] - self._factors[k][i] * x[k]
+        for i in range(n):
+            x[i] = x[i] * self._inverse_pivots[i]
+            for j in self._ancestors[i]:
+                x[i] = x[i] - self._factors[i][j] * x[j]
+        return x

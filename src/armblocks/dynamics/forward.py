@@ -9,7 +9,7 @@ from casadi import SX, Function, horzcat, vertcat
 from numpy.typing import NDArray
 
 from armblocks.dynamics.aba import aba
-from armblocks.dynamics.crba import crba, solve_factored
+from armblocks.dynamics.crba import FactoredInertia, crba
 from armblocks.dynamics.joint_motion import joint_motions
 from armblocks.dynamics.rnea import Wrench, rnea
 from armblocks.errors import RobotError
@@ -44,7 +44,7 @@ def forward_dynamics(
     bias = rnea(tree, joints, qd, [0.0] * n, tree.gravity, on_bodies)
     order = [body.speed for body in tree.bodies]
     net_torque = [tau[j] - bias[j] for j in order]
-    solution = solve_factored(tree, crba(tree, joints), net_torque)
+    solution = FactoredInertia(tree, crba(tree, joints)).solve(net_torque)
     qdd: list[SX] = [SX(0.0)] * n
     for j, acceleration in zip(order, solution):
         qdd[j] = acceleration

@@ -14,7 +14,7 @@ from casadi import SX, if_else, logic_and, logic_or, mtimes, sign, vertcat
 from numpy.typing import NDArray
 
 from armblocks.dynamics.base_parameters import regrouped
-from armblocks.dynamics.crba import SquareMatrix, crba, solve_factored
+from armblocks.dynamics.crba import FactoredInertia, SquareMatrix, crba
 from armblocks.dynamics.forward import check_accelerations_exist
 from armblocks.dynamics.joint_motion import entries, joint_motions
 from armblocks.dynamics.loads import tip_wrench, with_payload
@@ -100,9 +100,8 @@ class JointEquations:
             [self._M[i][j] if i == j else self._M[i][j] * is_free[i] * is_free[j] for j in range(n)]
             for i in range(n)
         ]
-        solution = solve_factored(
-            self._tree, masked, [right[body.speed] * is_free[i] for i, body in enumerate(bodies)]
-        )
+        factored = FactoredInertia(self._tree, masked)
+        solution = factored.solve([right[body.speed] * is_free[i] for i, body in enumerate(bodies)])
         result = SX(n, 1)
         for body, value in zip(bodies, solution):
             result[body.speed] = value

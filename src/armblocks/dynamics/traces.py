@@ -20,6 +20,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from casadi import SX, jacobian, mtimes, vertcat
 
+from armblocks.dynamics.actuation import motor_torques
 from armblocks.dynamics.ball_joints import (
     difference,
     integrated,
@@ -28,6 +29,7 @@ from armblocks.dynamics.ball_joints import (
     structure_matrix,
 )
 from armblocks.dynamics.base_parameters import regrouped
+from armblocks.dynamics.constrained import constrained_motion, restoring_rates
 from armblocks.dynamics.crba import crba
 from armblocks.dynamics.energy import first_moment, kinetic_energy, potential_energy
 from armblocks.dynamics.forward import check_accelerations_exist, forward_dynamics
@@ -35,6 +37,7 @@ from armblocks.dynamics.friction import joint_friction, rotor_torques
 from armblocks.dynamics.jacobian import jacobian_matrix, tool_columns, world_columns, yoshikawa
 from armblocks.dynamics.joint_motion import entries, joint_motions
 from armblocks.dynamics.kinematics import body_poses, constant_pose, frame_pose
+from armblocks.dynamics.mechanism import Array
 from armblocks.dynamics.loads import PAYLOAD_SLOT, WRENCH_SLOT, tip_wrench, with_payload
 from armblocks.dynamics.rnea import rnea
 from armblocks.equations import Signature, TracedFunction, signature
@@ -106,7 +109,8 @@ def trace_rne(robot: Robot) -> TracedFunction:
     def equations(q: SX, qd: SX, qdd: SX) -> SX:
         rates, accelerations = entries(qd), entries(qdd)
         rigid = rnea(tree, joint_motions(tree, q), rates, accelerations, tree.gravity)
-        return _sum(rigid, rotor_torques(robot, accelerations), joint_friction(robot, rates))
+        torques = _sum(rigid, rotor_torques(robot, accelerations), joint_friction(robot, rates))
+        return _of_motors(tree, q, torques)
 
     return _trace("rne", robot, ("q", "qd", "qdd"), ("tau", (robot.n,), "N m"), equations)
 
@@ -121,7 +125,8 @@ def trace_rne_loaded(robot: Robot) -> TracedFunction:
         rigid = rnea(
             loaded, joint_motions(loaded, q), rates, accelerations, tree.gravity, tip_wrench(tree, wrench)
         )
-        return _sum(rigid, rotor_torques(robot, accelerations), joint_friction(robot, rates))
+        torques = _sum(rigid, rotor_torques(robot, accelerations), joint_friction(robot, rates))
+        return _of_motors(tree, q, torques)
 
     inputs = ("q", "qd", "qdd", "wrench", "payload")
     return _trace("rne", robot, inputs, ("tau", (robot.n,), "N m"), equations)
@@ -133,7 +138,8 @@ def trace_gravload(robot: Robot) -> TracedFunction:
 
     def equations(q: SX) -> SX:
         no_motion = [0.0] * tree.n
-        return _sum(rnea(tree, joint_motions(tree, q), no_motion, no_motion, tree.gravity))
+        torques = _sum(rnea(tree, joint_motions(tree, q), no_motion, no_motion, tree.gravity))
+        return _of_motors(tree, q, torques)
 
     return _trace("gravload", robot, ("q",), ("tau", (robot.n,), "N m"), equations)
 
@@ -197,6 +203,8 @@ def trace_accel(robot: Robot) -> TracedFunction:
     check_accelerations_exist(tree)
 
     def equations(q: SX, qd: SX, tau: SX) -> SX:
+        if robot.constraints:
+            return constrained_motion(tree, q, qd, tau).qdd
         rates = entries(qd)
         net_torque = _difference(entries(tau), joint_friction(robot, rates))
         return _sum(forward_dynamics(tree, q, rates, net_torque))
@@ -221,6 +229,26 @@ def trace_accel_loaded(robot: Robot) -> TracedFunction:
 
     inputs = ("q", "qd", "tau", "wrench", "payload")
     return _trace("accel", robot, inputs, ("qdd", (robot.n,), "rad/s2"), equations)
+
+
+def trace_constrained_motion(robot: Robot, near: Array | None = None) -> TracedFunction:
+    """The consistent state nearest to ``q``, ``qd``, its motion under ``tau``, and the rates of a run.
+
+    Outputs: ``q (nq,)``, ``qd (n,)``, ``qdd (n,)``; ``q_rates (nq,)``, ``qd_rates (n,)``: see
+    :func:`armblocks.dynamics.constrained.restoring_rates`. ``near``: coordinates near which the constraints
+    are assembled to find the independent relations.
+    """
+    tree = KinematicTree.of(robot)
+
+    def equations(q: SX, qd: SX, tau: SX) -> tuple[SX, ...]:
+        motion = constrained_motion(tree, q, qd, tau, near)
+        return (motion.q, motion.qd, motion.qdd, *restoring_rates(tree, q, qd, motion))
+
+    nq, n = (robot.nq,), (robot.n,)
+    outputs = signature(
+        ("q", nq, ""), ("qd", n, ""), ("qdd", n, ""), ("q_rates", nq, ""), ("qd_rates", n, "")
+    )
+    return TracedFunction.trace("constrained_motion", _inputs(robot, ("q", "qd", "tau")), outputs, equations)
 
 
 def trace_kinetic_energy(robot: Robot) -> TracedFunction:
@@ -321,6 +349,13 @@ TRACES: Mapping[str, Callable[[Robot], TracedFunction]] = {
     "normalised": trace_normalised,
 }
 """The trace functions by name: ``TRACES["rne"](robot)``."""
+
+
+def _of_motors(tree: KinematicTree, q: SX, torques: SX) -> SX:
+    """The torques of the motors of a robot with constraints; without constraints the torques themselves."""
+    if not tree.robot.constraints:
+        return torques
+    return _sum(motor_torques(tree, q, entries(torques)))
 
 
 def _trace(

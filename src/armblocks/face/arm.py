@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Protocol
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from armblocks.compiler import Kernel, OperationCount, cached_kernel
 from armblocks.compiler.arguments import check_count, in_order
 from armblocks.errors import InputError, UnknownNameError
+from armblocks.face.assembly import Assembly, assemble
 from armblocks.face.notebook_views import robot_view
 from armblocks.face.payload import Payload, payload_numbers
 from armblocks.robot import FrictionModel, Robot
@@ -220,6 +221,17 @@ class Arm:
     def position_rates(self) -> StateFunction:
         """``position_rates(q, qd)`` → dq/dt (nq,): ``qd`` itself, and the rates of quaternions."""
         return self._entry("position_rates")
+
+    def assemble(
+        self, q: ArrayLike | None = None, qd: ArrayLike | None = None, *, locked: Sequence[str] = ()
+    ) -> Assembly:
+        """Find the state near ``q`` (nq,), ``qd`` (n,) that satisfies the constraints of the robot.
+
+        By default ``q`` is the neutral configuration and ``qd`` is zero. The joints named in ``locked`` keep
+        their coordinates and speeds. Raises :class:`armblocks.errors.AssemblyError` that names the constraint
+        with the largest gap if no configuration near ``q`` satisfies all constraints.
+        """
+        return assemble(self.robot, q, qd, locked)
 
     # ---- dynamics ----------------------------------------------------------------------------------------
     @cached_property

@@ -18,8 +18,9 @@ from typing import cast
 
 import numpy as np
 
-from armblocks.errors import ArmblocksError, FormatError, RobotError
+from armblocks.errors import ArmblocksError, FormatError, RobotError, UnknownNameError
 from armblocks.formats.canonical_json import canonical_bytes
+from armblocks.formats.constraint_json import constraint_from_json, constraint_to_json
 from armblocks.formats.json_document import Node, closed_members, read_document
 from armblocks.formats.robot_facts import facts_from_json
 from armblocks.formats.shapes_json import shape_from_json, shape_to_json
@@ -54,6 +55,7 @@ _ROBOT_KEYS = (
     "gravity",
     "friction_model",
     "links",
+    "constraints",
 )
 _MASS_KEYS = ("mass", "centre_of_mass", "inertia")
 _LINK_KEYS = ("name", "parent", "dh", "joint", "before", "after", "limits", *_MASS_KEYS, "motor", "geometry")
@@ -86,6 +88,10 @@ def robot_from_json(node: Node) -> Robot:
     if "friction_model" in members:
         model = FrictionModel(members["friction_model"].choice([model.value for model in FrictionModel]))
     links = tuple(_link_from_json(member) for member in members["links"].elements())
+    constraints = tuple(
+        constraint_from_json(member, _transform_from_json)
+        for member in (members["constraints"].elements() if "constraints" in members else ())
+    )
     try:
         return Robot(
             name=texts["name"],
@@ -96,8 +102,9 @@ def robot_from_json(node: Node) -> Robot:
             tool=_transform_from_json(members["tool"]) if "tool" in members else Transform(),
             gravity=_vector_from_json(members["gravity"]) if "gravity" in members else STANDARD_GRAVITY,
             friction_model=model,
+            constraints=constraints,
         )
-    except RobotError as error:
+    except (RobotError, UnknownNameError) as error:
         raise FormatError(
             f"{error.where}: {error.what}", where=node.where, allowed=error.allowed, fix=error.fix
         ) from error
@@ -123,6 +130,10 @@ def robot_to_json(robot: Robot) -> dict[str, object]:
     for key in ("base", "tool"):
         if not getattr(robot, key).is_identity:
             document[key] = _transform_to_json(getattr(robot, key))
+    if robot.constraints:
+        document["constraints"] = [
+            constraint_to_json(constraint, _transform_to_json) for constraint in robot.constraints
+        ]
     return {key: _without_signed_zeros(value) for key, value in document.items()}
 
 

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from armblocks.errors import UnknownNameError, check_arguments
 from armblocks.lazy_exports import display_method
 from armblocks.robot.checks import check_robot
+from armblocks.robot.constraint_checks import check_constraints
+from armblocks.robot.constraints import Constraint
 from armblocks.robot.fields import pose
 from armblocks.robot.friction_model import FrictionModel
 from armblocks.robot.joints import Coordinate, Joint, JointLimits
@@ -28,8 +30,9 @@ class Robot:
     ``base`` pose of the base frame in the world; ``tool`` pose of the tool in the frame of the tip, which is
     the last link; both accept a (4, 4) matrix. ``gravity`` m/s2 in the world frame, the acceleration
     of a falling body (toolbox files have the opposite sign); ``friction_model`` see :class:`FrictionModel`.
-    The joint coordinates q (nq,) and speeds qd (nv,) are in the order of the moving links. A joint has the
-    name of its link.
+    ``constraints``: relations between the links beside the tree of joints, such as the closures of loops and
+    the couplings of joints. The joint coordinates q (nq,) and speeds qd (nv,) are in the order of the moving
+    links. A joint has the name of its link.
 
     Robots are values: two robots are equal and have the same hash if all their numbers and names are equal.
     ``source`` (the origin of the numbers) is not compared.
@@ -49,6 +52,7 @@ class Robot:
     tool: Transform = field(default_factory=Transform)
     gravity: Vector3 = STANDARD_GRAVITY
     friction_model: FrictionModel = FrictionModel.SQUARED_GEAR
+    constraints: tuple[Constraint, ...] = ()
     source: str = field(default="", compare=False)
 
     def __new__(cls, *values: object, **named: object) -> Self:
@@ -67,6 +71,8 @@ class Robot:
             {"base": self.base, "tool": self.tool},
             self.gravity,
         )
+        object.__setattr__(self, "constraints", tuple(self.constraints))
+        check_constraints(self.name, self.links, self.constraints)
 
     _repr_html_ = display_method("armblocks.face.notebook_views", "robot_view")
 

@@ -1,0 +1,323 @@
+"""Consistent configurations and degrees of freedom of robots with constraints, by numerical methods.
+
+``assembled`` finds coordinates that satisfy the constraints, ``mobility`` finds the degrees of freedom and
+the relations that follow from others.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from casadi import SX, Function, vertcat
+from numpy.typing import NDArray
+
+from armblocks.dynamics.ball_joints import integrated, normalised
+from armblocks.dynamics.constraint_equations import attached_frame, constraint_equations
+from armblocks.dynamics.joint_motion import entries
+from armblocks.dynamics.kinematics import body_poses, constant_pose, frame_pose
+from armblocks.errors import AssemblyError, RobotError, UnknownNameError
+from armblocks.robot.constraints import Closure, Constraint, LinearCombination, NoDisplacement, Perpendicular
+from armblocks.robot.robot import Robot
+from armblocks.robot.tree import KinematicTree
+from armblocks.spatial import Transform
+
+Array = NDArray[np.float64]
+
+RESIDUAL_TOLERANCE = 1e-12
+"""Largest residual of an assembled configuration: m, or cosine of an angle."""
+RANK_TOLERANCE = 1e-5
+"""Singular values below this fraction of the largest one count as zero.
+
+Near a singular configuration a smaller tolerance would count a direction in which the mechanism can almost
+move as locked. With 1e-9 Bricard's mechanism has no degree of freedom at inaccurate coordinates."""
+MAX_STEPS = 200
+"""Maximum number of steps from one start."""
+RESTARTS = 12
+"""Number of further starts, beside the guess."""
+MOTIONS = 6
+"""Number of configurations at which the rank of the Jacobian is determined."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mobility:
+    """The degrees of freedom of a robot with constraints.
+
+    ``degrees_of_freedom``: n minus the number of independent relations, at configurations in general.
+    ``instantaneous``: the same at the given configuration; it is larger at a singular configuration.
+    ``independent``: the indices of a largest set of independent relations, in the order of the constraints.
+    ``redundant``: the constraints of the other relations, by name, once for each relation.
+    """
+
+    degrees_of_freedom: int
+    instantaneous: int
+    independent: tuple[int, ...]
+    redundant: tuple[str, ...]
+
+    @property
+    def singular(self) -> bool:
+        """Whether the mechanism can move in more directions here than at other configurations."""
+        return self.instantaneous > self.degrees_of_freedom
+
+
+class Mechanism:
+    """The constraints of a robot as functions of numbers."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self.tree = tree = KinematicTree.of(robot)
+        q = SX.sym("q", robot.nq)
+        step = SX.sym("step", robot.nv)
+        equations = constraint_equations(tree, q)
+        self.names = equations.names
+        self.neutral = np.array([value for joint in robot.joints for value in joint.neutral])
+        self._evaluate = Function("constraints", [q], [equations.residual_vector, equations.jacobian])
+        moved = vertcat(*integrated(robot, entries(q), entries(step), 1.0))
+        self._move = Function("move", [q, step], [moved])
+        self._normalise = Function("normalise", [q], [vertcat(*normalised(robot, entries(q)))])
+        bodies = body_poses(tree, entries(q), constant_pose(Transform()))
+        ground = constant_pose(Transform())
+        self._closures = [c for c in robot.constraints if isinstance(c, Closure)]
+        poses = [
+            frame_pose(attached_frame(tree, end), bodies, ground).matrix()
+            for closure in self._closures
+            for end in (closure.first, closure.second)
+        ]
+        self._poses = Function("poses", [q], poses)
+
+    def residuals(self, q: Array) -> Array:
+        """The residuals (m,) at ``q`` (nq,)."""
+        return np.asarray(self._evaluate(q)[0].full())[:, 0]
+
+    def jacobian(self, q: Array) -> Array:
+        """J (m, n) at ``q`` (nq,)."""
+        return np.asarray(self._evaluate(q)[1].full())
+
+    def moved(self, q: Array, step: Array) -> Array:
+        """The coordinates after ``step`` (n,), a speed over unit time."""
+        return np.asarray(self._move(q, step).full())[:, 0]
+
+    def assembled(self, guess: Array, locked: Sequence[str] = ()) -> Array:
+        """Coordinates near ``guess`` that satisfy the constraints; the ``locked`` joints keep theirs.
+
+        Levenberg-Marquardt steps with the exact Jacobian; further starts near the guess if they end elsewhere
+        than at a solution. Raises AssemblyError with the constraint that has the largest gap, and
+        UnknownNameError for an unknown joint.
+        """
+        free = self._free_speeds(locked)
+        random = np.random.default_rng(0)
+        guess = np.asarray(self._normalise(guess).full())[:, 0]
+        best, smallest = guess, math.inf
+        for attempt in range(RESTARTS + 1):
+            start = guess
+            if attempt:
+                step = np.zeros(self.tree.n)
+                step[free] = random.normal(scale=0.1 * attempt, size=len(free))
+                start = self.moved(guess, step)
+            q = self._descend(start, free)
+            size = self._distance(q)
+            if size < smallest:
+                best, smallest = q, size
+            if size <= RESIDUAL_TOLERANCE:
+                return q
+        raise self._assembly_error(best, locked)
+
+    def consistent_speeds(self, q: Array, qd: Array, locked: Sequence[str] = ()) -> Array:
+        """The speeds nearest to ``qd`` (n,) that satisfy the constraints at ``q``.
+
+        The ``locked`` joints keep their speeds. Raises RobotError if these contradict the constraints.
+        """
+        free = self._free_speeds(locked)
+        J = self.jacobian(q)
+        change = np.zeros(self.tree.n)
+        rates = J @ qd
+        change[free] = -_least_squares(J[:, free], rates)
+        remaining = np.abs(J @ (qd + change))
+        if len(remaining) and remaining.max() > 1e-9 * max(1.0, float(np.abs(rates).max())):
+            worst = self.names[int(np.argmax(remaining))]
+            raise RobotError(
+                f"the speeds of the locked joints violate constraint '{worst}' "
+                f"by {remaining.max():.3g} per second",
+                where=f"robot '{self.robot.name}'",
+                allowed="speeds of locked joints that the constraints permit",
+                fix="lock fewer joints, at most as many as the mechanism has degrees of freedom",
+            )
+        return qd + change
+
+    def mobility(self, q: Array) -> Mobility:
+        """The degrees of freedom at and near an assembled configuration ``q``."""
+        jacobians = [self.jacobian(q), *(self.jacobian(other) for other in self._neighbours(q))]
+        ranks = [_rank(J) for J in jacobians]
+        rank = max(ranks)
+        independent = _independent_rows([J for J, r in zip(jacobians, ranks) if r == rank], rank)
+        others = [i for i in range(len(self.names)) if i not in independent]
+        return Mobility(
+            self.tree.n - rank,
+            self.tree.n - ranks[0],
+            tuple(independent),
+            tuple(self.names[i] for i in others),
+        )
+
+    def gaps(self, q: Array) -> dict[str, str]:
+        """The violation of each constraint at ``q`` in words: mm and degrees, or the unit of a coordinate."""
+        texts = {constraint.name: "" for constraint in self.robot.constraints}
+        for constraint in self.robot.constraints:
+            parts: list[str] = []
+            position, angle, other = self._gap(constraint, q)
+            if position is not None:
+                parts.append(f"{1000.0 * position:.4g} mm")
+            if angle is not None:
+                parts.append(f"{math.degrees(angle):.4g} deg")
+            if other is not None:
+                parts.append(f"{other:.4g} in its equation")
+            texts[constraint.name] = " and ".join(parts)
+        return texts
+
+    def _gap(self, constraint: Constraint, q: Array) -> tuple[float | None, float | None, float | None]:
+        """The violation of one constraint: distance (m), angle (rad), residual of a coupling."""
+        values = self.residuals(q)[[i for i, name in enumerate(self.names) if name == constraint.name]]
+        position: list[float] = []
+        angle: list[float] = []
+        other: list[float] = []
+        for relation, value in zip(constraint.relations, values.tolist()):
+            match relation:
+                case NoDisplacement():
+                    position.append(value)
+                case Perpendicular():
+                    angle.append(math.asin(max(-1.0, min(1.0, value))))
+                case LinearCombination():
+                    other.append(value)
+                case _:
+                    length = relation.length
+                    position.append(math.sqrt(max(0.0, length * length + 2.0 * length * value)) - length)
+        if isinstance(constraint, Closure) and angle and self._reversed_axes(constraint, q):
+            angle.append(math.pi)
+        return (
+            math.hypot(*position) if position else None,
+            max(map(abs, angle)) if angle else None,
+            max(map(abs, other)) if other else None,
+        )
+
+    def _distance(self, q: Array) -> float:
+        """The largest residual; infinite if a closure is assembled with a reversed axis."""
+        if any(self._reversed_axes(closure, q) for closure in self._closures):
+            return math.inf
+        return float(np.abs(self.residuals(q)).max(initial=0.0))
+
+    def _reversed_axes(self, closure: Closure, q: Array) -> bool:
+        """Whether an axis of the second frame is opposite to the same axis of the first frame."""
+        index = self._closures.index(closure)
+        poses = self._poses(q)
+        a, b = (np.asarray(pose.full()) for pose in poses[2 * index : 2 * index + 2])
+        return any(float(a[:3, axis] @ b[:3, axis]) < 0.0 for axis in closure.parallel_axes)
+
+    def _free_speeds(self, locked: Sequence[str]) -> list[int]:
+        """The indices in qd of the joints that are not locked."""
+        names = self.robot.joint_names
+        for name in locked:
+            if name not in names:
+                raise UnknownNameError("joint", name, names, where=f"robot '{self.robot.name}'")
+        return sorted(body.speed for body in self.tree.bodies if body.link not in locked)
+
+    def _descend(self, q: Array, free: list[int]) -> Array:
+        """The end of Levenberg-Marquardt steps from ``q``."""
+        residuals = self.residuals(q)
+        size, damping = float(residuals @ residuals), 1e-3
+        for _ in range(MAX_STEPS):
+            if np.abs(residuals).max(initial=0.0) <= 0.01 * RESIDUAL_TOLERANCE or damping > 1e12:
+                break
+            U, s, Vt = np.linalg.svd(self.jacobian(q)[:, free], full_matrices=False)
+            largest = float(s.max(initial=0.0))
+            if largest == 0.0:
+                break
+            # Directions that rounding alone constrains are left out of the nearly undamped last steps.
+            gains = np.where(
+                s > 1e-11 * largest, s / (s * s + damping * largest * largest * min(1.0, size)), 0.0
+            )
+            step = np.zeros(self.tree.n)
+            step[free] = -Vt.T @ (gains * (U.T @ residuals))
+            candidate = self.moved(q, step)
+            new = self.residuals(candidate)
+            new_size = float(new @ new)
+            if new_size < size:
+                q, residuals, size, damping = candidate, new, new_size, max(0.2 * damping, 1e-15)
+            else:
+                damping *= 8.0
+        return q
+
+    def _neighbours(self, q: Array) -> list[Array]:
+        """Assembled configurations near ``q``, by random motions in the directions that J permits."""
+        random = np.random.default_rng(1)
+        found: list[Array] = []
+        free = list(range(self.tree.n))
+        for k in range(MOTIONS):
+            J = self.jacobian(q)
+            step = random.normal(size=self.tree.n)
+            step -= _least_squares(J, J @ step)
+            length = float(np.linalg.norm(step))
+            if length < 1e-9:
+                break
+            other = self._descend(self.moved(q, (0.03 + 0.04 * k) / length * step), free)
+            if np.abs(self.residuals(other)).max(initial=0.0) <= RESIDUAL_TOLERANCE:
+                found.append(other)
+        return found
+
+    def _assembly_error(self, q: Array, locked: Sequence[str]) -> AssemblyError:
+        gaps = self.gaps(q)
+
+        def severity(constraint: Constraint) -> float:
+            return max(value or 0.0 for value in self._gap(constraint, q))
+
+        worst = max(self.robot.constraints, key=severity).name
+        keeping = f", with {', '.join(locked)} locked," if locked else ""
+        return AssemblyError(
+            f"no configuration near the guess{keeping} satisfies constraint '{worst}': "
+            f"a gap of {gaps[worst]} remains",
+            where=f"robot '{self.robot.name}'",
+            allowed="links whose lengths permit all constraints together",
+            fix="start from a nearer guess, lock fewer joints, or correct the frames of the constraint",
+            q=q.tolist(),
+            gaps=gaps,
+        )
+
+
+@lru_cache(maxsize=32)
+def mechanism(robot: Robot) -> Mechanism:
+    """The numerical functions of a robot's constraints; the last robots are cached."""
+    return Mechanism(robot)
+
+
+def _least_squares(A: Array, b: Array) -> Array:
+    """The shortest x that minimises |A x - b|, without singular values below ``RANK_TOLERANCE``."""
+    U, s, Vt = np.linalg.svd(A, full_matrices=False)
+    kept = s > RANK_TOLERANCE * s.max(initial=0.0)
+    return np.asarray(Vt[kept].T @ ((U[:, kept].T @ b) / s[kept]))
+
+
+def _rank(J: Array) -> int:
+    s = np.linalg.svd(J, compute_uv=False)
+    return int(np.sum(s > RANK_TOLERANCE * s.max(initial=0.0)))
+
+
+def _independent_rows(jacobians: Sequence[Array], rank: int) -> list[int]:
+    """``rank`` rows that are independent in all Jacobians.
+
+    Gram-Schmidt orthogonalisation with row exchange: the next row is the one with the largest smallest
+    remainder over all Jacobians.
+    """
+    remainders = [J.copy() for J in jacobians]
+    scale = [max(float(np.linalg.norm(row)) for row in J) if len(J) else 1.0 for J in jacobians]
+    chosen: list[int] = []
+    for _ in range(rank):
+        lengths = np.min([np.linalg.norm(R, axis=1) / s for R, s in zip(remainders, scale)], axis=0)
+        lengths[chosen] = -1.0
+        # Of nearly equal rows the first one is taken, so that rounding does not decide.
+        best = int(np.argmax(lengths > 0.9 * lengths.max()))
+        chosen.append(best)
+        for remainder in remainders:
+            direction = remainder[best] / np.linalg.norm(remainder[best])
+            remainder -= np.outer(remainder @ direction, direction)
+    return sorted(chosen)

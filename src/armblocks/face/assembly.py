@@ -1,0 +1,83 @@
+"""Consistent configurations of arms with constraints."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.errors import InputError
+from armblocks.robot import Robot
+from armblocks.robot.fields import numbers
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """A state that satisfies the constraints of a robot.
+
+    ``q`` (nq,) rad or m and ``qd`` (n,) rad/s or m/s. ``degrees_of_freedom``: of the mechanism at
+    configurations in general; ``instantaneous_mobility``: at ``q``, larger where q is singular.
+    ``redundant``: by constraint, how many of its equations follow from the others. ``residual``: the largest
+    residual, m or cosine of an angle.
+    """
+
+    q: Array
+    qd: Array
+    degrees_of_freedom: int
+    instantaneous_mobility: int
+    redundant: dict[str, int]
+    residual: float
+
+    @property
+    def singular(self) -> bool:
+        """Whether the mechanism can move in more directions at ``q`` than at other configurations."""
+        return self.instantaneous_mobility > self.degrees_of_freedom
+
+    def __str__(self) -> str:
+        dof = self.degrees_of_freedom
+        lines = [f"{dof} degree{'' if dof == 1 else 's'} of freedom, largest residual {self.residual:.1e}"]
+        if self.singular:
+            lines.append(f"singular: {self.instantaneous_mobility} degrees of freedom at this configuration")
+        for name, count in self.redundant.items():
+            equations = "equation follows" if count == 1 else "equations follow"
+            lines.append(f"constraint '{name}': {count} {equations} from the others")
+        return "\n".join(lines)
+
+
+def assemble(
+    robot: Robot, q: ArrayLike | None, qd: ArrayLike | None, locked: Sequence[str]
+) -> Assembly:
+    """The state near ``q`` and ``qd`` that satisfies the constraints, see :meth:`Arm.assemble`."""
+    from armblocks.dynamics.mechanism import mechanism
+
+    guess = robot.neutral if q is None else _vector(robot, "q", q, robot.nq)
+    speeds = np.zeros(robot.nv) if qd is None else _vector(robot, "qd", qd, robot.nv)
+    functions = mechanism(robot)
+    found = functions.assembled(guess, locked)
+    mobility = functions.mobility(found)
+    return Assembly(
+        q=found,
+        qd=functions.consistent_speeds(found, speeds, locked),
+        degrees_of_freedom=mobility.degrees_of_freedom,
+        instantaneous_mobility=mobility.instantaneous,
+        redundant=dict(Counter(mobility.redundant)),
+        residual=float(np.abs(functions.residuals(found)).max(initial=0.0)),
+    )
+
+
+def _vector(robot: Robot, name: str, value: ArrayLike, size: int) -> Array:
+    """Finite numbers (size,). Raises InputError."""
+    vector = numbers(value, where=f"{name} of robot '{robot.name}'")
+    if vector.shape != (size,) or not np.isfinite(vector).all():
+        raise InputError(
+            f"{name} has the shape {vector.shape}" if vector.shape != (size,) else f"{name} is not finite",
+            where=f"assemble, robot '{robot.name}'",
+            allowed=f"({size},), finite numbers",
+            fix="give one number for each coordinate",
+        )
+    return vector

@@ -1,0 +1,82 @@
+"""Constraints of robots as JSON: an object with ``type``, ``name`` and the fields of the type.
+
+The type is the class name in lower case with underscores: ``revolute_closure``, ``rod``, ``coupling``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import fields
+from typing import cast
+
+from armblocks.errors import RobotError
+from armblocks.formats.json_document import Node, closed_members
+from armblocks.robot.constraints import CONSTRAINT_TYPES, Attachment, Constraint
+from armblocks.spatial import Transform
+
+CONSTRAINT_NAMES = {re.sub(r"(?<!^)(?=[A-Z])", "_", kind.__name__).lower(): kind for kind in CONSTRAINT_TYPES}
+"""The types of constraints by their names in files."""
+
+
+def constraint_from_json(node: Node, transform_from_json: Callable[[Node], Transform]) -> Constraint:
+    """The constraint that a JSON object describes."""
+    known = sorted({field.name for kind in CONSTRAINT_TYPES for field in fields(kind)})
+    kind = CONSTRAINT_NAMES[
+        closed_members(node, ("type", *known), ("type",))["type"].choice(CONSTRAINT_NAMES)
+    ]
+    names = [field.name for field in fields(kind)]
+    members = closed_members(node, ("type", *names), ("type", "name"))
+    values: dict[str, object] = {}
+    for field in fields(kind):
+        if field.name not in members:
+            continue
+        member = members[field.name]
+        match field.type:
+            case "str":
+                values[field.name] = member.text()
+            case "Attachment":
+                values[field.name] = _attachment_from_json(member, transform_from_json)
+            case "float":
+                values[field.name] = member.number()
+            case _:
+                values[field.name] = tuple((name, entry.number()) for name, entry in member.members().items())
+    missing = [
+        name for name in ("first", "second", "length", "terms") if name in names and name not in values
+    ]
+    if missing:
+        raise node.error(
+            f"the constraint has no {missing[0]}", allowed=", ".join(names), fix=f"add '{missing[0]}'"
+        )
+    try:
+        return kind(**values)  # pyright: ignore[reportArgumentType] - by the fields of the type
+    except RobotError as error:
+        raise node.error(error.what, allowed=error.allowed, fix=error.fix) from error
+
+
+def constraint_to_json(
+    constraint: Constraint, transform_to_json: Callable[[Transform], dict[str, object]]
+) -> dict[str, object]:
+    """The JSON object that describes a constraint."""
+    kind = next(name for name, kind in CONSTRAINT_NAMES.items() if kind is type(constraint))
+    entry: dict[str, object] = {"type": kind}
+    for field in fields(constraint):
+        value = getattr(constraint, field.name)
+        if isinstance(value, Attachment):
+            frame: dict[str, object] = {"link": value.link}
+            if not value.pose.is_identity:
+                frame["pose"] = transform_to_json(value.pose)
+            entry[field.name] = frame
+        elif isinstance(value, tuple):
+            entry[field.name] = dict(cast("tuple[tuple[str, float], ...]", value))
+        elif field.name != "constant" or value != 0.0:
+            entry[field.name] = value
+    return entry
+
+
+def _attachment_from_json(node: Node, transform_from_json: Callable[[Node], Transform]) -> Attachment:
+    members = closed_members(node, ("link", "pose"), ("link",))
+    link = None if members["link"].value is None else members["link"].text()
+    return Attachment(
+        link=link, pose=transform_from_json(members["pose"]) if "pose" in members else Transform()
+    )

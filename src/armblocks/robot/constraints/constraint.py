@@ -1,0 +1,118 @@
+"""The base classes of constraints: relations between links beside those of the joints of the tree."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import ClassVar, Self
+
+from armblocks.errors import RobotError, check_arguments
+from armblocks.robot.constraints.relations import NoDisplacement, Perpendicular, Relation
+from armblocks.robot.fields import check_kind, pose
+from armblocks.spatial import Transform
+
+
+@dataclass(frozen=True, kw_only=True)
+class Attachment:
+    """A frame that is fixed to a link: ``pose`` in the frame of the link named ``link`` (None: the base).
+
+    ``pose`` may be a (4, 4) matrix.
+    """
+
+    link: str | None = None
+    pose: Transform = field(default_factory=Transform)
+
+    def __new__(cls, *values: object, **named: object) -> Self:
+        check_arguments(cls, values, named)
+        return super().__new__(cls)
+
+    def __post_init__(self) -> None:
+        where = f"pose of an attachment to {'the base' if self.link is None else f'link {self.link!r}'}"
+        object.__setattr__(self, "pose", pose(self.pose, where=where))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Constraint(ABC):
+    """Equations that the coordinates of a robot satisfy at all times, beside the tree of its joints.
+
+    ``name`` is unique in the robot. Each relation is one equation; equations that follow from others are
+    allowed, because the algorithms find and omit them.
+    """
+
+    name: str
+
+    title: ClassVar[str] = ""
+    """The name of the type in messages and files."""
+
+    def __new__(cls, *values: object, **named: object) -> Self:
+        check_arguments(cls, values, named)
+        return super().__new__(cls)
+
+    def __post_init__(self) -> None:
+        if not self.name:
+            raise RobotError(
+                f"a constraint of type {self.title} has no name",
+                allowed="a name that is not empty",
+                fix="name the constraint",
+                where="constraint",
+            )
+
+    @property
+    @abstractmethod
+    def relations(self) -> tuple[Relation, ...]:
+        """The equations."""
+
+    @property
+    def links(self) -> tuple[str | None, ...]:
+        """The links that the constraint names; None is the base."""
+        return ()
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The joints whose coordinates the constraint names."""
+        return ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Closure(Constraint):
+    """A joint between two links that closes a loop of the tree, described by the relations of two frames.
+
+    ``first`` and ``second``: frames on the two links. A subclass defines the relations of the frames.
+    """
+
+    first: Attachment
+    second: Attachment
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for end in (self.first, self.second):
+            check_kind(end, Attachment, where=f"constraint '{self.name}'")
+        if self.first.link == self.second.link:
+            raise RobotError(
+                "both frames are on the same link",
+                where=f"constraint '{self.name}'",
+                allowed="frames on two links, or on a link and the base",
+                fix="correct the link of one of the frames",
+            )
+
+    @property
+    def links(self) -> tuple[str | None, ...]:
+        return (self.first.link, self.second.link)
+
+    @property
+    def parallel_axes(self) -> Iterator[int]:
+        """The axes that have the same direction in both frames.
+
+        The relations alone would also accept the opposite direction.
+        """
+        crossed = {(r.first, r.second) for r in self.relations if isinstance(r, Perpendicular)}
+        for axis in range(3):
+            others = [other for other in range(3) if other != axis]
+            if all((other, axis) in crossed or (axis, other) in crossed for other in others):
+                yield axis
+
+    @property
+    def locks_position(self) -> bool:
+        """Whether the origins of the frames coincide."""
+        return sum(isinstance(relation, NoDisplacement) for relation in self.relations) == 3

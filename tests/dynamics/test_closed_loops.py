@@ -1,0 +1,188 @@
+"""Constraints and closed loops: against a formulation in maximal coordinates, references and closed forms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armblocks.dynamics import trace_constrained_motion, trace_rne
+from armblocks.dynamics.mechanism import Mechanism
+from armblocks.errors import AssemblyError, RobotError
+from armblocks.robot import Link, Motor, Revolute, Robot
+from armblocks.robot.constraints import (
+    Attachment,
+    Coupling,
+    RevoluteClosure,
+    Rod,
+)
+from armblocks.spatial import Transform, rotation_about, transl
+from maximal_coordinates import accelerations
+from mechanisms_for_tests import (
+    CLOSURES,
+    bricard,
+    four_bar,
+    parallelograms,
+    random_mechanism,
+    slider_crank,
+)
+
+SEEDS = range(2 * len(CLOSURES))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_accelerations_equal_those_in_maximal_coordinates(seed: int) -> None:
+    robot, q = random_mechanism(seed)
+    random = np.random.default_rng(seed)
+    mechanism = Mechanism(robot)
+    assert np.abs(mechanism.residuals(q)).max() < 1e-12
+    qd = mechanism.consistent_speeds(q, random.normal(size=robot.n))
+    tau = 3 * random.normal(size=robot.n)
+    consistent_q, consistent_qd, qdd, *_ = trace_constrained_motion(robot, near=q)(q, qd, tau)
+    expected = accelerations(robot, q, qd, tau)
+    assert consistent_q == pytest.approx(q, abs=1e-12)
+    assert consistent_qd == pytest.approx(qd, abs=1e-11)
+    assert qdd == pytest.approx(expected, abs=1e-10 * max(1.0, np.abs(expected).max()))
+
+
+@pytest.mark.parametrize("seed", SEEDS[:6])
+def test_motor_torques_cause_their_motion(seed: int) -> None:
+    """Joints that determine the others get motors; the torques of rne cause the given accelerations."""
+    robot, q = random_mechanism(seed)
+    mechanism = Mechanism(robot)
+    driven = driven_joints(mechanism, q)
+    for name in driven:
+        motor = Motor(inertia=1e-3, gear_ratio=10.0, viscous_friction=1e-3)
+        robot = robot.with_link(name, motor=motor)
+    mechanism = Mechanism(robot)
+    random = np.random.default_rng(seed)
+    qd = mechanism.consistent_speeds(q, random.normal(size=robot.n))
+    tau = np.where(np.isin(robot.joint_names, driven), 3 * random.normal(size=robot.n), 0.0)
+    qdd = trace_constrained_motion(robot, near=q)(q, qd, tau)[2]
+    assert trace_rne(robot)(q, qd, qdd)[0] == pytest.approx(tau, abs=1e-8)
+
+
+def driven_joints(mechanism: Mechanism, q: np.ndarray) -> list[str]:
+    """Joints, as many as degrees of freedom, whose speeds determine all others: columns left by pivoting."""
+    J = mechanism.jacobian(q)
+    rank = mechanism.tree.n - mechanism.mobility(q).degrees_of_freedom
+    dependent: list[int] = []
+    R = J.copy()
+    for _ in range(rank):
+        k = int(np.argmax(np.linalg.norm(R, axis=0)))
+        dependent.append(k)
+        direction = R[:, k] / np.linalg.norm(R[:, k])
+        R -= np.outer(direction, direction @ R)
+    names = mechanism.robot.joint_names
+    return [names[k] for k in range(len(names)) if k not in dependent]
+
+
+def test_the_degree_of_freedom_of_bricard_s_mechanism() -> None:
+    """Six joints minus five equations of the closure would leave 0; one equation follows from the others."""
+    robot = bricard()
+    mobility = Mechanism(robot).mobility(robot.neutral)
+    assert mobility.degrees_of_freedom == 1
+    assert mobility.redundant == ("last hinge",)
+
+
+def test_a_planar_loop_has_three_redundant_equations() -> None:
+    robot = four_bar()
+    mobility = Mechanism(robot).mobility(robot.neutral)
+    assert (mobility.degrees_of_freedom, mobility.instantaneous, mobility.singular) == (1, 1, False)
+    assert mobility.redundant == ("pin",) * 3
+
+
+def test_parallelograms_are_singular_when_flat() -> None:
+    robot = parallelograms(2)
+    mechanism = Mechanism(robot)
+    flat = robot.neutral
+    flat[:3], flat[3:] = -np.pi / 2, np.pi / 2
+    assert np.abs(mechanism.residuals(flat)).max() < 1e-12
+    mobility = mechanism.mobility(flat)
+    assert (mobility.degrees_of_freedom, mobility.singular) == (1, True)
+    assert mobility.instantaneous == 3
+
+
+@pytest.mark.parametrize("build", [four_bar, slider_crank, bricard])
+def test_assembly_finds_a_configuration_and_keeps_locked_joints(build: Callable[[], Robot]) -> None:
+    robot = build()
+    mechanism = Mechanism(robot)
+    guess = robot.neutral + 0.1
+    name = robot.joint_names[0]
+    q = mechanism.assembled(guess, locked=(name,))
+    assert q[0] == guess[0]
+    assert np.abs(mechanism.residuals(q)).max() < 1e-12
+
+
+def test_links_that_are_too_short_are_named_with_their_gap() -> None:
+    robot = four_bar()
+    far = Rod(
+        name="far", first=Attachment(), second=Attachment(link="crank", pose=transl(0.3, 0, 0)), length=0.5
+    )
+    with pytest.raises(AssemblyError) as failure:
+        Mechanism(replace(robot, constraints=(far,))).assembled(robot.neutral)
+    assert "constraint 'far'" in str(failure.value)
+    assert failure.value.gaps == {"far": "200 mm"}
+
+
+def test_an_assembly_with_a_reversed_axis_does_not_count() -> None:
+    """The z axes meet after a rotation by 180 degrees, too, but in opposite directions."""
+    link = Link(name="flap", joint=Revolute(axis=(1, 0, 0)))
+    hinge = RevoluteClosure(name="hinge", first=Attachment(), second=Attachment(link="flap"))
+    mechanism = Mechanism(Robot(name="flap", links=(link,), constraints=(hinge,)))
+    assert mechanism.assembled(np.array([3.0])) == pytest.approx([2 * np.pi], abs=1e-9) or (
+        mechanism.assembled(np.array([3.0])) == pytest.approx([0.0], abs=1e-9)
+    )
+
+
+def test_speeds_of_locked_joints_that_contradict_are_refused() -> None:
+    mechanism = Mechanism(four_bar())
+    with pytest.raises(RobotError, match="violate constraint 'pin'"):
+        mechanism.consistent_speeds(
+            np.zeros(3), np.array([1.0, 0.0, 0.0]), locked=("crank", "coupler", "rocker")
+        )
+
+
+def test_a_coupling_is_a_gear() -> None:
+    """Two discs with moments 1 and 2 kg m2, the second one three times as fast: the inertia is 1 + 9 * 2."""
+    discs = tuple(
+        Link(name=name, mass=1.0, inertia=(0, 0, moment)) for name, moment in (("a", 1.0), ("b", 2.0))
+    )
+    gear = Coupling(name="gear", terms=(("b", 1.0), ("a", -3.0)))
+    robot = Robot(name="gear", links=discs, constraints=(gear,))
+    _, _, qdd, *_ = trace_constrained_motion(robot)(np.zeros(2), np.zeros(2), np.array([1.0, 2.0]))
+    assert qdd == pytest.approx([7 / 19, 21 / 19])
+
+
+def test_a_state_far_from_the_constraints_has_no_motion() -> None:
+    """The result is NaN instead of wrong numbers."""
+    motion = trace_constrained_motion(four_bar())
+    assert np.isnan(motion(np.full(3, 2.0), np.zeros(3), np.zeros(3))[2]).all()
+
+
+def test_a_shaft_with_a_cardan_joint_has_its_ratio_of_speeds() -> None:
+    """tan(out) = tan(in) / cos(beta): the speeds differ by cos(beta) / (1 - sin²(beta) cos²(in))."""
+    beta = 0.5
+    shaft = Transform(rotation=rotation_about((0, 0, 1), beta))
+    links = (
+        Link(name="in", joint=Revolute(axis=(1, 0, 0)), inertia=(0.01, 0.02, 0.02)),
+        Link(name="cross", parent="in", joint=Revolute(axis=(0, 1, 0)), inertia=(5e-4, 3e-4, 3e-4)),
+        Link(name="out", parent="cross", inertia=(0.03, 0.02, 0.02)),
+    )
+    along_x = Transform(rotation=((0, 0, 1), (1, 0, 0), (0, 1, 0)))
+    bearing = RevoluteClosure(
+        name="bearing", first=Attachment(pose=shaft @ along_x), second=Attachment(link="out", pose=along_x)
+    )
+    mechanism = Mechanism(Robot(name="cardan", links=links, constraints=(bearing,)))
+    assert mechanism.mobility(mechanism.assembled(np.zeros(3))).degrees_of_freedom == 1
+    for angle in (0.0, 0.3, 1.2, 2.5):
+        q = mechanism.assembled(np.array([angle, 0.0, 0.0]), locked=("in",))
+        qd = mechanism.consistent_speeds(q, np.array([1.0, 0.0, 0.0]), locked=("in",))
+        axis = np.array(shaft.rotation)[:, 0]
+        x = np.array(rotation_about((1, 0, 0), q[0]))
+        y = x @ np.array(rotation_about((0, 1, 0), q[1]))
+        omega = qd[0] * np.eye(3)[0] + qd[1] * x[:, 1] + qd[2] * y[:, 2]
+        expected = np.cos(beta) / (1 - np.sin(beta) ** 2 * np.cos(angle) ** 2)
+        assert axis @ omega == pytest.approx(expected, abs=1e-12)
