@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armblocks.blocks.robots.ports import (
     check_joint_values,
+    check_no_constraints,
     check_start,
     coordinate_rates,
     normalised_coordinates,
@@ -122,6 +123,7 @@ class ArmPlant(Block):
     wrench_input: bool = parameter(False, doc="whether the block has an input for a force at the tip")
 
     def check(self) -> None:
+        check_no_constraints(self, self.robot)
         check_start(self, self.robot, "q0")
         for name in ("qd0", "breakaway", "stiffness", "damping"):
             check_joint_values(self, self.robot, name)

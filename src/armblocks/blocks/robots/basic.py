@@ -15,7 +15,9 @@ from numpy.typing import ArrayLike
 from armblocks import dynamics
 from armblocks.blocks.example_signals import position_of
 from armblocks.blocks.robots.ports import (
+    apply_all,
     apply_traced,
+    check_consistent_start,
     check_joint_values,
     check_start,
     coordinate_rates,
@@ -309,6 +311,7 @@ class ForwardDynamics(Block):
     def check(self) -> None:
         check_start(self, self.robot, "q0")
         check_joint_values(self, self.robot, "qd0")
+        check_consistent_start(self, self.robot, "q0", "qd0")
 
     def output_rate(self, port: str) -> str | None:
         return None if port == "q" and self.robot.nq != self.robot.nv else super().output_rate(port)
@@ -324,12 +327,21 @@ class ForwardDynamics(Block):
         return tuple(State(port.name, (len(port.names),), port.doc, port.unit) for port in (q, qd))
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        if self.robot.constraints:
+            q, qd, qdd, _, _ = self._constrained_motion(x, u)
+            return {"q": q, "qd": qd, "qdd": qdd}
         qdd = apply_traced(dynamics.trace_accel(self.robot), x["q"], x["qd"], u["tau"])
         return {"q": normalised_coordinates(self.robot, x["q"]), "qd": x["qd"], "qdd": qdd}
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        if self.robot.constraints:
+            _, _, _, q_rates, qd_rates = self._constrained_motion(x, u)
+            return {"q": q_rates, "qd": qd_rates}
         qdd = apply_traced(dynamics.trace_accel(self.robot), x["q"], x["qd"], u["tau"])
         return {"q": coordinate_rates(self.robot, x["q"], x["qd"]), "qd": qdd}
+
+    def _constrained_motion(self, x: Signals, u: Signals) -> tuple[SX, ...]:
+        return apply_all(dynamics.trace_constrained_motion(self.robot), x["q"], x["qd"], u["tau"])
 
     def initial_states(self, p: Signals) -> Signals:
         return {"q": start_coordinates(self.robot, p["q0"]), "qd": p["qd0"]}

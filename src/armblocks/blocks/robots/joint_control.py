@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from armblocks import dynamics
 from armblocks.blocks.robots.ports import (
     apply_traced,
+    check_no_constraints,
     check_speeds_are_rates,
     q_port,
     qd_port,
@@ -180,6 +181,7 @@ class ComputedTorque(Block):
     )
 
     def check(self) -> None:
+        check_no_constraints(self, self.robot)
         _check_gains(self, self.robot)
 
     def input_ports(self) -> tuple[Port, ...]:

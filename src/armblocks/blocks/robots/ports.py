@@ -8,16 +8,26 @@ from numpy.typing import NDArray
 
 from armblocks import dynamics
 from armblocks.diagram import Block, Port, rate_unit, shape_of
+from armblocks.dynamics.mechanism import mechanism
 from armblocks.equations import TracedFunction, flatten, unflatten
 from armblocks.errors import InputError
 from armblocks.robot import Robot
 
+MAX_START_RESIDUAL = 1e-6
+"""Largest residual of a start state that counts as consistent: m, or cosine of an angle, also per second."""
+
 
 def apply_traced(traced: TracedFunction, *values: SX) -> SX:
     """The result of a traced robot function for other symbols, as an array of its natural shape."""
+    (result,) = apply_all(traced, *values)
+    return result
+
+
+def apply_all(traced: TracedFunction, *values: SX) -> tuple[SX, ...]:
+    """All results of a traced robot function for other symbols, each in its natural shape."""
     flat = [flatten(value, slot.shape) for value, slot in zip(values, traced.inputs)]
-    (result,) = traced.casadi_function().call(flat, True, False)
-    return unflatten(result, traced.outputs.slots[0].shape)
+    results = traced.casadi_function().call(flat, True, False)
+    return tuple(unflatten(result, slot.shape) for result, slot in zip(results, traced.outputs))
 
 
 def coordinate_unit(robot: Robot) -> str:
@@ -95,6 +105,42 @@ def check_start(block: Block, robot: Robot, name: str) -> None:
             where=where,
             allowed="quaternions w x y z other than zero",
             fix=f"begin with the neutral coordinates {robot.neutral.tolist()}",
+        )
+
+
+def check_consistent_start(block: Block, robot: Robot, q_name: str, qd_name: str) -> None:
+    """Raise ``InputError`` if the start values of q and qd violate the constraints of the robot."""
+    if not robot.constraints:
+        return
+    functions = mechanism(robot)
+    given = np.asarray(block.parameter_value(q_name), dtype=float)
+    q = given if given.shape else robot.neutral + given
+    qd = np.broadcast_to(np.asarray(block.parameter_value(qd_name), dtype=float), (robot.n,))
+    rates = functions.jacobian(q) @ qd
+    for name, values, unit in (
+        (q_name, functions.residuals(q), ""),
+        (qd_name, rates / max(1.0, float(np.abs(qd).max(initial=0.0))), " per second"),
+    ):
+        worst = int(np.argmax(np.abs(values)))
+        if abs(values[worst]) > MAX_START_RESIDUAL:
+            constraint = functions.names[worst]
+            gap = functions.gaps(q)[constraint] if name == q_name else f"{abs(values[worst]):.3g}{unit}"
+            raise InputError(
+                f"{name} violates constraint '{constraint}' by {gap}",
+                where=f"{block.type_name()}.{name}",
+                allowed="a state that satisfies the constraints of the robot",
+                fix="take q and qd of arm.assemble(q0, qd0)",
+            )
+
+
+def check_no_constraints(block: Block, robot: Robot) -> None:
+    """Raise ``InputError`` for a robot with constraints, whose joints do not move independently."""
+    if robot.constraints:
+        raise InputError(
+            f"robot '{robot.name}' has constraints, such as '{robot.constraints[0].name}'",
+            where=block.type_name(),
+            allowed="robots whose joints move independently",
+            fix="use the block ForwardDynamics for its motion, and controllers of its motor joints",
         )
 
 
