@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     )
     from armblocks.equations import SimulationOptions
     from armblocks.face.arm import Arm
+    from armblocks.face.assembly import Assembly
     from armblocks.face.block_examples import block_example
     from armblocks.face.diagram_run import DiagramRun
     from armblocks.face.diagrams import (
@@ -46,7 +47,10 @@ if TYPE_CHECKING:
     from armblocks.face.trimming import trim
     from armblocks.formats import load_table
     from armblocks.robot import (
+        Attachment,
+        Coupling,
         Cylindrical,
+        CylindricalClosure,
         DhRow,
         Fixed,
         Free,
@@ -55,12 +59,21 @@ if TYPE_CHECKING:
         Link,
         Motor,
         Planar,
+        PlanarClosure,
+        PointOnLine,
+        PointOnPlane,
         Prismatic,
+        PrismaticClosure,
         Revolute,
+        RevoluteClosure,
         Robot,
+        Rod,
         Screw,
         Spherical,
+        SphericalClosure,
         Universal,
+        UniversalClosure,
+        WeldClosure,
         modified_dh,
         standard_dh,
     )
@@ -72,6 +85,19 @@ else:
         __name__,
         {
             "Arm": "armblocks.face.arm",
+            "Attachment": "armblocks.robot",
+            "Coupling": "armblocks.robot",
+            "CylindricalClosure": "armblocks.robot",
+            "PlanarClosure": "armblocks.robot",
+            "PointOnLine": "armblocks.robot",
+            "PointOnPlane": "armblocks.robot",
+            "PrismaticClosure": "armblocks.robot",
+            "RevoluteClosure": "armblocks.robot",
+            "Rod": "armblocks.robot",
+            "SphericalClosure": "armblocks.robot",
+            "UniversalClosure": "armblocks.robot",
+            "WeldClosure": "armblocks.robot",
+            "Assembly": "armblocks.face.assembly",
             "CompiledDiagram": "armblocks.face.model",
             "Cylindrical": "armblocks.robot",
             "DhRow": "armblocks.robot",
@@ -139,8 +165,12 @@ else:
 
 __all__ = [
     "Arm",
+    "Assembly",
+    "Attachment",
     "CompiledDiagram",
+    "Coupling",
     "Cylindrical",
+    "CylindricalClosure",
     "DhRow",
     "Diagram",
     "DiagramBuilder",
@@ -157,16 +187,25 @@ __all__ = [
     "OperatingPoint",
     "Payload",
     "Planar",
+    "PlanarClosure",
+    "PointOnLine",
+    "PointOnPlane",
     "Prismatic",
+    "PrismaticClosure",
     "Revolute",
+    "RevoluteClosure",
     "Robot",
+    "Rod",
     "Screw",
     "SensitivityResult",
     "SimulationOptions",
     "SimulationResult",
     "Spherical",
+    "SphericalClosure",
     "Transform",
     "Universal",
+    "UniversalClosure",
+    "WeldClosure",
     "begin",
     "block_example",
     "blocks",

@@ -40,7 +40,7 @@ class Assembly:
 
     def __str__(self) -> str:
         dof = self.degrees_of_freedom
-        lines = [f"{dof} degree{'' if dof == 1 else 's'} of freedom, largest residual {self.residual:.1e}"]
+        lines = [f"{dof} degree{'' if dof == 1 else 's'} of freedom"]
         if self.singular:
             lines.append(f"singular: {self.instantaneous_mobility} degrees of freedom at this configuration")
         for name, count in self.redundant.items():

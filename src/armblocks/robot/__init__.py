@@ -1,5 +1,22 @@
 """Robot descriptions: immutable values, and their numbered form for algorithms."""
 
+from armblocks.robot.constraints import (
+    CONSTRAINT_TYPES,
+    Attachment,
+    Closure,
+    Constraint,
+    Coupling,
+    CylindricalClosure,
+    PlanarClosure,
+    PointOnLine,
+    PointOnPlane,
+    PrismaticClosure,
+    RevoluteClosure,
+    Rod,
+    SphericalClosure,
+    UniversalClosure,
+    WeldClosure,
+)
 from armblocks.robot.dh import DhConvention, DhRow, link_from_dh, modified_dh, serial_chain, standard_dh
 from armblocks.robot.friction_model import FrictionModel
 from armblocks.robot.joints import (
@@ -27,8 +44,14 @@ from armblocks.robot.robot import Robot
 from armblocks.robot.tips import deepest_tip, with_tip
 
 __all__ = [
+    "CONSTRAINT_TYPES",
     "JOINT_TYPES",
+    "Attachment",
+    "Closure",
+    "Constraint",
+    "Coupling",
     "Cylindrical",
+    "CylindricalClosure",
     "DhConvention",
     "DhRow",
     "Fixed",
@@ -40,13 +63,22 @@ __all__ = [
     "Link",
     "Motor",
     "Planar",
+    "PlanarClosure",
     "PlausibilityFinding",
+    "PointOnLine",
+    "PointOnPlane",
     "Prismatic",
+    "PrismaticClosure",
     "Revolute",
+    "RevoluteClosure",
     "Robot",
+    "Rod",
     "Screw",
     "Spherical",
+    "SphericalClosure",
     "Universal",
+    "UniversalClosure",
+    "WeldClosure",
     "deepest_tip",
     "inertia_findings",
     "inertia_matrix",
