@@ -55,7 +55,7 @@ def body_states(robot: Robot, q: Array, qd: Array) -> dict[str | None, Body]:
     """The states of the base (None) and of all links."""
     base = np.asarray(robot.base.matrix)
     bodies: dict[str | None, Body] = {None: Body(base[:3, :3], base[:3, 3], np.zeros(3), np.zeros(3))}
-    index = {link.name: k for k, link in enumerate(robot.moving_links)}
+    index = {link.name: k for k, link in enumerate(robot.tree_links)}
     remaining = list(robot.links)
     while remaining:
         link = next(link for link in remaining if link.parent in bodies)
@@ -171,7 +171,7 @@ def _coordinate(equations: Equations, link: Link, a: Frame, b: Frame) -> tuple[A
 def _constraint_rows(
     robot: Robot, equations: Equations, speeds: list[tuple[Array, float]]
 ) -> Iterator[tuple[Array, float]]:
-    names = list(robot.joint_names)
+    names = [link.name for link in robot.tree_links]
     for constraint in robot.constraints:
         if isinstance(constraint, Coupling):
             terms = [(speeds[names.index(joint)], factor) for joint, factor in constraint.terms]

@@ -8,9 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armblocks.dynamics import trace_constrained_motion, trace_rne
+from armblocks.dynamics import (
+    trace_accel,
+    trace_constrained_motion,
+    trace_fkine,
+    trace_inertia,
+    trace_jacob0,
+    trace_rne,
+)
 from armblocks.dynamics.mechanism import Mechanism
-from armblocks.errors import AssemblyError, RobotError
+from armblocks.errors import ArmblocksError, AssemblyError, RobotError
 from armblocks.robot import Link, Motor, Revolute, Robot
 from armblocks.robot.constraints import (
     Attachment,
@@ -67,7 +74,7 @@ def test_motor_torques_cause_their_motion(seed: int) -> None:
 def driven_joints(mechanism: Mechanism, q: np.ndarray) -> list[str]:
     """Joints, as many as degrees of freedom, whose speeds determine all others: columns left by pivoting."""
     J = mechanism.jacobian(q)
-    rank = mechanism.tree.n - mechanism.mobility(q).degrees_of_freedom
+    rank = mechanism.robot.nv - mechanism.mobility(q).degrees_of_freedom
     dependent: list[int] = []
     R = J.copy()
     for _ in range(rank):
@@ -148,12 +155,59 @@ def test_speeds_of_locked_joints_that_contradict_are_refused() -> None:
 def test_a_coupling_is_a_gear() -> None:
     """Two discs with moments 1 and 2 kg m2, the second one three times as fast: the inertia is 1 + 9 * 2."""
     discs = tuple(
-        Link(name=name, mass=1.0, inertia=(0, 0, moment)) for name, moment in (("a", 1.0), ("b", 2.0))
+        Link(name=name, mass=1.0, inertia=(0, 0, moment)) for name, moment in (("b", 2.0), ("a", 1.0))
     )
     gear = Coupling(name="gear", terms=(("b", 1.0), ("a", -3.0)))
     robot = Robot(name="gear", links=discs, constraints=(gear,))
-    _, _, qdd, *_ = trace_constrained_motion(robot)(np.zeros(2), np.zeros(2), np.array([1.0, 2.0]))
-    assert qdd == pytest.approx([7 / 19, 21 / 19])
+    assert robot.joint_names == ("a",)
+    assert trace_inertia(robot)(np.zeros(1))[0] == pytest.approx(19.0)
+    assert trace_accel(robot)([0.0], [0.0], [1.0])[0] == pytest.approx(1 / 19)
+
+
+def test_couplings_equal_multipliers() -> None:
+    """Random trees with couplings: independent coordinates and a formulation with multipliers agree."""
+    random = np.random.default_rng(5)
+    for seed in range(4):
+        tree, _ = random_mechanism(seed)
+        names = [link.name for link in tree.links]
+        a, b, c, d = (str(name) for name in random.choice(names, 4, replace=False))
+        couplings = (
+            Coupling(name="one", terms=((a, 2.0), (b, -1.0), (c, 0.5)), constant=0.3),
+            Coupling(name="two", terms=((d, 1.0), (a, 0.7)), constant=-0.1),
+        )
+        robot = replace(tree, constraints=couplings)
+        q, qd, tau = random.uniform(-1, 1, (3, robot.nv))
+        coordinates = robot.coordinate_map
+        tree_q, tree_qd = coordinates.tree_coordinates(q), coordinates.speeds @ qd
+        tree_tau = random.normal(size=tree.nv)
+        tau = coordinates.speeds.T @ tree_tau
+        expected = accelerations(replace(robot, constraints=couplings), tree_q, tree_qd, tree_tau)
+        (qdd,) = trace_accel(robot)(q, qd, tau)
+        assert coordinates.speeds @ qdd == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
+        assert trace_rne(robot)(q, qd, qdd)[0] == pytest.approx(tau, abs=1e-9)
+        (M,) = trace_inertia(robot)(q)
+        no_speed = np.zeros(robot.nv)
+        columns = [trace_rne(robot)(q, no_speed, e)[0] for e in np.eye(robot.nv)]
+        still = trace_rne(robot)(q, no_speed, no_speed)[0]
+        assert M == pytest.approx(np.array(columns).T - still[:, None], abs=1e-9)
+        T0, T1 = (trace_fkine(robot)(q + h * qd)[0] for h in (-1e-6, 1e-6))
+        (J,) = trace_jacob0(robot)(q)
+        assert (J @ qd)[:3] == pytest.approx((T1 - T0)[:3, 3] / 2e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("terms", "message"),
+    [
+        ((("a", 1.0), ("b", 1.0)), "two couplings determine joint 'a'"),
+        ((("b", 1.0), ("a", 1.0)), "depend on itself: a -> b -> a"),
+        ((("c", 1.0),), "no link named 'c'"),
+    ],
+)
+def test_couplings_that_contradict_are_refused(terms: tuple[tuple[str, float], ...], message: str) -> None:
+    links = (Link(name="a"), Link(name="b"))
+    first = Coupling(name="first", terms=(("a", 1.0), ("b", -1.0)))
+    with pytest.raises(ArmblocksError, match=message):
+        Robot(name="pair", links=links, constraints=(first, Coupling(name="second", terms=terms)))
 
 
 def test_a_state_far_from_the_constraints_has_no_motion() -> None:

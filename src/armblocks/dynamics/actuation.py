@@ -8,49 +8,68 @@ Ghodoussi, *Dynamics computation of closed-link robot mechanisms*, IEEE Trans. R
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from functools import wraps
 
 import numpy as np
-from casadi import SX
+from casadi import SX, mtimes, vertcat
 
-from armblocks.dynamics.constrained import independent_relations, symmetric_solver
-from armblocks.dynamics.constraint_equations import constraint_equations
+from armblocks.dynamics.constrained import (
+    ConstrainedEquations,
+    independent_relations,
+    symmetric_solver,
+)
+from armblocks.dynamics.joint_motion import entries
 from armblocks.dynamics.mechanism import RANK_TOLERANCE, mechanism
+from armblocks.dynamics.reduction import Trace
+from armblocks.equations import TracedFunction, flatten
 from armblocks.errors import RobotError
+from armblocks.robot.robot import Robot
 from armblocks.robot.tree import KinematicTree
-from armblocks.spatial.vectors import Scalar
 
 
-def motor_torques(tree: KinematicTree, q: SX, tree_torques: Sequence[Scalar]) -> list[Scalar]:
-    """Torques (n,) of the joints with a motor, and 0 at the others, in the order of qd.
+def motor_torques(robot: Robot, tree: KinematicTree, q: SX, free_torques: SX) -> SX:
+    """Torques (n, 1) of the joints with a motor, and 0 at the others, in the order of qd.
 
-    ``tree_torques``: the torques of all joints for the same motion without the constraints. Raises RobotError
-    unless the motors and the degrees of freedom agree in number and the motors move all of them.
+    ``free_torques`` (n, 1): the torques of all joints for the same motion without the closures. Raises
+    RobotError unless the motors and the degrees of freedom agree in number and the motors move all of them.
     """
-    passive = [body.speed for body in tree.bodies if body.motor is None]
-    relations = independent_relations(tree)
-    _check_actuation(tree, passive, relations)
-    equations = constraint_equations(tree, q).only(relations)
-    columns = [[row[j] for row in equations.rows] for j in passive]
+    passive = [k for k, motor in enumerate(robot.motors) if motor is None]
+    relations = independent_relations(robot)
+    _check_actuation(robot, passive, relations)
+    J = ConstrainedEquations(robot, tree, q, relations).J
     # J_p' λ = tau_p by its normal equations, whose matrix is J_p J_p'.
-    m = len(relations)
-    normal = [[_sum(c[i] * c[k] for c in columns) for k in range(m)] for i in range(m)]
-    right = [_sum(c[i] * tree_torques[j] for c, j in zip(columns, passive)) for i in range(m)]
-    multipliers = symmetric_solver(normal)(right)
-    torques: list[Scalar] = [0.0] * tree.n
-    for body in tree.bodies:
-        j = body.speed
-        if body.motor is not None:
-            carried = _sum(row[j] * factor for row, factor in zip(equations.rows, multipliers))
-            torques[j] = tree_torques[j] - carried
-    return torques
+    J_passive = J[:, passive]
+    solve = symmetric_solver(mtimes(J_passive, J_passive.T))
+    multipliers = vertcat(*solve(entries(mtimes(J_passive, free_torques[passive]))))
+    torques = free_torques - mtimes(J.T, multipliers)
+    torques[passive] = 0.0
+    return SX(torques)
 
 
-def _check_actuation(tree: KinematicTree, passive: Sequence[int], relations: Sequence[int]) -> None:
+def of_motors(trace: Trace) -> Trace:
+    """The trace of joint torques; of a robot with closed loops, of those of its motors."""
+
+    @wraps(trace)
+    def trace_of_motors(robot: Robot) -> TracedFunction:
+        traced = trace(robot)
+        if not robot.closures:
+            return traced
+
+        def equations(*values: SX) -> SX:
+            flat = [flatten(value, slot.shape) for value, slot in zip(values, traced.inputs)]
+            (free,) = traced.casadi_function().call(flat, True, False)
+            return motor_torques(robot, KinematicTree.of(robot), values[0], free)
+
+        return TracedFunction.trace(traced.name, traced.inputs, traced.outputs, equations)
+
+    return trace_of_motors
+
+
+def _check_actuation(robot: Robot, passive: Sequence[int], relations: Sequence[int]) -> None:
     """Raise RobotError unless the joints without a motor follow from those with a motor."""
-    robot = tree.robot
     functions = mechanism(robot)
-    dof, motors = tree.n - len(relations), tree.n - len(passive)
+    dof, motors = robot.nv - len(relations), robot.nv - len(passive)
     where = f"robot '{robot.name}'"
     if motors != dof:
         raise RobotError(
@@ -59,7 +78,7 @@ def _check_actuation(tree: KinematicTree, passive: Sequence[int], relations: Seq
             allowed="as many motors as degrees of freedom, so that the torques exist and are unique",
             fix="give a motor (Motor() without inertia is enough) to the actuated joints only",
         )
-    J = functions.jacobian(functions.assembled(functions.neutral))[np.ix_(relations, passive)]
+    J = functions.jacobian(functions.assembled(robot.neutral))[np.ix_(relations, passive)]
     s = np.linalg.svd(J, compute_uv=False)
     if len(s) and s.min() <= RANK_TOLERANCE * s.max():
         raise RobotError(
@@ -68,10 +87,3 @@ def _check_actuation(tree: KinematicTree, passive: Sequence[int], relations: Seq
             allowed="motors whose joints fix the mechanism when they are locked",
             fix="move a motor to a joint that can still move while the others are locked",
         )
-
-
-def _sum(terms: Iterable[Scalar]) -> SX:
-    total = SX(0.0)
-    for term in terms:
-        total = total + term
-    return total

@@ -1,31 +1,36 @@
 """Forward dynamics of robots with constraints, and the projection onto them.
 
-The multipliers of the independent relations are eliminated: with ``A = J M⁻¹ J'``,
+Couplings are eliminated: the equations have independent coordinates (:mod:`armblocks.dynamics.reduction`).
+The multipliers of the closures' independent relations are eliminated: with ``A = J M⁻¹ J'``,
 
     A multipliers = - (dJ/dt qd + J M⁻¹ (tau - h)),    qdd = M⁻¹ (tau - h + J' multipliers).
 
-``J' multipliers`` are the generalised forces of the constraints. Source: Featherstone, *Rigid Body Dynamics
+``J' multipliers`` are the generalised forces of the closures. Source: Featherstone, *Rigid Body Dynamics
 Algorithms*, 8.3; Udwadia and Kalaba, *A new perspective on constrained motion*, Proc. R. Soc. A 1992.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from casadi import SX, Function, fabs, fmax, if_else, mtimes, vertcat
+from casadi import SX, Function, fabs, fmax, if_else, jtimes, mtimes, vertcat
 
 from armblocks.dynamics.ball_joints import difference, integrated, position_rates
-from armblocks.dynamics.constraint_equations import (
-    acceleration_bias,
-    constraint_equations,
-)
+from armblocks.dynamics.constraint_equations import constraint_equations
 from armblocks.dynamics.crba import FactoredInertia, crba
 from armblocks.dynamics.friction import joint_friction
 from armblocks.dynamics.joint_motion import entries, joint_motions
 from armblocks.dynamics.mechanism import Array, mechanism
-from armblocks.dynamics.rnea import rnea
+from armblocks.dynamics.reduction import (
+    generalised_forces,
+    reduced_columns,
+    tree_coordinates,
+    tree_speeds,
+)
+from armblocks.dynamics.rnea import Wrench, rnea
+from armblocks.robot.robot import Robot
 from armblocks.robot.tree import KinematicTree
 from armblocks.spatial.vectors import Scalar
 
@@ -39,11 +44,14 @@ RESTORING_TIME = 0.1
 MAX_RESIDUAL = 1e-9
 """Largest residual after the projection: m, or cosine of an angle. A larger one would give wrong motions."""
 
+Solve = Callable[[Sequence[Scalar]], list[SX]]
+"""The solution of linear equations for one right-hand side."""
+
 
 class ConstrainedMotion(NamedTuple):
     """Coordinates and speeds that satisfy the constraints, the accelerations, and the multipliers.
 
-    ``qdd`` (n,) in the order of qd. ``multipliers``: of the independent relations, N or N m.
+    ``multipliers``: of the independent relations, N or N m.
     """
 
     q: SX
@@ -52,80 +60,109 @@ class ConstrainedMotion(NamedTuple):
     multipliers: SX
 
 
-class ConstraintForces:
-    """The constraints at one q and the inertia there: directions in which the relations act.
+class ConstrainedEquations:
+    """The equations of a robot with constraints at one ``q`` (nq, 1).
 
-    ``equations``: the independent relations. ``responses``: ``M⁻¹ J'``, one column in the order of qd for
-    each relation.
+    ``tree``: the bodies, perhaps with regrouped parameters. ``relations``: the indices of the independent
+    relations of its closures.
     """
 
-    def __init__(self, tree: KinematicTree, q: SX, relations: Sequence[int]) -> None:
-        self.tree = tree
+    def __init__(self, robot: Robot, tree: KinematicTree, q: SX, relations: Sequence[int]) -> None:
+        self.robot = robot
         self.q = q
-        self.joints = joint_motions(tree, q)
-        self.equations = constraint_equations(tree, q).only(relations)
-        self._inertia = FactoredInertia(tree, crba(tree, self.joints))
-        self._order = [body.speed for body in tree.bodies]
-        self.responses = [self.accelerations(row) for row in self.equations.rows]
-        self._solve = symmetric_solver(
-            [[_dot(row, response) for response in self.responses] for row in self.equations.rows]
-        )
-
-    def accelerations(self, forces: Sequence[Scalar]) -> list[SX]:
-        """``M⁻¹ forces``, both in the order of qd."""
-        solution = self._inertia.solve([forces[j] for j in self._order])
-        result: list[SX] = [SX(0.0)] * self.tree.n
-        for j, value in zip(self._order, solution):
-            result[j] = value
-        return result
+        self._tree = tree
+        self._map = robot.coordinate_map
+        tree_q = tree_coordinates(self._map, q)
+        self._joints = joint_motions(tree, tree_q)
+        equations = constraint_equations(tree, tree_q).only(relations)
+        self.residuals = equations.residuals
+        self.J = reduced_columns(self._map, equations.jacobian) if relations else SX(0, robot.nv)
 
     def consistent_speeds(self, qd: SX) -> SX:
         """The speeds nearest to ``qd`` in the metric of the kinetic energy that satisfy the constraints."""
-        rates = mtimes(self.equations.jacobian, qd)
-        return qd - self._response(self._solve(entries(rates)))
+        _, responses, in_metric = self._factored()
+        return qd - _combined(responses, in_metric(entries(mtimes(self.J, qd))), self.robot.nv)
 
-    def motion(self, qd: SX, net_torque: Sequence[Scalar]) -> tuple[SX, SX]:
-        """Accelerations (n, 1) and multipliers; ``net_torque`` is the joint torque minus friction."""
-        no_acceleration = [0.0] * self.tree.n
-        bias = rnea(self.tree, self.joints, entries(qd), no_acceleration, self.tree.gravity)
-        free = vertcat(*self.accelerations([a - b for a, b in zip(net_torque, bias)]))
-        needed = -(
-            acceleration_bias(self.tree, self.equations, self.q, qd) + mtimes(self.equations.jacobian, free)
-        )
-        multipliers = self._solve(entries(needed))
-        return free + self._response(multipliers), vertcat(*multipliers)
+    def motion(self, qd: SX, tau: SX, on_bodies: Mapping[int, Wrench] | None = None) -> tuple[SX, SX]:
+        """Accelerations (n, 1) and multipliers for consistent ``qd`` and the joint torques ``tau``.
 
-    def _response(self, multipliers: Sequence[Scalar]) -> SX:
-        """``M⁻¹ J' multipliers`` (n, 1)."""
-        total = SX.zeros(self.tree.n)
-        for factor, response in zip(multipliers, self.responses):
-            total = total + factor * vertcat(*response)
-        return total
+        ``on_bodies``: see :func:`armblocks.dynamics.rnea.rnea`.
+        """
+        solve, responses, in_metric = self._factored()
+        rates = tree_speeds(self._map, qd)
+        at_rest = [0.0] * self._tree.n
+        gravity = self._tree.gravity
+        bias = vertcat(*rnea(self._tree, self._joints, entries(rates), at_rest, gravity, on_bodies))
+        resistance = vertcat(*joint_friction(self._tree.robot, entries(rates)))
+        free = vertcat(*solve(entries(tau - generalised_forces(self._map, bias + resistance))))
+        q_rates = vertcat(*position_rates(self.robot, entries(self.q), entries(qd)))
+        bias_of_relations = jtimes(mtimes(self.J, qd), self.q, q_rates)
+        multipliers = in_metric(entries(-(bias_of_relations + mtimes(self.J, free))))
+        return free + _combined(responses, multipliers, self.robot.nv), vertcat(*multipliers)
+
+    def shortest_step(self) -> Callable[[Sequence[Scalar]], SX]:
+        """The shortest speeds, over unit time, that reduce given residuals to zero."""
+        solve = symmetric_solver(mtimes(self.J, self.J.T))
+        return lambda residuals: mtimes(self.J.T, -vertcat(*solve(residuals)))
+
+    def _factored(self) -> tuple[Solve, list[SX], Solve]:
+        """``M⁻¹``, its products with the rows of J, and the inverse of ``J M⁻¹ J'``."""
+        solve = self._inertia()
+        responses = [vertcat(*solve(entries(self.J[i, :].T))) for i in range(self.J.shape[0])]
+        if not responses:
+            return solve, [], lambda _: []
+        rows = [mtimes(self.J, response) for response in responses]
+        A = SX(self.J.shape[0], self.J.shape[0])
+        for k, column in enumerate(rows):
+            A[:, k] = column
+        return solve, responses, symmetric_solver(A)
+
+    def _inertia(self) -> Solve:
+        """The function that solves equations with the inertia matrix, in the order of qd."""
+        M = crba(self._tree, self._joints)
+        order = [body.speed for body in self._tree.bodies]
+        if not self.robot.couplings:
+            factored = FactoredInertia(self._tree, M)
+
+            def solve(forces: Sequence[Scalar]) -> list[SX]:
+                result = [SX(0.0)] * self._tree.n
+                for j, value in zip(order, factored.solve([forces[j] for j in order])):
+                    result[j] = value
+                return result
+
+            return solve
+        of_tree = SX(self._tree.n, self._tree.n)
+        for i, row in zip(order, M):
+            for j, entry in zip(order, row):
+                of_tree[i, j] = entry
+        return symmetric_solver(generalised_forces(self._map, reduced_columns(self._map, of_tree)))
 
 
-def independent_relations(tree: KinematicTree, near: Array | None = None) -> tuple[int, ...]:
+def independent_relations(robot: Robot, near: Array | None = None) -> tuple[int, ...]:
     """The indices of the relations that the equations of motion contain, see :meth:`Mechanism.mobility`.
 
     ``near`` (nq,): coordinates near which the constraints are assembled for this; by default the neutral
     ones.
     """
-    functions = mechanism(tree.robot)
-    return functions.mobility(functions.assembled(functions.neutral if near is None else near)).independent
+    if not robot.closures:
+        return ()
+    functions = mechanism(robot)
+    return functions.mobility(functions.assembled(robot.neutral if near is None else near)).independent
 
 
-def projected(tree: KinematicTree, q: SX, relations: Sequence[int]) -> SX:
+def projected(robot: Robot, tree: KinematicTree, q: SX, relations: Sequence[int]) -> SX:
     """Coordinates (nq, 1) near ``q`` that satisfy the constraints: shortest steps in the speeds.
 
     They are NaN if a residual larger than ``MAX_RESIDUAL`` remains, because ``q`` is too far from them.
     """
-    equations = constraint_equations(tree, q).only(relations)
-    J = equations.jacobian
-    solve = symmetric_solver([[_dot(a, b) for b in equations.rows] for a in equations.rows])
-    residuals = equations.residuals
+    if not relations:
+        return q
+    equations = ConstrainedEquations(robot, tree, q, relations)
+    step, residuals = equations.shortest_step(), equations.residuals
     for _ in range(POSITION_STEPS):
-        step = mtimes(J.T, -vertcat(*solve(residuals)))
-        q = SX(vertcat(*integrated(tree.robot, entries(q), entries(step), 1.0)))
-        residuals = constraint_equations(tree, q).only(relations).residuals
+        q = SX(vertcat(*integrated(robot, entries(q), entries(step(residuals)), 1.0)))
+        at = tree_coordinates(robot.coordinate_map, q)
+        residuals = constraint_equations(tree, at).only(relations).residuals
     largest = SX(0.0)
     for residual in residuals:
         largest = fmax(largest, fabs(residual))
@@ -133,27 +170,36 @@ def projected(tree: KinematicTree, q: SX, relations: Sequence[int]) -> SX:
 
 
 def constrained_motion(
-    tree: KinematicTree, q: SX, qd: SX, tau: SX, near: Array | None = None
+    robot: Robot,
+    tree: KinematicTree,
+    q: SX,
+    qd: SX,
+    tau: SX,
+    *,
+    near: Array | None = None,
+    on_bodies: Mapping[int, Wrench] | None = None,
+    loads: Sequence[SX] = (),
 ) -> ConstrainedMotion:
     """The motion of a robot with constraints under the joint torques ``tau`` (n, 1).
 
     The state is the consistent one nearest to ``q``, ``qd``. ``near``: see :func:`independent_relations`.
+    ``on_bodies``: see :func:`armblocks.dynamics.rnea.rnea`. ``loads``: the symbols on which the inertias of
+    ``tree`` and ``on_bodies`` depend.
     """
-    relations = independent_relations(tree, near)
-    # The bias of the accelerations is a derivative with respect to q at constant speeds: both are symbols.
-    at, speeds = SX.sym("q", tree.robot.nq), SX.sym("qd", tree.n)
-    forces = ConstraintForces(tree, at, relations)
-    friction = joint_friction(tree.robot, entries(speeds))
-    net_torque = [torque - resistance for torque, resistance in zip(entries(tau), friction)]
-    consistent = Function("speeds", [at, qd], [forces.consistent_speeds(qd)])
-    motion = Function("motion", [at, speeds, tau], list(forces.motion(speeds, net_torque)))
-    q = projected(tree, q, relations)
-    (qd,) = consistent.call([q, qd], True, False)
-    qdd, multipliers = motion.call([q, qd, tau], True, False)
+    relations = independent_relations(robot, near)
+    # The bias of the relations is a derivative with respect to q at constant speeds: both are symbols.
+    at, speeds = SX.sym("q", robot.nq), SX.sym("qd", robot.nv)
+    equations = ConstrainedEquations(robot, tree, at, relations)
+    consistent = Function("speeds", [at, qd, *loads], [equations.consistent_speeds(qd)])
+    results = list(equations.motion(speeds, tau, on_bodies))
+    motion = Function("motion", [at, speeds, tau, *loads], results)
+    q = projected(robot, tree, q, relations)
+    (qd,) = consistent.call([q, qd, *loads], True, False)
+    qdd, multipliers = motion.call([q, qd, tau, *loads], True, False)
     return ConstrainedMotion(q, qd, qdd, multipliers)
 
 
-def restoring_rates(tree: KinematicTree, q: SX, qd: SX, motion: ConstrainedMotion) -> tuple[SX, SX]:
+def restoring_rates(robot: Robot, q: SX, qd: SX, motion: ConstrainedMotion) -> tuple[SX, SX]:
     """Rates of the states ``q`` (nq, 1) and ``qd`` (n, 1) of an integration of ``motion``.
 
     They are those of the motion and a decay of the distance from the consistent state with the time constant
@@ -161,18 +207,19 @@ def restoring_rates(tree: KinematicTree, q: SX, qd: SX, motion: ConstrainedMotio
     within the range of the projection and does not change the motion. Source: the method of Baumgarte 1972,
     here without its influence on the results.
     """
-    to_consistent = vertcat(*difference(tree.robot, entries(q), entries(motion.q)))
+    to_consistent = vertcat(*difference(robot, entries(q), entries(motion.q)))
     speeds = motion.qd + to_consistent / RESTORING_TIME
-    q_rates = vertcat(*position_rates(tree.robot, entries(q), entries(speeds)))
+    q_rates = vertcat(*position_rates(robot, entries(q), entries(speeds)))
     return SX(q_rates), motion.qdd + (motion.qd - qd) / RESTORING_TIME
 
 
-def symmetric_solver(A: Sequence[Sequence[Scalar]]) -> Callable[[Sequence[Scalar]], list[SX]]:
+def symmetric_solver(A: SX) -> Solve:
     """The function that solves ``A x = b`` for a symmetric positive definite A, by ``A = L D L'``."""
-    m = len(A)
-    H = [[SX(entry) for entry in row] for row in A]
+    m = A.shape[0]
+    H = [[A[i, j] for j in range(m)] for i in range(m)]
     inverse_pivots: list[SX] = []
     for k in range(m):
+        # This is 1 / H[k][k]. With that expression CasADi would replace every product with it by a division.
         inverse_pivots.append(2.0 / (H[k][k] + H[k][k]))
         factors = [H[i][k] * inverse_pivots[k] for i in range(k + 1, m)]
         for i in range(k + 1, m):
@@ -195,8 +242,8 @@ def symmetric_solver(A: Sequence[Sequence[Scalar]]) -> Callable[[Sequence[Scalar
     return solve
 
 
-def _dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> SX:
-    total = SX(0.0)
-    for x, y in zip(a, b):
-        total = total + x * y
+def _combined(columns: Sequence[SX], factors: Sequence[SX], size: int) -> SX:
+    total = SX.zeros(size)
+    for column, factor in zip(columns, factors):
+        total = total + factor * column
     return total

@@ -1,4 +1,4 @@
-"""The equations of constraints: residuals, and their Jacobian with respect to the speeds.
+"""The equations of closures: residuals, and their Jacobian with respect to the speeds.
 
 The residual of a relation is 0 where it is satisfied. The Jacobian J (m, n) of all m relations maps the
 speeds to the rates of the residuals, ``d/dt residual = J qd``, also where the residuals are not 0.
@@ -10,17 +10,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from casadi import SX, horzcat, jtimes, mtimes, vertcat
+from casadi import SX, horzcat, vertcat
 
-from armblocks.dynamics.ball_joints import position_rates
 from armblocks.dynamics.joint_motion import entries
 from armblocks.dynamics.kinematics import Pose, body_poses, constant_pose, frame_pose
 from armblocks.robot.constraints import (
     Attachment,
     Closure,
-    Constraint,
     Distance,
-    LinearCombination,
     NoDisplacement,
     Perpendicular,
     Relation,
@@ -32,9 +29,10 @@ from armblocks.spatial.vectors import Scalar, Vector, add, cross, dot, scale, su
 
 @dataclass(frozen=True, eq=False)
 class ConstraintEquations:
-    """The relations of all constraints at one q, in the order of the robot's constraints.
+    """The relations of all closures at one q, in the order of the robot's constraints.
 
-    ``names``: the constraint of each relation. ``residuals`` (m,), ``rows`` (m, n): J, in the order of qd.
+    ``names``: the closure of each relation. ``residuals`` (m,), ``rows`` (m, n): J of the tree, in the
+    order of its speeds.
     """
 
     names: tuple[str, ...]
@@ -62,32 +60,20 @@ class ConstraintEquations:
 
 
 def constraint_equations(tree: KinematicTree, q: SX) -> ConstraintEquations:
-    """The relations of the robot's constraints at ``q`` (nq, 1)."""
-    coordinates = entries(q)
+    """The relations of the closures of loops at ``q``, the coordinates of all joints of the tree."""
     ground = constant_pose(Transform())
-    bodies = body_poses(tree, coordinates, ground)
+    bodies = body_poses(tree, entries(q), ground)
     names: list[str] = []
     residuals: list[Scalar] = []
     rows: list[tuple[Scalar, ...]] = []
-    for constraint in tree.robot.constraints:
-        frames = _FramePair.of(tree, constraint, bodies, ground)
-        for relation in constraint.relations:
-            if isinstance(relation, LinearCombination):
-                residual, row = _linear_combination(tree, relation, coordinates)
-            else:
-                assert frames is not None
-                residual, row = frames.equation(relation)
-            names.append(constraint.name)
+    for closure in tree.robot.closures:
+        frames = _FramePair.of(tree, closure, bodies, ground)
+        for relation in closure.relations:
+            residual, row = frames.equation(relation)
+            names.append(closure.name)
             residuals.append(residual)
             rows.append(tuple(row))
     return ConstraintEquations(tuple(names), tuple(residuals), tuple(rows))
-
-
-def acceleration_bias(tree: KinematicTree, equations: ConstraintEquations, q: SX, qd: SX) -> SX:
-    """``dJ/dt qd`` (m, 1): the second rates of the residuals at zero acceleration."""
-    rates = mtimes(equations.jacobian, qd)
-    q_rates = vertcat(*position_rates(tree.robot, entries(q), entries(qd)))
-    return SX(jtimes(rates, q, q_rates))
 
 
 def attached_frame(tree: KinematicTree, attachment: Attachment) -> Frame:
@@ -116,13 +102,9 @@ class _FramePair:
     angular_columns: dict[int, Vector]
 
     @classmethod
-    def of(
-        cls, tree: KinematicTree, constraint: Constraint, bodies: Sequence[Pose], ground: Pose
-    ) -> _FramePair | None:
-        """The frames of a closure; None for a constraint without frames."""
-        if not isinstance(constraint, Closure):
-            return None
-        ends = [attached_frame(tree, end) for end in (constraint.first, constraint.second)]
+    def of(cls, tree: KinematicTree, closure: Closure, bodies: Sequence[Pose], ground: Pose) -> _FramePair:
+        """The frames of a closure."""
+        ends = [attached_frame(tree, end) for end in (closure.first, closure.second)]
         a, b = (frame_pose(end, bodies, ground) for end in ends)
         moved = [set[int]() if end.body == BASE else {end.body, *tree.ancestors(end.body)} for end in ends]
         points: dict[int, Vector] = {}
@@ -151,28 +133,12 @@ class _FramePair:
                 d = self.displacement
                 residual = (dot(d, d) - length * length) * (0.5 / length)
                 return residual, self._row(self.point_columns, scale(1.0 / length, d))
-            case LinearCombination():
-                raise AssertionError("a relation between coordinates has no frames")
 
     def _row(self, columns: dict[int, Vector], direction: Vector) -> list[Scalar]:
         row: list[Scalar] = [0.0] * self.n
         for index, column in columns.items():
             row[index] = dot(direction, column)
         return row
-
-
-def _linear_combination(
-    tree: KinematicTree, relation: LinearCombination, coordinates: Sequence[Scalar]
-) -> tuple[Scalar, list[Scalar]]:
-    """The residual and the row of a relation between joint coordinates."""
-    body_of = {body.link: body for body in tree.bodies}
-    row: list[Scalar] = [0.0] * tree.n
-    residual: Scalar = -relation.constant
-    for joint, factor in relation.terms:
-        body = body_of[joint]
-        residual = residual + factor * coordinates[body.position]
-        row[body.speed] = factor
-    return residual, row
 
 
 def _axis(pose: Pose, index: int) -> Vector:

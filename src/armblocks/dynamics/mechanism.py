@@ -19,8 +19,9 @@ from armblocks.dynamics.ball_joints import integrated, normalised
 from armblocks.dynamics.constraint_equations import attached_frame, constraint_equations
 from armblocks.dynamics.joint_motion import entries
 from armblocks.dynamics.kinematics import body_poses, constant_pose, frame_pose
+from armblocks.dynamics.reduction import reduced_columns, tree_coordinates
 from armblocks.errors import AssemblyError, RobotError, UnknownNameError
-from armblocks.robot.constraints import Closure, Constraint, LinearCombination, NoDisplacement, Perpendicular
+from armblocks.robot.constraints import Closure, Distance, NoDisplacement, Perpendicular
 from armblocks.robot.robot import Robot
 from armblocks.robot.tree import KinematicTree
 from armblocks.spatial import Transform
@@ -68,19 +69,21 @@ class Mechanism:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self.tree = tree = KinematicTree.of(robot)
+        tree = KinematicTree.of(robot)
         q = SX.sym("q", robot.nq)
         step = SX.sym("step", robot.nv)
-        equations = constraint_equations(tree, q)
+        coordinates = robot.coordinate_map
+        tree_q = tree_coordinates(coordinates, q)
+        equations = constraint_equations(tree, tree_q)
         self.names = equations.names
-        self.neutral = np.array([value for joint in robot.joints for value in joint.neutral])
-        self._evaluate = Function("constraints", [q], [equations.residual_vector, equations.jacobian])
+        J = reduced_columns(coordinates, equations.jacobian)
+        self._evaluate = Function("closures", [q], [equations.residual_vector, J])
         moved = vertcat(*integrated(robot, entries(q), entries(step), 1.0))
         self._move = Function("move", [q, step], [moved])
         self._normalise = Function("normalise", [q], [vertcat(*normalised(robot, entries(q)))])
-        bodies = body_poses(tree, entries(q), constant_pose(Transform()))
         ground = constant_pose(Transform())
-        self._closures = [c for c in robot.constraints if isinstance(c, Closure)]
+        bodies = body_poses(tree, entries(tree_q), ground)
+        self._closures = robot.closures
         poses = [
             frame_pose(attached_frame(tree, end), bodies, ground).matrix()
             for closure in self._closures
@@ -114,7 +117,7 @@ class Mechanism:
         for attempt in range(RESTARTS + 1):
             start = guess
             if attempt:
-                step = np.zeros(self.tree.n)
+                step = np.zeros(self.robot.nv)
                 step[free] = random.normal(scale=0.1 * attempt, size=len(free))
                 start = self.moved(guess, step)
             q = self._descend(start, free)
@@ -132,7 +135,7 @@ class Mechanism:
         """
         free = self._free_speeds(locked)
         J = self.jacobian(q)
-        change = np.zeros(self.tree.n)
+        change = np.zeros(self.robot.nv)
         rates = J @ qd
         change[free] = -_least_squares(J[:, free], rates)
         remaining = np.abs(J @ (qd + change))
@@ -155,51 +158,38 @@ class Mechanism:
         independent = _independent_rows([J for J, r in zip(jacobians, ranks) if r == rank], rank)
         others = [i for i in range(len(self.names)) if i not in independent]
         return Mobility(
-            self.tree.n - rank,
-            self.tree.n - ranks[0],
+            self.robot.nv - rank,
+            self.robot.nv - ranks[0],
             tuple(independent),
             tuple(self.names[i] for i in others),
         )
 
     def gaps(self, q: Array) -> dict[str, str]:
-        """The violation of each constraint at ``q`` in words: mm and degrees, or the unit of a coordinate."""
-        texts = {constraint.name: "" for constraint in self.robot.constraints}
-        for constraint in self.robot.constraints:
-            parts: list[str] = []
-            position, angle, other = self._gap(constraint, q)
-            if position is not None:
-                parts.append(f"{1000.0 * position:.4g} mm")
-            if angle is not None:
-                parts.append(f"{math.degrees(angle):.4g} deg")
-            if other is not None:
-                parts.append(f"{other:.4g} in its equation")
-            texts[constraint.name] = " and ".join(parts)
+        """The violation of each closure at ``q`` in words, in mm and degrees."""
+        texts: dict[str, str] = {}
+        for closure in self._closures:
+            position, angle = self._gap(closure, q)
+            has_angle = any(isinstance(relation, Perpendicular) for relation in closure.relations)
+            angle_text = f" and {math.degrees(angle):.4g} deg" if has_angle else ""
+            texts[closure.name] = f"{1000.0 * position:.4g} mm{angle_text}"
         return texts
 
-    def _gap(self, constraint: Constraint, q: Array) -> tuple[float | None, float | None, float | None]:
-        """The violation of one constraint: distance (m), angle (rad), residual of a coupling."""
-        values = self.residuals(q)[[i for i, name in enumerate(self.names) if name == constraint.name]]
-        position: list[float] = []
-        angle: list[float] = []
-        other: list[float] = []
-        for relation, value in zip(constraint.relations, values.tolist()):
+    def _gap(self, closure: Closure, q: Array) -> tuple[float, float]:
+        """The violation of one closure: distance (m) and angle (rad)."""
+        values = self.residuals(q)[[i for i, name in enumerate(self.names) if name == closure.name]]
+        position: list[float] = [0.0]
+        angle: list[float] = [0.0]
+        for relation, value in zip(closure.relations, values.tolist()):
             match relation:
                 case NoDisplacement():
                     position.append(value)
                 case Perpendicular():
                     angle.append(math.asin(max(-1.0, min(1.0, value))))
-                case LinearCombination():
-                    other.append(value)
-                case _:
-                    length = relation.length
-                    position.append(math.sqrt(max(0.0, length * length + 2.0 * length * value)) - length)
-        if isinstance(constraint, Closure) and angle and self._reversed_axes(constraint, q):
+                case Distance(length):
+                    position.append(math.sqrt(max(0.0, length * (length + 2.0 * value))) - length)
+        if self._reversed_axes(closure, q):
             angle.append(math.pi)
-        return (
-            math.hypot(*position) if position else None,
-            max(map(abs, angle)) if angle else None,
-            max(map(abs, other)) if other else None,
-        )
+        return math.hypot(*position), max(map(abs, angle))
 
     def _distance(self, q: Array) -> float:
         """The largest residual; infinite if a closure is assembled with a reversed axis."""
@@ -220,7 +210,8 @@ class Mechanism:
         for name in locked:
             if name not in names:
                 raise UnknownNameError("joint", name, names, where=f"robot '{self.robot.name}'")
-        return sorted(body.speed for body in self.tree.bodies if body.link not in locked)
+        owners = [link.name for link in self.robot.moving_links for _ in link.joint.speeds]
+        return [k for k, name in enumerate(owners) if name not in locked]
 
     def _descend(self, q: Array, free: list[int]) -> Array:
         """The end of Levenberg-Marquardt steps from ``q``."""
@@ -237,7 +228,7 @@ class Mechanism:
             gains = np.where(
                 s > 1e-11 * largest, s / (s * s + damping * largest * largest * min(1.0, size)), 0.0
             )
-            step = np.zeros(self.tree.n)
+            step = np.zeros(self.robot.nv)
             step[free] = -Vt.T @ (gains * (U.T @ residuals))
             candidate = self.moved(q, step)
             new = self.residuals(candidate)
@@ -252,10 +243,10 @@ class Mechanism:
         """Assembled configurations near ``q``, by random motions in the directions that J permits."""
         random = np.random.default_rng(1)
         found: list[Array] = []
-        free = list(range(self.tree.n))
+        free = list(range(self.robot.nv))
         for k in range(MOTIONS):
             J = self.jacobian(q)
-            step = random.normal(size=self.tree.n)
+            step = random.normal(size=self.robot.nv)
             step -= _least_squares(J, J @ step)
             length = float(np.linalg.norm(step))
             if length < 1e-9:
@@ -268,10 +259,7 @@ class Mechanism:
     def _assembly_error(self, q: Array, locked: Sequence[str]) -> AssemblyError:
         gaps = self.gaps(q)
 
-        def severity(constraint: Constraint) -> float:
-            return max(value or 0.0 for value in self._gap(constraint, q))
-
-        worst = max(self.robot.constraints, key=severity).name
+        worst = max(self._closures, key=lambda closure: max(self._gap(closure, q))).name
         keeping = f", with {', '.join(locked)} locked," if locked else ""
         return AssemblyError(
             f"no configuration near the guess{keeping} satisfies constraint '{worst}': "

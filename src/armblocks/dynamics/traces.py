@@ -18,9 +18,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from casadi import SX, jacobian, mtimes, vertcat
+from casadi import SX, horzsplit, jacobian, mtimes, vertcat
 
-from armblocks.dynamics.actuation import motor_torques
+from armblocks.dynamics.actuation import of_motors
 from armblocks.dynamics.ball_joints import (
     difference,
     integrated,
@@ -37,8 +37,13 @@ from armblocks.dynamics.friction import joint_friction, rotor_torques
 from armblocks.dynamics.jacobian import jacobian_matrix, tool_columns, world_columns, yoshikawa
 from armblocks.dynamics.joint_motion import entries, joint_motions
 from armblocks.dynamics.kinematics import body_poses, constant_pose, frame_pose
-from armblocks.dynamics.mechanism import Array
 from armblocks.dynamics.loads import PAYLOAD_SLOT, WRENCH_SLOT, tip_wrench, with_payload
+from armblocks.dynamics.mechanism import Array
+from armblocks.dynamics.reduction import (
+    in_independent_coordinates,
+    reduced_columns,
+    tree_coordinates,
+)
 from armblocks.dynamics.rnea import rnea
 from armblocks.equations import Signature, TracedFunction, signature
 from armblocks.equations.signatures import Slot
@@ -48,6 +53,7 @@ from armblocks.robot.tree import KinematicTree
 from armblocks.spatial.vectors import Scalar, add, rotate, scale
 
 
+@in_independent_coordinates
 def trace_fkine(robot: Robot) -> TracedFunction:
     """``T (4, 4)``: pose of the tool in the world, base and tool transform included; m."""
     tree = KinematicTree.of(robot)
@@ -59,6 +65,7 @@ def trace_fkine(robot: Robot) -> TracedFunction:
     return _trace("fkine", robot, ("q",), ("T", (4, 4), "m"), equations)
 
 
+@in_independent_coordinates
 def trace_link_poses(robot: Robot) -> TracedFunction:
     """``poses (L + 2, 4, 4)`` in the world: the base, every link in the robot's order, the tool; m."""
     tree = KinematicTree.of(robot)
@@ -72,6 +79,7 @@ def trace_link_poses(robot: Robot) -> TracedFunction:
     return _trace("link_poses", robot, ("q",), ("poses", (len(robot.links) + 2, 4, 4), "m"), equations)
 
 
+@in_independent_coordinates
 def trace_jacob0(robot: Robot) -> TracedFunction:
     """``J (6, n)``: velocity of the tool's origin, then angular velocity of the tool, in world axes."""
     tree = KinematicTree.of(robot)
@@ -82,6 +90,7 @@ def trace_jacob0(robot: Robot) -> TracedFunction:
     return _trace("jacob0", robot, ("q",), ("J", (6, robot.n), ""), equations)
 
 
+@in_independent_coordinates
 def trace_jacobe(robot: Robot) -> TracedFunction:
     """``J (6, n)``: velocity of the tool's origin, then angular velocity of the tool, in tool axes."""
     tree = KinematicTree.of(robot)
@@ -94,14 +103,20 @@ def trace_jacobe(robot: Robot) -> TracedFunction:
 
 def trace_manipulability(robot: Robot) -> TracedFunction:
     """``w ()``: Yoshikawa's measure, see :func:`armblocks.dynamics.jacobian.yoshikawa`."""
-    tree = KinematicTree.of(robot)
+    tree, coordinates = KinematicTree.of(robot), robot.coordinate_map
 
     def equations(q: SX) -> SX:
-        return yoshikawa(world_columns(tree, entries(q)))
+        if not robot.couplings:
+            return yoshikawa(world_columns(tree, entries(q)))
+        J = jacobian_matrix(world_columns(tree, entries(tree_coordinates(coordinates, q))))
+        columns = horzsplit(reduced_columns(coordinates, J))
+        return yoshikawa([((c[0], c[1], c[2]), (c[3], c[4], c[5])) for c in columns])
 
     return _trace("manipulability", robot, ("q",), ("w", (), ""), equations)
 
 
+@of_motors
+@in_independent_coordinates
 def trace_rne(robot: Robot) -> TracedFunction:
     """``tau (n,)`` of a motion, with rigid bodies, rotor inertia, friction and the robot's gravity."""
     tree = regrouped(KinematicTree.of(robot))
@@ -109,12 +124,13 @@ def trace_rne(robot: Robot) -> TracedFunction:
     def equations(q: SX, qd: SX, qdd: SX) -> SX:
         rates, accelerations = entries(qd), entries(qdd)
         rigid = rnea(tree, joint_motions(tree, q), rates, accelerations, tree.gravity)
-        torques = _sum(rigid, rotor_torques(robot, accelerations), joint_friction(robot, rates))
-        return _of_motors(tree, q, torques)
+        return _sum(rigid, rotor_torques(robot, accelerations), joint_friction(robot, rates))
 
     return _trace("rne", robot, ("q", "qd", "qdd"), ("tau", (robot.n,), "N m"), equations)
 
 
+@of_motors
+@in_independent_coordinates
 def trace_rne_loaded(robot: Robot) -> TracedFunction:
     """``tau (n,)`` as ``rne``, with a wrench at the tip and a payload at the tool."""
     tree = regrouped(KinematicTree.of(robot))
@@ -125,25 +141,26 @@ def trace_rne_loaded(robot: Robot) -> TracedFunction:
         rigid = rnea(
             loaded, joint_motions(loaded, q), rates, accelerations, tree.gravity, tip_wrench(tree, wrench)
         )
-        torques = _sum(rigid, rotor_torques(robot, accelerations), joint_friction(robot, rates))
-        return _of_motors(tree, q, torques)
+        return _sum(rigid, rotor_torques(robot, accelerations), joint_friction(robot, rates))
 
     inputs = ("q", "qd", "qdd", "wrench", "payload")
     return _trace("rne", robot, inputs, ("tau", (robot.n,), "N m"), equations)
 
 
+@of_motors
+@in_independent_coordinates
 def trace_gravload(robot: Robot) -> TracedFunction:
     """``tau (n,)`` that holds the arm at rest against gravity."""
     tree = regrouped(KinematicTree.of(robot))
 
     def equations(q: SX) -> SX:
         no_motion = [0.0] * tree.n
-        torques = _sum(rnea(tree, joint_motions(tree, q), no_motion, no_motion, tree.gravity))
-        return _of_motors(tree, q, torques)
+        return _sum(rnea(tree, joint_motions(tree, q), no_motion, no_motion, tree.gravity))
 
     return _trace("gravload", robot, ("q",), ("tau", (robot.n,), "N m"), equations)
 
 
+@in_independent_coordinates
 def trace_inertia(robot: Robot) -> TracedFunction:
     """``M (n, n)``: joint-space inertia, rotors included; kg m2, kg m or kg."""
     tree = regrouped(KinematicTree.of(robot))
@@ -156,6 +173,7 @@ def trace_inertia(robot: Robot) -> TracedFunction:
     return _trace("inertia", robot, ("q",), ("M", (robot.n, robot.n), "kg m2"), equations)
 
 
+@in_independent_coordinates
 def trace_coriolis(robot: Robot) -> TracedFunction:
     """``C (n, n)``: ``C qd`` is the velocity torque without friction, and ``dM/dt - 2 C`` is skew.
 
@@ -182,6 +200,7 @@ def trace_coriolis(robot: Robot) -> TracedFunction:
     return _trace("coriolis", robot, ("q", "qd"), ("C", (robot.n, robot.n), "N m s"), equations)
 
 
+@in_independent_coordinates
 def trace_friction(robot: Robot) -> TracedFunction:
     """``tau (n,)`` that overcomes motor friction, with the sign of ``qd``; see :class:`FrictionModel`.
 
@@ -204,7 +223,7 @@ def trace_accel(robot: Robot) -> TracedFunction:
 
     def equations(q: SX, qd: SX, tau: SX) -> SX:
         if robot.constraints:
-            return constrained_motion(tree, q, qd, tau).qdd
+            return constrained_motion(robot, tree, q, qd, tau).qdd
         rates = entries(qd)
         net_torque = _difference(entries(tau), joint_friction(robot, rates))
         return _sum(forward_dynamics(tree, q, rates, net_torque))
@@ -222,10 +241,13 @@ def trace_accel_loaded(robot: Robot) -> TracedFunction:
     check_accelerations_exist(with_payload(tree, generic_payload))
 
     def equations(q: SX, qd: SX, tau: SX, wrench: SX, payload: SX) -> SX:
+        loaded, wrenches = with_payload(tree, payload), tip_wrench(tree, wrench)
+        if robot.constraints:
+            loads = (wrench, payload)
+            return constrained_motion(robot, loaded, q, qd, tau, on_bodies=wrenches, loads=loads).qdd
         rates = entries(qd)
         net_torque = _difference(entries(tau), joint_friction(robot, rates))
-        loaded = with_payload(tree, payload)
-        return _sum(forward_dynamics(loaded, q, rates, net_torque, tip_wrench(tree, wrench)))
+        return _sum(forward_dynamics(loaded, q, rates, net_torque, wrenches))
 
     inputs = ("q", "qd", "tau", "wrench", "payload")
     return _trace("accel", robot, inputs, ("qdd", (robot.n,), "rad/s2"), equations)
@@ -241,8 +263,8 @@ def trace_constrained_motion(robot: Robot, near: Array | None = None) -> TracedF
     tree = KinematicTree.of(robot)
 
     def equations(q: SX, qd: SX, tau: SX) -> tuple[SX, ...]:
-        motion = constrained_motion(tree, q, qd, tau, near)
-        return (motion.q, motion.qd, motion.qdd, *restoring_rates(tree, q, qd, motion))
+        motion = constrained_motion(robot, tree, q, qd, tau, near=near)
+        return (motion.q, motion.qd, motion.qdd, *restoring_rates(robot, q, qd, motion))
 
     nq, n = (robot.nq,), (robot.n,)
     outputs = signature(
@@ -251,6 +273,7 @@ def trace_constrained_motion(robot: Robot, near: Array | None = None) -> TracedF
     return TracedFunction.trace("constrained_motion", _inputs(robot, ("q", "qd", "tau")), outputs, equations)
 
 
+@in_independent_coordinates
 def trace_kinetic_energy(robot: Robot) -> TracedFunction:
     """``energy ()``, J, kinetic energy of bodies and rotors."""
     tree = regrouped(KinematicTree.of(robot))
@@ -261,6 +284,7 @@ def trace_kinetic_energy(robot: Robot) -> TracedFunction:
     return _trace("kinetic_energy", robot, ("q", "qd"), ("energy", (), "J"), equations)
 
 
+@in_independent_coordinates
 def trace_potential_energy(robot: Robot) -> TracedFunction:
     """``energy ()``, J, potential energy: zero if the centre of mass is at the world's origin."""
     tree = KinematicTree.of(robot)
@@ -271,6 +295,7 @@ def trace_potential_energy(robot: Robot) -> TracedFunction:
     return _trace("potential_energy", robot, ("q",), ("energy", (), "J"), equations)
 
 
+@in_independent_coordinates
 def trace_centre_of_mass(robot: Robot) -> TracedFunction:
     """``centre (3,)`` of mass of all links in the world, m. Raises RobotError for a robot without mass."""
     tree = KinematicTree.of(robot)
@@ -349,13 +374,6 @@ TRACES: Mapping[str, Callable[[Robot], TracedFunction]] = {
     "normalised": trace_normalised,
 }
 """The trace functions by name: ``TRACES["rne"](robot)``."""
-
-
-def _of_motors(tree: KinematicTree, q: SX, torques: SX) -> SX:
-    """The torques of the motors of a robot with constraints; without constraints the torques themselves."""
-    if not tree.robot.constraints:
-        return torques
-    return _sum(motor_torques(tree, q, entries(torques)))
 
 
 def _trace(

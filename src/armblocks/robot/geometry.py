@@ -106,7 +106,9 @@ def link_frames(robot: Robot, q: Sequence[float]) -> NDArray[np.float64]:
     frames: dict[str | None, Transform] = {None: robot.base}
     coordinates: dict[str, Sequence[float]] = {}
     first = 0
-    for link in robot.moving_links:
+    if robot.couplings:
+        q = robot.coordinate_map.tree_coordinates(q).tolist()
+    for link in robot.tree_links:
         coordinates[link.name] = q[first : first + link.joint.nq]
         first += link.joint.nq
     for link in _parents_first(robot):

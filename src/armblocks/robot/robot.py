@@ -13,7 +13,8 @@ from armblocks.errors import UnknownNameError, check_arguments
 from armblocks.lazy_exports import display_method
 from armblocks.robot.checks import check_robot
 from armblocks.robot.constraint_checks import check_constraints
-from armblocks.robot.constraints import Constraint
+from armblocks.robot.constraints import Closure, Constraint, Coupling
+from armblocks.robot.coordinate_map import CoordinateMap, coordinate_map, dependent_joints
 from armblocks.robot.fields import pose
 from armblocks.robot.friction_model import FrictionModel
 from armblocks.robot.joints import Coordinate, Joint, JointLimits
@@ -73,13 +74,41 @@ class Robot:
         )
         object.__setattr__(self, "constraints", tuple(self.constraints))
         check_constraints(self.name, self.links, self.constraints)
+        if self.couplings:
+            _ = self.coordinate_map  # raises RobotError for couplings that contradict each other
 
     _repr_html_ = display_method("armblocks.face.notebook_views", "robot_view")
 
     @cached_property
-    def moving_links(self) -> tuple[Link, ...]:
-        """The links whose joints have a coordinate, in the order of q."""
+    def tree_links(self) -> tuple[Link, ...]:
+        """The links whose joints move, also those that follow from other joints."""
         return tuple(link for link in self.links if link.joint.moves)
+
+    @cached_property
+    def moving_links(self) -> tuple[Link, ...]:
+        """The links whose joints have a coordinate in q, in the order of q."""
+        dependent = dependent_joints(self.couplings)
+        return tuple(link for link in self.tree_links if link.name not in dependent)
+
+    @cached_property
+    def couplings(self) -> tuple[Coupling, ...]:
+        """The constraints that make a joint depend on others, which leaves it out of q."""
+        return tuple(entry for entry in self.constraints if isinstance(entry, Coupling))
+
+    @cached_property
+    def closures(self) -> tuple[Closure, ...]:
+        """The constraints that close loops."""
+        return tuple(entry for entry in self.constraints if isinstance(entry, Closure))
+
+    @cached_property
+    def uncoupled(self) -> Robot:
+        """The robot without its couplings: q has all joints of the tree."""
+        return replace(self, constraints=self.closures) if self.couplings else self
+
+    @cached_property
+    def coordinate_map(self) -> CoordinateMap:
+        """The coordinates of ``uncoupled`` as functions of those of this robot."""
+        return coordinate_map(self.tree_links, self.couplings, f"robot '{self.name}'")
 
     @property
     def n(self) -> int:

@@ -72,6 +72,7 @@ class Frame:
 class KinematicTree:
     """The bodies of a robot and its frames.
 
+    ``robot``: without couplings, so that every joint has coordinates of its own.
     ``bodies``: parents before children. ``links``: the frame of each link, in the robot's order. ``tip``: the
     frame of the last link. ``tool``: the tool frame. ``base``: pose of the base in the world. ``gravity``:
     m/s2, in *base* axes. ``grounded``: the inertia of the links fixed to the base.
@@ -87,6 +88,7 @@ class KinematicTree:
     @classmethod
     def of(cls, robot: Robot) -> KinematicTree:
         """Number the robot's joints, merge fixed links, and rotate every joint axis to z."""
+        robot = robot.uncoupled
         first_of: dict[str, tuple[int, int]] = {}
         position = speed = 0
         for link in robot.moving_links:

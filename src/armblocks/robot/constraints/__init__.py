@@ -10,7 +10,6 @@ from armblocks.robot.constraints.point_on_plane import PointOnPlane
 from armblocks.robot.constraints.prismatic_closure import PrismaticClosure
 from armblocks.robot.constraints.relations import (
     Distance,
-    LinearCombination,
     NoDisplacement,
     Perpendicular,
     Relation,
@@ -34,7 +33,6 @@ __all__ = [
     "Coupling",
     "CylindricalClosure",
     "Distance",
-    "LinearCombination",
     "NoDisplacement",
     "Perpendicular",
     "PlanarClosure",

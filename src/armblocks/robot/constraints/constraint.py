@@ -33,11 +33,10 @@ class Attachment:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Constraint(ABC):
+class Constraint:
     """Equations that the coordinates of a robot satisfy at all times, beside the tree of its joints.
 
-    ``name`` is unique in the robot. Each relation is one equation; equations that follow from others are
-    allowed, because the algorithms find and omit them.
+    ``name`` is unique in the robot.
     """
 
     name: str
@@ -59,11 +58,6 @@ class Constraint(ABC):
             )
 
     @property
-    @abstractmethod
-    def relations(self) -> tuple[Relation, ...]:
-        """The equations."""
-
-    @property
     def links(self) -> tuple[str | None, ...]:
         """The links that the constraint names; None is the base."""
         return ()
@@ -75,10 +69,11 @@ class Constraint(ABC):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Closure(Constraint):
+class Closure(Constraint, ABC):
     """A joint between two links that closes a loop of the tree, described by the relations of two frames.
 
-    ``first`` and ``second``: frames on the two links. A subclass defines the relations of the frames.
+    ``first`` and ``second``: frames on the two links. Each relation is one equation; equations that follow
+    from others are allowed, because the algorithms find and omit them.
     """
 
     first: Attachment
@@ -95,6 +90,11 @@ class Closure(Constraint):
                 allowed="frames on two links, or on a link and the base",
                 fix="correct the link of one of the frames",
             )
+
+    @property
+    @abstractmethod
+    def relations(self) -> tuple[Relation, ...]:
+        """The equations of the two frames."""
 
     @property
     def links(self) -> tuple[str | None, ...]:

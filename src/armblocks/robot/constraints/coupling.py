@@ -8,7 +8,6 @@ from typing import ClassVar
 
 from armblocks.errors import RobotError
 from armblocks.robot.constraints.constraint import Constraint
-from armblocks.robot.constraints.relations import LinearCombination, Relation
 from armblocks.robot.fields import number
 
 
@@ -16,9 +15,9 @@ from armblocks.robot.fields import number
 class Coupling(Constraint):
     """A gear, rack, belt or mimic joint: the sum of ``coefficient q`` over ``terms`` is ``constant``.
 
-    ``terms``: pairs of a joint with one coordinate and its coefficient. The joint b that mimics a,
-    ``q_b = multiplier q_a + offset``, has the terms ``(("b", 1.0), ("a", -multiplier))`` and the constant
-    ``offset``.
+    ``terms``: pairs of a joint with one coordinate and its coefficient. The first joint depends on the
+    others: it is not an entry of the robot's q. The joint b that mimics a, ``q_b = multiplier q_a + offset``, has the
+    terms ``(("b", 1.0), ("a", -multiplier))`` and the constant ``offset``.
     """
 
     terms: tuple[tuple[str, float], ...]
@@ -48,10 +47,6 @@ class Coupling(Constraint):
             raise RobotError(
                 "a coefficient is 0", where=where, allowed="other numbers", fix="leave the joint out"
             )
-
-    @property
-    def relations(self) -> tuple[Relation, ...]:
-        return (LinearCombination(self.terms, self.constant),)
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -1,8 +1,8 @@
-"""The elementary relations of which all constraints are composed.
+"""The elementary relations of which the closures of loops are composed.
 
-A constraint is a sequence of them. The algorithms of :mod:`armblocks.dynamics` know only these four; a type
-of constraint is therefore described by its sequence alone. ``a`` is the first frame of a closure and ``b``
-the second one; both have the axes x, y, z with the indices 0, 1, 2.
+A closure is a sequence of them. The algorithms of :mod:`armblocks.dynamics` know only these three; a type of
+closure is therefore described by its sequence alone. ``a`` is the first frame of a closure and ``b`` the
+second one; both have the axes x, y, z with the indices 0, 1, 2.
 """
 
 from __future__ import annotations
@@ -35,18 +35,7 @@ class Distance:
     length: float
 
 
-@dataclass(frozen=True)
-class LinearCombination:
-    """The sum of ``coefficient q`` over single-axis joints, by name, is ``constant``.
-
-    Units: those of the coordinates (rad or m); the coefficients convert between them.
-    """
-
-    terms: tuple[tuple[str, float], ...]
-    constant: float
-
-
-Relation = NoDisplacement | Perpendicular | Distance | LinearCombination
+Relation = NoDisplacement | Perpendicular | Distance
 """An elementary relation: one equation."""
 
 ORIGINS_COINCIDE = (NoDisplacement(0), NoDisplacement(1), NoDisplacement(2))

@@ -1,0 +1,101 @@
+"""The coordinates of all joints of the tree as functions of the independent coordinates q.
+
+A coupling makes one joint depend linearly on others. The robot's q has the independent joints only:
+
+    q_tree = positions q + offsets,    qd_tree = speeds qd,    tau = speeds' tau_tree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.errors import RobotError
+from armblocks.robot.constraints import Coupling
+from armblocks.robot.link import Link
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class CoordinateMap:
+    """``positions`` (nq of the tree, nq), ``offsets`` (nq of the tree,), ``speeds`` (nv of the tree, nv)."""
+
+    positions: Array
+    offsets: Array
+    speeds: Array
+
+    def tree_coordinates(self, q: ArrayLike) -> Array:
+        """The coordinates of all joints of the tree for ``q`` (nq,)."""
+        return self.positions @ np.asarray(q) + self.offsets
+
+
+def dependent_joints(couplings: Sequence[Coupling]) -> dict[str, Coupling]:
+    """The joint that each coupling determines, by name: the first one of its terms."""
+    return {coupling.terms[0][0]: coupling for coupling in couplings}
+
+
+def coordinate_map(links: Sequence[Link], couplings: Sequence[Coupling], where: str) -> CoordinateMap:
+    """The map for the moving ``links`` of a tree.
+
+    Raises RobotError if a joint depends on two couplings or on itself.
+    """
+    dependent = dependent_joints(couplings)
+    if len(dependent) < len(couplings):
+        twice = next(c.terms[0][0] for c in couplings if dependent[c.terms[0][0]] is not c)
+        raise RobotError(
+            f"two couplings determine joint '{twice}'",
+            where=where,
+            allowed="each joint is the first term of one coupling at most",
+            fix="put the joint that shall depend on the others first",
+        )
+    combinations = {link.name: _combination(link.name, dependent, (), where) for link in links}
+    independent = [link for link in links if link.name not in dependent]
+    nq, nv = sum(link.joint.nq for link in independent), sum(link.joint.nv for link in independent)
+    columns: dict[str, tuple[int, int]] = {}
+    position = speed = 0
+    for link in independent:
+        columns[link.name] = position, speed
+        position, speed = position + link.joint.nq, speed + link.joint.nv
+    positions, offsets, speeds = [np.zeros((0, nq))], [np.zeros(0)], [np.zeros((0, nv))]
+    for link in links:
+        factors, constant = combinations[link.name]
+        if link.name in columns:
+            column, speed = columns[link.name]
+            positions.append(np.eye(nq)[column : column + link.joint.nq])
+            speeds.append(np.eye(nv)[speed : speed + link.joint.nv])
+        else:
+            row, rate = np.zeros((1, nq)), np.zeros((1, nv))
+            for name, factor in factors.items():
+                row[0, columns[name][0]] = rate[0, columns[name][1]] = factor
+            positions.append(row)
+            speeds.append(rate)
+        offsets.append(np.full(link.joint.nq, constant))
+    return CoordinateMap(np.vstack(positions), np.concatenate(offsets), np.vstack(speeds))
+
+
+def _combination(
+    joint: str, dependent: Mapping[str, Coupling], path: tuple[str, ...], where: str
+) -> tuple[dict[str, float], float]:
+    """A coordinate as factors of independent joints and a constant."""
+    if joint in path:
+        raise RobotError(
+            f"couplings make joint '{joint}' depend on itself: {' -> '.join((*path, joint))}",
+            where=where,
+            allowed="couplings whose first joints follow from joints that are not coupled",
+            fix="put another joint first in one of these couplings",
+        )
+    if joint not in dependent:
+        return {joint: 1.0}, 0.0
+    (_, own), *others = dependent[joint].terms
+    factors: dict[str, float] = {}
+    constant = dependent[joint].constant / own
+    for name, factor in others:
+        inner, inner_constant = _combination(name, dependent, (*path, joint), where)
+        constant -= factor / own * inner_constant
+        for independent, value in inner.items():
+            factors[independent] = factors.get(independent, 0.0) - factor / own * value
+    return {name: value for name, value in factors.items() if value != 0.0}, constant
