@@ -8,7 +8,7 @@ Ghodoussi, *Dynamics computation of closed-link robot mechanisms*, IEEE Trans. R
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import wraps
 
 import numpy as np
@@ -21,7 +21,6 @@ from armblocks.dynamics.constrained import (
 )
 from armblocks.dynamics.joint_motion import entries
 from armblocks.dynamics.mechanism import RANK_TOLERANCE, mechanism
-from armblocks.dynamics.reduction import Trace
 from armblocks.equations import TracedFunction, flatten
 from armblocks.errors import RobotError
 from armblocks.robot.robot import Robot
@@ -45,6 +44,9 @@ def motor_torques(robot: Robot, tree: KinematicTree, q: SX, free_torques: SX) ->
     torques = free_torques - mtimes(J.T, multipliers)
     torques[passive] = 0.0
     return SX(torques)
+
+
+Trace = Callable[[Robot], TracedFunction]
 
 
 def of_motors(trace: Trace) -> Trace:

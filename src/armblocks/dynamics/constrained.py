@@ -26,6 +26,7 @@ from armblocks.dynamics.mechanism import Array, mechanism
 from armblocks.dynamics.reduction import (
     generalised_forces,
     reduced_columns,
+    reduced_symmetric,
     tree_coordinates,
     tree_speeds,
 )
@@ -135,7 +136,7 @@ class ConstrainedEquations:
         for i, row in zip(order, M):
             for j, entry in zip(order, row):
                 of_tree[i, j] = entry
-        return symmetric_solver(generalised_forces(self._map, reduced_columns(self._map, of_tree)))
+        return symmetric_solver(reduced_symmetric(self._map, of_tree))
 
 
 def independent_relations(robot: Robot, near: Array | None = None) -> tuple[int, ...]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from casadi import SX, cos, sin
+from casadi import OP_NEG, SX, cos, sin
 
 from armblocks.dynamics.ball_joints import ball_rotation
 from armblocks.robot.tree import Body, KinematicTree
@@ -53,7 +53,12 @@ def cos_sin(variable: Scalar, constant: float) -> RotationZ:
     quarters = round(constant / (math.pi / 2))
     if abs(constant - quarters * (math.pi / 2)) > 4 * math.ulp(max(abs(constant), math.pi / 2)):
         variable, quarters = variable + constant, 0
-    c, s = SX(cos(variable)), SX(sin(variable))
+    variable = SX(variable)
+    if variable.is_op(OP_NEG):
+        # The joints of a parallelogram have opposite angles.
+        c, s = cos(variable.dep()), -sin(variable.dep())
+    else:
+        c, s = cos(variable), sin(variable)
     match quarters % 4:
         case 0:
             return RotationZ(c, s)

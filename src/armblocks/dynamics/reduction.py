@@ -6,45 +6,43 @@ With the constant matrix C of :class:`armblocks.robot.coordinate_map.CoordinateM
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import wraps
+from collections.abc import Callable, Sequence
 
 import numpy as np
-from casadi import DM, SX, mtimes, sparsify
+from casadi import DM, SX, mtimes, sparsify, vertcat
 from numpy.typing import NDArray
 
-from armblocks.equations import Signature, TracedFunction, flatten, unflatten
-from armblocks.equations.signatures import Slot
 from armblocks.robot.coordinate_map import CoordinateMap
-from armblocks.robot.robot import Robot
-
-Trace = Callable[[Robot], TracedFunction]
 
 
-def in_independent_coordinates(trace: Trace) -> Trace:
-    """The trace of a function, which also accepts robots with couplings.
+def in_independent_coordinates(
+    coordinates: CoordinateMap, inputs: Sequence[str], output: str, equations: Callable[..., SX]
+) -> Callable[..., SX]:
+    """The equations of a tree as equations in independent coordinates.
 
-    Inputs ``q``, ``qd``, ``qdd`` and outputs ``tau``, ``J``, ``M``, ``C`` are those of the independent
-    coordinates; other inputs and outputs do not depend on their choice.
+    Inputs named ``q``, ``qd``, ``qdd`` and outputs named ``tau``, ``J``, ``M``, ``C`` are transformed; other
+    inputs and outputs do not depend on the choice of coordinates.
     """
+    transforms = {"q": tree_coordinates, "qd": tree_speeds, "qdd": tree_speeds}
 
-    @wraps(trace)
-    def reduced_trace(robot: Robot) -> TracedFunction:
-        if not robot.couplings:
-            return trace(robot)
-        return _reduced(trace(robot.uncoupled), robot)
+    def reduced_equations(*values: SX) -> SX:
+        of_tree = [
+            transforms[name](coordinates, value) if name in transforms else value
+            for name, value in zip(inputs, values)
+        ]
+        return _reduced_output(coordinates, output, equations(*of_tree))
 
-    return reduced_trace
+    return reduced_equations
 
 
 def tree_coordinates(coordinates: CoordinateMap, q: SX) -> SX:
-    """The coordinates of all joints of the tree for ``q`` (nq, 1)."""
-    return mtimes(_sparse(coordinates.positions), q) + SX(coordinates.offsets)
+    """The coordinates of all joints of the tree, without offsets, for ``q`` (nq, 1)."""
+    return _products(coordinates.positions, q)
 
 
 def tree_speeds(coordinates: CoordinateMap, qd: SX) -> SX:
     """The speeds, or accelerations, of all joints of the tree for ``qd`` (nv, 1)."""
-    return mtimes(_sparse(coordinates.speeds), qd)
+    return _products(coordinates.speeds, qd)
 
 
 def generalised_forces(coordinates: CoordinateMap, tau: SX) -> SX:
@@ -57,33 +55,14 @@ def reduced_columns(coordinates: CoordinateMap, J: SX) -> SX:
     return mtimes(J, _sparse(coordinates.speeds))
 
 
-def _reduced(traced: TracedFunction, robot: Robot) -> TracedFunction:
-    coordinates = robot.coordinate_map
-    sizes = {"q": robot.nq, "qd": robot.nv, "qdd": robot.nv}
-    inputs = Signature(
-        tuple(Slot(s.name, (sizes[s.name],), s.unit) if s.name in sizes else s for s in traced.inputs)
-    )
-    n = robot.nv
-    shapes = {"tau": (n,), "J": (6, n), "M": (n, n), "C": (n, n)}
-    outputs = Signature(tuple(Slot(s.name, shapes.get(s.name, s.shape), s.unit) for s in traced.outputs))
-
-    def equations(*values: SX) -> tuple[SX, ...]:
-        of_tree = [
-            tree_coordinates(coordinates, value)
-            if slot.name == "q"
-            else tree_speeds(coordinates, value)
-            if slot.name in sizes
-            else value
-            for slot, value in zip(inputs, values)
-        ]
-        flat = [flatten(value, slot.shape) for value, slot in zip(of_tree, traced.inputs)]
-        results = traced.casadi_function().call(flat, True, False)
-        natural = [unflatten(result, slot.shape) for result, slot in zip(results, traced.outputs)]
-        return tuple(
-            _reduced_output(coordinates, slot.name, result) for slot, result in zip(outputs, natural)
-        )
-
-    return TracedFunction.trace(traced.name, inputs, outputs, equations)
+def reduced_symmetric(coordinates: CoordinateMap, M: SX) -> SX:
+    """``C' M C`` for a symmetric M; each pair of equal entries is computed once."""
+    product = generalised_forces(coordinates, reduced_columns(coordinates, M))
+    upper = SX(product)
+    for i in range(upper.shape[0]):
+        for j in range(i):
+            upper[i, j] = upper[j, i]
+    return upper
 
 
 def _reduced_output(coordinates: CoordinateMap, name: str, value: SX) -> SX:
@@ -92,10 +71,25 @@ def _reduced_output(coordinates: CoordinateMap, name: str, value: SX) -> SX:
             return generalised_forces(coordinates, value)
         case "J":
             return reduced_columns(coordinates, value)
-        case "M" | "C":
+        case "M":
+            return reduced_symmetric(coordinates, value)
+        case "C":
             return generalised_forces(coordinates, reduced_columns(coordinates, value))
         case _:
             return value
+
+
+def _products(matrix: NDArray[np.float64], values: SX) -> SX:
+    """``matrix values``. Rows of opposite signs become an expression and its negative, computed once."""
+    rows: list[SX] = []
+    for row in matrix:
+        factors = [(k, float(row[k])) for k in np.flatnonzero(row)]
+        sign = -1.0 if factors and factors[0][1] < 0.0 else 1.0
+        total = SX(0.0)
+        for k, factor in factors:
+            total = total + sign * factor * values[int(k)]
+        rows.append(sign * total)
+    return SX(vertcat(*rows))
 
 
 def _sparse(matrix: NDArray[np.float64]) -> SX:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from casadi import SX, horzsplit, jacobian, mtimes, vertcat
+from casadi import SX, jacobian, mtimes, vertcat
 
 from armblocks.dynamics.actuation import of_motors
 from armblocks.dynamics.ball_joints import (
@@ -53,7 +53,6 @@ from armblocks.robot.tree import KinematicTree
 from armblocks.spatial.vectors import Scalar, add, rotate, scale
 
 
-@in_independent_coordinates
 def trace_fkine(robot: Robot) -> TracedFunction:
     """``T (4, 4)``: pose of the tool in the world, base and tool transform included; m."""
     tree = KinematicTree.of(robot)
@@ -65,7 +64,6 @@ def trace_fkine(robot: Robot) -> TracedFunction:
     return _trace("fkine", robot, ("q",), ("T", (4, 4), "m"), equations)
 
 
-@in_independent_coordinates
 def trace_link_poses(robot: Robot) -> TracedFunction:
     """``poses (L + 2, 4, 4)`` in the world: the base, every link in the robot's order, the tool; m."""
     tree = KinematicTree.of(robot)
@@ -79,7 +77,6 @@ def trace_link_poses(robot: Robot) -> TracedFunction:
     return _trace("link_poses", robot, ("q",), ("poses", (len(robot.links) + 2, 4, 4), "m"), equations)
 
 
-@in_independent_coordinates
 def trace_jacob0(robot: Robot) -> TracedFunction:
     """``J (6, n)``: velocity of the tool's origin, then angular velocity of the tool, in world axes."""
     tree = KinematicTree.of(robot)
@@ -90,7 +87,6 @@ def trace_jacob0(robot: Robot) -> TracedFunction:
     return _trace("jacob0", robot, ("q",), ("J", (6, robot.n), ""), equations)
 
 
-@in_independent_coordinates
 def trace_jacobe(robot: Robot) -> TracedFunction:
     """``J (6, n)``: velocity of the tool's origin, then angular velocity of the tool, in tool axes."""
     tree = KinematicTree.of(robot)
@@ -109,14 +105,14 @@ def trace_manipulability(robot: Robot) -> TracedFunction:
         if not robot.couplings:
             return yoshikawa(world_columns(tree, entries(q)))
         J = jacobian_matrix(world_columns(tree, entries(tree_coordinates(coordinates, q))))
-        columns = horzsplit(reduced_columns(coordinates, J))
-        return yoshikawa([((c[0], c[1], c[2]), (c[3], c[4], c[5])) for c in columns])
+        reduced = reduced_columns(coordinates, J)
+        columns = [entries(SX(reduced[:, k])) for k in range(robot.nv)]
+        return yoshikawa([((vx, vy, vz), (wx, wy, wz)) for vx, vy, vz, wx, wy, wz in columns])
 
-    return _trace("manipulability", robot, ("q",), ("w", (), ""), equations)
+    return _trace("manipulability", robot, ("q",), ("w", (), ""), equations, of_tree=False)
 
 
 @of_motors
-@in_independent_coordinates
 def trace_rne(robot: Robot) -> TracedFunction:
     """``tau (n,)`` of a motion, with rigid bodies, rotor inertia, friction and the robot's gravity."""
     tree = regrouped(KinematicTree.of(robot))
@@ -124,13 +120,12 @@ def trace_rne(robot: Robot) -> TracedFunction:
     def equations(q: SX, qd: SX, qdd: SX) -> SX:
         rates, accelerations = entries(qd), entries(qdd)
         rigid = rnea(tree, joint_motions(tree, q), rates, accelerations, tree.gravity)
-        return _sum(rigid, rotor_torques(robot, accelerations), joint_friction(robot, rates))
+        return _sum(rigid, rotor_torques(tree.robot, accelerations), joint_friction(tree.robot, rates))
 
     return _trace("rne", robot, ("q", "qd", "qdd"), ("tau", (robot.n,), "N m"), equations)
 
 
 @of_motors
-@in_independent_coordinates
 def trace_rne_loaded(robot: Robot) -> TracedFunction:
     """``tau (n,)`` as ``rne``, with a wrench at the tip and a payload at the tool."""
     tree = regrouped(KinematicTree.of(robot))
@@ -141,14 +136,13 @@ def trace_rne_loaded(robot: Robot) -> TracedFunction:
         rigid = rnea(
             loaded, joint_motions(loaded, q), rates, accelerations, tree.gravity, tip_wrench(tree, wrench)
         )
-        return _sum(rigid, rotor_torques(robot, accelerations), joint_friction(robot, rates))
+        return _sum(rigid, rotor_torques(tree.robot, accelerations), joint_friction(tree.robot, rates))
 
     inputs = ("q", "qd", "qdd", "wrench", "payload")
     return _trace("rne", robot, inputs, ("tau", (robot.n,), "N m"), equations)
 
 
 @of_motors
-@in_independent_coordinates
 def trace_gravload(robot: Robot) -> TracedFunction:
     """``tau (n,)`` that holds the arm at rest against gravity."""
     tree = regrouped(KinematicTree.of(robot))
@@ -160,7 +154,6 @@ def trace_gravload(robot: Robot) -> TracedFunction:
     return _trace("gravload", robot, ("q",), ("tau", (robot.n,), "N m"), equations)
 
 
-@in_independent_coordinates
 def trace_inertia(robot: Robot) -> TracedFunction:
     """``M (n, n)``: joint-space inertia, rotors included; kg m2, kg m or kg."""
     tree = regrouped(KinematicTree.of(robot))
@@ -173,7 +166,6 @@ def trace_inertia(robot: Robot) -> TracedFunction:
     return _trace("inertia", robot, ("q",), ("M", (robot.n, robot.n), "kg m2"), equations)
 
 
-@in_independent_coordinates
 def trace_coriolis(robot: Robot) -> TracedFunction:
     """``C (n, n)``: ``C qd`` is the velocity torque without friction, and ``dM/dt - 2 C`` is skew.
 
@@ -200,7 +192,6 @@ def trace_coriolis(robot: Robot) -> TracedFunction:
     return _trace("coriolis", robot, ("q", "qd"), ("C", (robot.n, robot.n), "N m s"), equations)
 
 
-@in_independent_coordinates
 def trace_friction(robot: Robot) -> TracedFunction:
     """``tau (n,)`` that overcomes motor friction, with the sign of ``qd``; see :class:`FrictionModel`.
 
@@ -208,7 +199,7 @@ def trace_friction(robot: Robot) -> TracedFunction:
     """
 
     def equations(qd: SX) -> SX:
-        return _sum(joint_friction(robot, entries(qd)))
+        return _sum(joint_friction(robot.uncoupled, entries(qd)))
 
     return _trace("friction", robot, ("qd",), ("tau", (robot.n,), "N m"), equations)
 
@@ -228,7 +219,7 @@ def trace_accel(robot: Robot) -> TracedFunction:
         net_torque = _difference(entries(tau), joint_friction(robot, rates))
         return _sum(forward_dynamics(tree, q, rates, net_torque))
 
-    return _trace("accel", robot, ("q", "qd", "tau"), ("qdd", (robot.n,), "rad/s2"), equations)
+    return _trace("accel", robot, ("q", "qd", "tau"), ("qdd", (robot.n,), "rad/s2"), equations, of_tree=False)
 
 
 def trace_accel_loaded(robot: Robot) -> TracedFunction:
@@ -250,7 +241,7 @@ def trace_accel_loaded(robot: Robot) -> TracedFunction:
         return _sum(forward_dynamics(loaded, q, rates, net_torque, wrenches))
 
     inputs = ("q", "qd", "tau", "wrench", "payload")
-    return _trace("accel", robot, inputs, ("qdd", (robot.n,), "rad/s2"), equations)
+    return _trace("accel", robot, inputs, ("qdd", (robot.n,), "rad/s2"), equations, of_tree=False)
 
 
 def trace_constrained_motion(robot: Robot, near: Array | None = None) -> TracedFunction:
@@ -273,7 +264,6 @@ def trace_constrained_motion(robot: Robot, near: Array | None = None) -> TracedF
     return TracedFunction.trace("constrained_motion", _inputs(robot, ("q", "qd", "tau")), outputs, equations)
 
 
-@in_independent_coordinates
 def trace_kinetic_energy(robot: Robot) -> TracedFunction:
     """``energy ()``, J, kinetic energy of bodies and rotors."""
     tree = regrouped(KinematicTree.of(robot))
@@ -284,7 +274,6 @@ def trace_kinetic_energy(robot: Robot) -> TracedFunction:
     return _trace("kinetic_energy", robot, ("q", "qd"), ("energy", (), "J"), equations)
 
 
-@in_independent_coordinates
 def trace_potential_energy(robot: Robot) -> TracedFunction:
     """``energy ()``, J, potential energy: zero if the centre of mass is at the world's origin."""
     tree = KinematicTree.of(robot)
@@ -295,7 +284,6 @@ def trace_potential_energy(robot: Robot) -> TracedFunction:
     return _trace("potential_energy", robot, ("q",), ("energy", (), "J"), equations)
 
 
-@in_independent_coordinates
 def trace_centre_of_mass(robot: Robot) -> TracedFunction:
     """``centre (3,)`` of mass of all links in the world, m. Raises RobotError for a robot without mass."""
     tree = KinematicTree.of(robot)
@@ -321,7 +309,7 @@ def trace_position_rates(robot: Robot) -> TracedFunction:
     def equations(q: SX, qd: SX) -> SX:
         return _sum(position_rates(robot, entries(q), entries(qd)))
 
-    return _trace("position_rates", robot, ("q", "qd"), ("rates", (robot.nq,), ""), equations)
+    return _trace("position_rates", robot, ("q", "qd"), ("rates", (robot.nq,), ""), equations, of_tree=False)
 
 
 def trace_integrate(robot: Robot) -> TracedFunction:
@@ -330,7 +318,7 @@ def trace_integrate(robot: Robot) -> TracedFunction:
     def equations(q: SX, qd: SX, dt: SX) -> SX:
         return _sum(integrated(robot, entries(q), entries(qd), dt))
 
-    return _trace("integrate", robot, ("q", "qd", "dt"), ("q", (robot.nq,), ""), equations)
+    return _trace("integrate", robot, ("q", "qd", "dt"), ("q", (robot.nq,), ""), equations, of_tree=False)
 
 
 def trace_difference(robot: Robot) -> TracedFunction:
@@ -339,7 +327,7 @@ def trace_difference(robot: Robot) -> TracedFunction:
     def equations(q0: SX, q1: SX) -> SX:
         return _sum(difference(robot, entries(q0), entries(q1)))
 
-    return _trace("difference", robot, ("q0", "q1"), ("qd", (robot.n,), ""), equations)
+    return _trace("difference", robot, ("q0", "q1"), ("qd", (robot.n,), ""), equations, of_tree=False)
 
 
 def trace_normalised(robot: Robot) -> TracedFunction:
@@ -348,7 +336,7 @@ def trace_normalised(robot: Robot) -> TracedFunction:
     def equations(q: SX) -> SX:
         return _sum(normalised(robot, entries(q)))
 
-    return _trace("normalised", robot, ("q",), ("q", (robot.nq,), ""), equations)
+    return _trace("normalised", robot, ("q",), ("q", (robot.nq,), ""), equations, of_tree=False)
 
 
 TRACES: Mapping[str, Callable[[Robot], TracedFunction]] = {
@@ -382,7 +370,10 @@ def _trace(
     inputs: Sequence[str],
     output: tuple[str, tuple[int, ...], str],
     equations: Callable[..., SX],
+    *,
+    of_tree: bool = True,
 ) -> TracedFunction:
+    """The trace of ``equations``, which have the coordinates of the tree (``of_tree``) or of the robot."""
     if robot.n == 0:
         raise RobotError(
             f"no joint moves, so there is no {name}",
@@ -390,6 +381,8 @@ def _trace(
             allowed="at least one joint that is not fixed",
             fix="give the robot a joint that moves",
         )
+    if robot.couplings and of_tree:
+        equations = in_independent_coordinates(robot.coordinate_map, inputs, output[0], equations)
     return TracedFunction.trace(name, _inputs(robot, inputs), signature(output), equations)
 
 

@@ -3,6 +3,8 @@
 A coupling makes one joint depend linearly on others. The robot's q has the independent joints only:
 
     q_tree = positions q + offsets,    qd_tree = speeds qd,    tau = speeds' tau_tree.
+
+:meth:`armblocks.robot.robot.Robot.uncoupled` has the offsets in its joints.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from armblocks.errors import RobotError
 from armblocks.robot.constraints import Coupling
@@ -22,15 +24,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class CoordinateMap:
-    """``positions`` (nq of the tree, nq), ``offsets`` (nq of the tree,), ``speeds`` (nv of the tree, nv)."""
+    """``positions`` (nq of the tree, nq), ``speeds`` (nv of the tree, nv).
+
+    ``offsets``: the constant of each dependent joint, by name.
+    """
 
     positions: Array
-    offsets: Array
+    offsets: Mapping[str, float]
     speeds: Array
-
-    def tree_coordinates(self, q: ArrayLike) -> Array:
-        """The coordinates of all joints of the tree for ``q`` (nq,)."""
-        return self.positions @ np.asarray(q) + self.offsets
 
 
 def dependent_joints(couplings: Sequence[Coupling]) -> dict[str, Coupling]:
@@ -60,7 +61,8 @@ def coordinate_map(links: Sequence[Link], couplings: Sequence[Coupling], where: 
     for link in independent:
         columns[link.name] = position, speed
         position, speed = position + link.joint.nq, speed + link.joint.nv
-    positions, offsets, speeds = [np.zeros((0, nq))], [np.zeros(0)], [np.zeros((0, nv))]
+    positions, speeds = [np.zeros((0, nq))], [np.zeros((0, nv))]
+    offsets: dict[str, float] = {}
     for link in links:
         factors, constant = combinations[link.name]
         if link.name in columns:
@@ -73,8 +75,8 @@ def coordinate_map(links: Sequence[Link], couplings: Sequence[Coupling], where: 
                 row[0, columns[name][0]] = rate[0, columns[name][1]] = factor
             positions.append(row)
             speeds.append(rate)
-        offsets.append(np.full(link.joint.nq, constant))
-    return CoordinateMap(np.vstack(positions), np.concatenate(offsets), np.vstack(speeds))
+            offsets[link.name] = constant
+    return CoordinateMap(np.vstack(positions), offsets, np.vstack(speeds))
 
 
 def _combination(

@@ -107,8 +107,9 @@ def link_frames(robot: Robot, q: Sequence[float]) -> NDArray[np.float64]:
     coordinates: dict[str, Sequence[float]] = {}
     first = 0
     if robot.couplings:
-        q = robot.coordinate_map.tree_coordinates(q).tolist()
-    for link in robot.tree_links:
+        q = (robot.coordinate_map.positions @ np.asarray(q)).tolist()
+        robot = robot.uncoupled
+    for link in robot.moving_links:
         coordinates[link.name] = q[first : first + link.joint.nq]
         first += link.joint.nq
     for link in _parents_first(robot):

@@ -102,8 +102,20 @@ class Robot:
 
     @cached_property
     def uncoupled(self) -> Robot:
-        """The robot without its couplings: q has all joints of the tree."""
-        return replace(self, constraints=self.closures) if self.couplings else self
+        """The robot without its couplings: q has all joints of the tree.
+
+        The constants of the couplings are in the offsets of the dependent joints.
+        """
+        if not self.couplings:
+            return self
+        offsets = self.coordinate_map.offsets
+        links = tuple(
+            replace(link, joint=link.joint.with_offset(offsets[link.name]), dh=None)
+            if link.name in offsets
+            else link
+            for link in self.links
+        )
+        return replace(self, links=links, constraints=self.closures)
 
     @cached_property
     def coordinate_map(self) -> CoordinateMap:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Self, cast
 
 from armblocks.errors import RobotError, check_arguments
@@ -141,6 +141,10 @@ class Joint(ABC):
                 low, high = (motion.linear * (end + motion.offset) for end in limits.position)
                 return min(low, high), max(low, high)
         return None
+
+    def with_offset(self, added: float) -> Self:
+        """The joint with a larger offset of its single coordinate."""
+        return replace(self, offset=self.offset + added)
 
     def motion(self, q: Sequence[float]) -> Transform:
         """The pose of the distal side in the joint frame at the coordinates ``q`` (nq,), offset included."""
