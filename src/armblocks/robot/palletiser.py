@@ -87,7 +87,8 @@ def palletiser(
     limits: Sequence[JointLimits] = (JointLimits(),) * 4,
     motors: Sequence[Motor | None] = (None,) * 4,
     masses: Masses | None = None,
-    **fields: str,
+    manufacturer: str = "",
+    comment: str = "",
 ) -> Robot:
     """Build a palletising arm with four axes from the lengths of its data sheet, m.
 
@@ -102,8 +103,7 @@ def palletiser(
 
     Turret, arms, drive lever and drive rod, two level rods with their triangle, wrist and flange are bodies.
     The parallelograms are couplings, so q has four entries and all motions are exact. ``masses`` (None: no
-    masses) are those of the parts; arms and rods are beams of square section with uniform mass. ``fields``:
-    other texts of :class:`armblocks.robot.Robot`, such as ``manufacturer``.
+    masses) are those of the parts; arms and rods are beams of square section with uniform mass.
     """
     if upper_arm_angle not in ("absolute", "relative"):
         raise InputError(
@@ -120,7 +120,7 @@ def palletiser(
         masses=masses,
     )
     couplings = _couplings(tuple(axes), upper_arm_angle == "relative")
-    return Robot(name=name, links=links, constraints=couplings, **fields)
+    return Robot(name=name, manufacturer=manufacturer, comment=comment, links=links, constraints=couplings)
 
 
 def _links(
