@@ -25,7 +25,7 @@ from armblocks.robot import Prismatic, Robot
 from armblocks.robot.constraints import RevoluteClosure
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
-from mechanisms_for_tests import bricard, four_bar, parallelograms, slider_crank  # noqa: E402
+from mechanisms_for_tests import bricard, four_bar, parallelograms, slider_crank
 
 STOP_TIME = 2.0
 CASES: dict[str, tuple[Callable[[], Robot], list[float]]] = {
