@@ -11,10 +11,12 @@ from numpy.testing import assert_allclose
 from urdf_trees import Oracle, random_urdf
 
 import armblocks as ab
+from armblocks.dynamics import trace_fkine
 from armblocks.errors import ArmblocksWarning, InertiaWarning, UnknownNameError
 from armblocks.formats import load_robot, read_robots
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.urdf.reader import read_urdf
+from armblocks.formats.urdf.writer import write_urdf
 from armblocks.robot import Robot, deepest_tip, with_tip
 from armblocks.robot.shapes import Box, Cylinder, Material, Sphere
 from robots_for_tests import evaluate
@@ -205,7 +207,7 @@ FOUND = [
     (
         joint(f'{LIMIT}<mimic joint="other"/>'),
         "urdf-mimic",
-        "it mimics joint 'other'; here its coordinate is independent",
+        "it mimics joint 'other' with the multiplier 1; its coordinate is independent here",
     ),
     (joint(f"{LIMIT}<limits/>"), "urdf-unknown-element", "the element <limits> is not read"),
     (
@@ -239,6 +241,22 @@ FOUND = [
         "the mesh 'a.ply' is not shown: '.ply' meshes are not supported",
     ),
 ]
+
+
+def test_a_joint_that_mimics_another_has_no_coordinate_of_its_own() -> None:
+    finger = (
+        f'<link name="finger">{INERTIAL}</link><joint name="k" type="prismatic"><parent link="arm"/>'
+        f'<child link="finger"/>{LIMIT}<mimic joint="j" multiplier="-2" offset="0.5"/></joint></robot>'
+    )
+    robot, context = read(joint(LIMIT).replace("</robot>", finger))
+    assert not context.findings
+    assert robot.joint_names == ("arm",)
+    assert robot.couplings[0].terms == (("finger", 1.0), ("arm", 2.0))
+    assert robot.couplings[0].constant == 0.5
+    again = read_urdf(write_urdf(robot), "again.urdf", FileContext())
+    assert again.couplings[0].terms == robot.couplings[0].terms
+    (pose,), (expected,) = trace_fkine(again)([0.3]), trace_fkine(robot.uncoupled)([0.3, -0.6])
+    assert pose == pytest.approx(expected, abs=1e-15)
 
 
 @pytest.mark.parametrize(

@@ -85,6 +85,7 @@ def print_robot(robot: Robot, console: Console) -> None:
         note = f"Motors, before the gear (friction model: {robot.friction_model.value})"
         _print_links(robot, console, note, _MOTORS)
     _print_limits(robot, console)
+    _print_constraints(robot, console)
     _print_frames(robot, console)
 
 
@@ -128,6 +129,27 @@ def _print_kinematics(robot: Robot, console: Console) -> None:
         console.print(kinematics_text(robot), soft_wrap=True)
     else:
         _print_tree(robot, console)
+
+
+def _print_constraints(robot: Robot, console: Console) -> None:
+    """Print couplings as equations, closures with their links, and the degrees of freedom."""
+    if not robot.constraints:
+        return
+    console.print()
+    console.print("Constraints", style=STRONG)
+    for coupling in robot.couplings:
+        (joint, own), *others = coupling.terms
+        sum_ = " ".join(f"{-factor / own:+g} {name}" for name, factor in others)
+        offset = f" {coupling.constant / own:+g}" if coupling.constant or not others else ""
+        console.print(f"{joint} = {sum_}{offset}", highlight=False, markup=False)
+    for closure in robot.closures:
+        first, second = (name or "(base)" for name in closure.links)
+        text = f"{closure.name}: {closure.title} between {first} and {second}"
+        console.print(text, highlight=False, markup=False)
+    if robot.closures:
+        from armblocks.face.assembly import assemble
+
+        console.print(str(assemble(robot, None, None, ())), highlight=False, markup=False)
 
 
 def _print_tree(robot: Robot, console: Console) -> None:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
 from armblocks.errors import ArmblocksWarning, FormatError
-from armblocks.robot import Joint, JointLimits, Link, Robot, with_tip
+from armblocks.robot import Coupling, Joint, JointLimits, Link, Robot, with_tip
 from armblocks.robot.shapes import Shape
 from armblocks.spatial import Transform
 
@@ -37,6 +37,35 @@ def check_joint(robot: Robot, link: Link, kinds: Collection[type[Joint]], format
         kind = type(link.joint).__name__.lower()
         what = f"the limits of its {kind} joint are not part of the {format} file"
         warn(f"robot '{robot.name}', link '{link.name}'", what)
+
+
+class Mimic(NamedTuple):
+    """The joint of another link that a joint follows: ``q = multiplier q_leader + offset``."""
+
+    leader: str
+    multiplier: float
+    offset: float
+
+
+def mimics_of(robot: Robot, format: str, *, supported: bool) -> dict[str, Mimic]:
+    """The joints that follow another one, by the name of their link.
+
+    Raises ``FormatError`` for closures of loops, for couplings of three or more joints, and for all couplings
+    if the format has none (``supported``).
+    """
+    mimics: dict[str, Mimic] = {}
+    for constraint in robot.constraints:
+        if not (supported and isinstance(constraint, Coupling) and len(constraint.terms) == 2):
+            kind = "coupling" if isinstance(constraint, Coupling) else f"{constraint.title} closure"
+            raise FormatError(
+                f"constraint '{constraint.name}', a {kind}, is not part of {format} files here",
+                where=f"robot '{robot.name}'",
+                allowed="joints that follow one other joint" if supported else "robots without constraints",
+                fix="save the robot as .json",
+            )
+        (follower, own), (leader, factor) = constraint.terms
+        mimics[follower] = Mimic(leader, -factor / own, constraint.constant / own)
+    return mimics
 
 
 def limits_of(link: Link) -> JointLimits:

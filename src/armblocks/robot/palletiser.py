@@ -41,9 +41,9 @@ class Masses:
     def estimated(cls, payload: float, lower_arm: float, upper_arm: float) -> Masses:
         """Estimate the masses from the payload (kg) and the lengths of the arms (m).
 
-        No manufacturer publishes them. The estimate has the masses of the KUKA KR 180 in the paper (150, 100
-        and 50 kg for lower arm, upper arm and wrist) and is proportional to payload and length; rods, lever and
-        triangle are assumptions. Real masses may differ by a factor of two.
+        No manufacturer publishes them. The estimate has the masses of the KUKA KR 180 in the paper (150,
+        100 and 50 kg for lower arm, upper arm and wrist) and is proportional to payload and length; rods,
+        lever and triangle are assumptions. Real masses may differ by a factor of two.
         """
         return cls(
             turret=1.7 * payload,

@@ -25,6 +25,7 @@ from armblocks.formats.robot_writing import (
     inertial_in,
     joint_friction,
     limits_of,
+    mimics_of,
     numbers,
     quoted,
     warn,
@@ -63,12 +64,14 @@ class _Body:
 def write_mjcf(robot: Robot) -> bytes:
     """The MJCF of a robot. Reading it gives the same kinematics and dynamics up to rounding.
 
-    Raises ``FormatError`` for joint types that MJCF does not have, and for chains of more
-    bodies than XML files may be deep. Warns of data that MJCF does not have: gear ratios (rotor inertia and
-    friction are written at the joint), speed limits, the tip and the order of the coordinates of some trees,
-    Coulomb friction that depends on the direction, friction that accelerates, housings. MuJoCo does not
-    accept moving bodies without mass or with physically impossible inertias; they are written as they are.
+    Raises ``FormatError`` for robots with constraints and for joint types that MJCF does not have, and for
+    chains of more bodies than XML files may be deep. Warns of data that MJCF does not have: gear ratios
+    (rotor inertia and friction are written at the joint), speed limits, the tip and the order of the
+    coordinates of some trees, Coulomb friction that depends on the direction, friction that accelerates,
+    housings. MuJoCo does not accept moving bodies without mass or with physically impossible inertias; they
+    are written as they are.
     """
+    mimics_of(robot, "MJCF", supported=False)
     for link in robot.links:
         check_joint(robot, link, _KINDS, "MJCF")
         if link.joint.nq != link.joint.nv:

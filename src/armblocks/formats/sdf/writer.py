@@ -22,6 +22,7 @@ from armblocks.formats.robot_writing import (
     inertial_in,
     joint_friction,
     limits_of,
+    mimics_of,
     numbers,
     quoted,
     warn,
@@ -50,10 +51,11 @@ def write_sdf(robot: Robot) -> bytes:
 
     A robot with another gravity than -9.81 m/s2 along z is written as the model of a world with this gravity.
 
-    Raises ``FormatError`` for joint types that SDF does not have. Warns of data that SDF
-    does not have: the tip and the order of the coordinates of some trees, Coulomb friction that depends on
-    the direction, friction that accelerates, meshes and housings, names that SDF reserves.
+    Raises ``FormatError`` for robots with constraints and for joint types that SDF does not have. Warns of
+    data that SDF does not have: the tip and the order of the coordinates of some trees, Coulomb friction
+    that depends on the direction, friction that accelerates, meshes and housings, names that SDF reserves.
     """
+    mimics_of(robot, "SDF", supported=False)
     warn_of_shapes(robot, (Box, Cylinder, Sphere), "SDF")
     names = file_names(robot, _is_reserved, "SDF")
     used = set(names.values()) | {link.name for link in robot.links}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from armblocks.errors import FormatError
@@ -10,7 +11,18 @@ from armblocks.formats.file_findings import FileContext
 from armblocks.formats.urdf.origins import origin_of
 from armblocks.formats.urdf.rules import AXIS, DAMPING, LIMIT, MIMIC, NO_LIMIT, TRANSMISSION
 from armblocks.formats.xml_elements import Element, note
-from armblocks.robot import Fixed, Free, Joint, JointLimits, Motor, Planar, Prismatic, Revolute, Spherical
+from armblocks.robot import (
+    Coupling,
+    Fixed,
+    Free,
+    Joint,
+    JointLimits,
+    Motor,
+    Planar,
+    Prismatic,
+    Revolute,
+    Spherical,
+)
 from armblocks.spatial import Matrix3, Transform, Vector3, rotation_about, rotation_x
 
 JOINT_KINDS: dict[str, type[Joint]] = {
@@ -23,6 +35,8 @@ JOINT_KINDS: dict[str, type[Joint]] = {
     "spherical": Spherical,
 }
 """The types of URDF, and that of the ball joints of Bullet."""
+_SINGLE = ("revolute", "continuous", "prismatic")
+"""The types with one coordinate."""
 UNIT_LENGTH = 1e-3
 """Maximum deviation of an axis's length from 1 without a finding."""
 UNLIMITED = 1e9
@@ -72,13 +86,33 @@ def joint_of(element: Element, context: FileContext) -> PlacedJoint:
     if kind == "planar":
         to_axis = Transform(rotation=_z_to(_axis(element, context)))
         return PlacedJoint(Planar(), before @ to_axis, to_axis.inverse())
-    mimic = element.first("mimic")
-    if mimic is not None:
-        leader = mimic.attributes.get("joint", "")
-        what = f"it mimics joint '{leader[:40]}'; here its coordinate is independent"
-        note(context, MIMIC, mimic, what, element.label)
     joint = JOINT_KINDS[kind](axis=_axis(element, context), limits=_limits(element, kind, context))
     return PlacedJoint(joint, before)
+
+
+def couplings_of(
+    joints: Mapping[str, Element], links: Mapping[Element, tuple[str, str]], context: FileContext
+) -> tuple[Coupling, ...]:
+    """The couplings of joints that mimic others: ``q = multiplier q_leader + offset``.
+
+    ``links``: the names of parent and child link of each joint; a joint has the name of its child link.
+    """
+    couplings: list[Coupling] = []
+    moving = {name: element for name, element in joints.items() if joint_type_of(element) in _SINGLE}
+    for name, element in moving.items():
+        mimic = element.first("mimic")
+        if mimic is None:
+            continue
+        leader = mimic.attributes.get("joint", "").strip()
+        multiplier, offset = mimic.number("multiplier", 1.0), mimic.number("offset", 0.0)
+        if leader not in moving or leader == name or multiplier == 0.0:
+            what = f"it mimics joint '{leader[:40]}' with the multiplier {multiplier:g}"
+            note(context, MIMIC, mimic, f"{what}; its coordinate is independent here", element.label)
+            continue
+        follower, followed = links[element][1], links[moving[leader]][1]
+        terms = ((follower, 1.0), (followed, -multiplier))
+        couplings.append(Coupling(name=f"{name} mimics {leader}", terms=terms, constant=offset))
+    return tuple(couplings)
 
 
 def _z_to(axis: Vector3) -> Matrix3:

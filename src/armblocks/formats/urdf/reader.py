@@ -17,7 +17,14 @@ from pathlib import PurePath
 from armblocks.errors import FormatError, RobotError, UnknownNameError
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.urdf.inertials import inertial_of
-from armblocks.formats.urdf.joints import PlacedJoint, Transmission, joint_of, motor_of, transmissions_of
+from armblocks.formats.urdf.joints import (
+    PlacedJoint,
+    Transmission,
+    couplings_of,
+    joint_of,
+    motor_of,
+    transmissions_of,
+)
 from armblocks.formats.urdf.names import free_joint_name
 from armblocks.formats.urdf.rules import NAME, UNKNOWN
 from armblocks.formats.urdf.shapes import shapes_of
@@ -85,7 +92,9 @@ def robot_of(root: Element, context: FileContext) -> Robot:
         described = [replace(link, geometry=None) for link in described]
     name = root.attributes.get("name", "").strip() or PurePath(root.file).stem
     try:
-        return with_tip(Robot(name=name, links=tuple(described)), deepest_tip(described))
+        couplings = couplings_of(joints, joint_links, context)
+        robot = Robot(name=name, links=tuple(described), constraints=couplings)
+        return with_tip(robot, deepest_tip(described))
     except RobotError as error:
         raise FormatError(
             f"{error.where}: {error.what}", where=root.file, allowed=error.allowed, fix=error.fix

@@ -6,8 +6,8 @@ from armblocks.formats.file_findings import Rule
 
 MIMIC = Rule(
     code="urdf-mimic",
-    allowed="joints that move independently",
-    remedy="give both coordinates the values of the coupling",
+    allowed="<mimic> of another revolute, continuous or prismatic joint, with a multiplier other than 0",
+    remedy="name the joint that is followed, or remove <mimic>",
 )
 NO_LIMIT = Rule(
     code="urdf-limit-missing",

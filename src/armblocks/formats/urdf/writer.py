@@ -14,11 +14,13 @@ import numpy as np
 
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.robot_writing import (
+    Mimic,
     check_joint,
     free_name,
     inertial_in,
     joint_friction,
     limits_of,
+    mimics_of,
     numbers,
     quoted,
     warn,
@@ -44,7 +46,7 @@ _KINDS: Mapping[type[Joint], str] = {
 def write_urdf(robot: Robot) -> bytes:
     """The URDF of a robot. Reading it gives the same kinematics and dynamics up to rounding.
 
-    Raises ``FormatError`` for joint types that URDF does not have. Warns of data that URDF
+    Raises ``FormatError`` for joint types and constraints that URDF does not have. Warns of data that URDF
     does not have: another gravity, the tip and the order of the coordinates of some trees, Coulomb friction
     that depends on the direction, friction that accelerates, meshes and housings.
     """
@@ -52,6 +54,7 @@ def write_urdf(robot: Robot) -> bytes:
         what = f"gravity {robot.gravity} is not part of a URDF file, which is read with -9.81 along z"
         warn(f"robot '{robot.name}'", what)
     warn_of_shapes(robot, (Box, Cylinder, Sphere), "URDF")
+    mimics = mimics_of(robot, "URDF", supported=True)
     names = {link.name for link in robot.links}
     root = free_name("base_link", names)
     own_root = _root_link(robot)
@@ -61,7 +64,7 @@ def write_urdf(robot: Robot) -> bytes:
     for link in robot.links:
         parts += _link_lines(robot, link)
         if link is not own_root:
-            parts += _joint_lines(robot, link, root)
+            parts += _joint_lines(robot, link, root, mimics.get(link.name))
     last = robot.links[-1]
     tip, end = last.name, last.after @ robot.tool
     if not end.is_identity:
@@ -118,7 +121,7 @@ def _geometry(shape: Shape) -> str:
             return ""
 
 
-def _joint_lines(robot: Robot, link: Link, root: str) -> list[str]:
+def _joint_lines(robot: Robot, link: Link, root: str, mimic: Mimic | None) -> list[str]:
     check_joint(robot, link, _KINDS, "URDF")
     joint = link.joint
     parent = next((other for other in robot.links if other.name == link.parent), None)
@@ -134,6 +137,11 @@ def _joint_lines(robot: Robot, link: Link, root: str) -> list[str]:
         axis = [] if kind == "floating" else [f'    <axis xyz="{numbers(joint.axis)}"/>']
         limit = [f"    {_limit(link)}"] if joint.nv == 1 else []
         lines += [*axis, *limit, *_dynamics(robot, link)]
+    if mimic is not None:
+        leader = quoted(f"{mimic.leader}_joint", robot)
+        lines.append(
+            f'    <mimic joint={leader} multiplier="{mimic.multiplier!r}" offset="{mimic.offset!r}"/>'
+        )
     lines.append("  </joint>")
     motor = link.motor
     if joint.moves and motor is not None and (motor.gear_ratio, motor.inertia) != (1.0, 0.0):

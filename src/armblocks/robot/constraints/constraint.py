@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Self
 
 from armblocks.errors import RobotError, check_arguments
@@ -33,7 +33,7 @@ class Attachment:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Constraint:
+class Constraint(ABC):
     """Equations that the coordinates of a robot satisfy at all times, beside the tree of its joints.
 
     ``name`` is unique in the robot.
@@ -57,6 +57,10 @@ class Constraint:
                 where="constraint",
             )
 
+    @abstractmethod
+    def with_renamed_link(self, old: str, new: str) -> Self:
+        """The constraint after a link, and with it its joint, has got another name."""
+
     @property
     def links(self) -> tuple[str | None, ...]:
         """The links that the constraint names; None is the base."""
@@ -69,7 +73,7 @@ class Constraint:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Closure(Constraint, ABC):
+class Closure(Constraint):
     """A joint between two links that closes a loop of the tree, described by the relations of two frames.
 
     ``first`` and ``second``: frames on the two links. Each relation is one equation; equations that follow
@@ -90,6 +94,10 @@ class Closure(Constraint, ABC):
                 allowed="frames on two links, or on a link and the base",
                 fix="correct the link of one of the frames",
             )
+
+    def with_renamed_link(self, old: str, new: str) -> Self:
+        ends = [replace(end, link=new) if end.link == old else end for end in (self.first, self.second)]
+        return replace(self, first=ends[0], second=ends[1])
 
     @property
     @abstractmethod

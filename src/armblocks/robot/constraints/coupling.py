@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 from armblocks.errors import RobotError
 from armblocks.robot.constraints.constraint import Constraint
@@ -16,8 +16,8 @@ class Coupling(Constraint):
     """A gear, rack, belt or mimic joint: the sum of ``coefficient q`` over ``terms`` is ``constant``.
 
     ``terms``: pairs of a joint with one coordinate and its coefficient. The first joint depends on the
-    others: it is not an entry of the robot's q. The joint b that mimics a, ``q_b = multiplier q_a + offset``, has the
-    terms ``(("b", 1.0), ("a", -multiplier))`` and the constant ``offset``.
+    others: it is not an entry of the robot's q. The joint b that mimics a, ``q_b = multiplier q_a +
+    offset``, has the terms ``(("b", 1.0), ("a", -multiplier))`` and the constant ``offset``.
     """
 
     terms: tuple[tuple[str, float], ...]
@@ -47,6 +47,10 @@ class Coupling(Constraint):
             raise RobotError(
                 "a coefficient is 0", where=where, allowed="other numbers", fix="leave the joint out"
             )
+
+    def with_renamed_link(self, old: str, new: str) -> Self:
+        terms = tuple((new if joint == old else joint, factor) for joint, factor in self.terms)
+        return replace(self, terms=terms)
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -137,7 +137,8 @@ def _rename(edit: RenameLink, robot: Robot) -> Robot:
         )
         for link in robot.links
     )
-    return replace(robot, links=links)
+    constraints = tuple(constraint.with_renamed_link(old, name) for constraint in robot.constraints)
+    return replace(robot, links=links, constraints=constraints)
 
 
 def _is_chain(robot: Robot) -> bool:
