@@ -210,6 +210,14 @@ def test_couplings_that_contradict_are_refused(terms: tuple[tuple[str, float], .
         Robot(name="pair", links=links, constraints=(first, Coupling(name="second", terms=terms)))
 
 
+@pytest.mark.parametrize(
+    ("terms", "message"), [((), "no joint is coupled"), ((("a", 1.0), ("a", 2.0)), "a joint occurs twice")]
+)
+def test_a_coupling_names_each_joint_once(terms: tuple[tuple[str, float], ...], message: str) -> None:
+    with pytest.raises(RobotError, match=message):
+        Coupling(name="pair", terms=terms)
+
+
 def test_a_state_far_from_the_constraints_has_no_motion() -> None:
     """The result is NaN instead of wrong numbers."""
     motion = trace_constrained_motion(four_bar())

@@ -97,6 +97,46 @@ assert np.allclose(arm.inertia(q), np.diag([0.1, 0.2 + 0.5, 0.3 + 0.5, 2.0]))
 assert np.allclose(arm.gravload(q), [0.0, -2.0 * 9.81 * 0.5, 0.0, 0.0])
 assert np.allclose(arm.difference(q, arm.integrate(q, np.ones(4), 0.5)), 0.5)
 """
+CLOSURE = '''"""Parallel axes."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from armblocks.robot.constraints.constraint import Closure
+from armblocks.robot.constraints.relations import Z_AXES_PARALLEL
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParallelAxes(Closure):
+    """The z axes of the frames are parallel."""
+
+    title: ClassVar[str] = "parallel axes"
+
+    @property
+    def relations(self):
+        return Z_AXES_PARALLEL
+'''
+USE_OF_CLOSURE = """
+import numpy as np
+
+import armblocks as ab
+from armblocks.robot import CONSTRAINT_TYPES
+from armblocks.robot.constraints.parallel_axes import ParallelAxes
+
+assert ParallelAxes in CONSTRAINT_TYPES
+links = [
+    ab.Link(name=name, parent=parent, joint=ab.Revolute(axis=(0, 1, 0)), mass=1.0, inertia=(1, 1, 1))
+    for name, parent in (("arm", None), ("hand", "arm"))
+]
+level = ParallelAxes(name="level", first=ab.Attachment(), second=ab.Attachment(link="hand"))
+ab.save_robot(ab.Robot(name="made", links=links, constraints=[level]), "made.json")
+arm = ab.load_robot("made.json")
+state = arm.assemble([0.3, 0.1], [1.0, 0.0], locked=("arm",))
+assert state.degrees_of_freedom == 1 and state.redundant == {"level": 1}
+assert np.allclose(state.q, [0.3, -0.3]) and np.allclose(state.qd, [1.0, -1.0])
+# The hand does not rotate: only the inertia of the arm remains.
+assert np.allclose(arm.accel(state.q, [0, 0], [2.0, 0.0]), [2.0, -2.0])
+"""
 SOLVER = '''"""Ralston's method."""
 
 from armblocks.integration.butcher_tableau import ButcherTableau, hermite_dense
@@ -162,10 +202,11 @@ assert ".dh" in READABLE
     [
         ("blocks/maths/doubled.py", BLOCK, USE),
         ("robot/joints/telescope.py", JOINT, USE_OF_JOINT),
+        ("robot/constraints/parallel_axes.py", CLOSURE, USE_OF_CLOSURE),
         ("simulation/methods/ralston.py", SOLVER, USE_OF_SOLVER),
         ("formats/robot_formats/dh_table.py", FORMAT, USE_OF_FORMAT),
     ],
-    ids=["a block with a face", "a joint type", "a solver", "a file format"],
+    ids=["a block with a face", "a joint type", "a closure", "a solver", "a file format"],
 )
 def test_an_addition_in_one_file_is_available_everywhere(
     place: str, file: str, use: str, tmp_path: Path
