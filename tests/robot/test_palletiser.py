@@ -63,7 +63,7 @@ def test_both_conventions_describe_one_arm() -> None:
 
 
 def test_the_linkages_are_closed_loops() -> None:
-    """The pins of the parallelograms stay together, and the motion is that of the loops in maximal coordinates."""
+    """The pins of the parallelograms stay together; the motion is that of loops in maximal coordinates."""
     robot = m410("absolute", Masses.estimated(185.0, 1.22, 1.3))
     q, qd, tau = np.random.default_rng(2).uniform(-0.8, 0.8, (3, 4))
     pins = (

@@ -49,9 +49,7 @@ class Assembly:
         return "\n".join(lines)
 
 
-def assemble(
-    robot: Robot, q: ArrayLike | None, qd: ArrayLike | None, locked: Sequence[str]
-) -> Assembly:
+def assemble(robot: Robot, q: ArrayLike | None, qd: ArrayLike | None, locked: Sequence[str]) -> Assembly:
     """The state near ``q`` and ``qd`` that satisfies the constraints, see :meth:`Arm.assemble`."""
     from armblocks.dynamics.mechanism import mechanism
 
