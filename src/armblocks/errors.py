@@ -165,9 +165,9 @@ class AssemblyError(RobotError):
         self,
         what: str,
         *,
-        where: str,
-        allowed: str,
-        fix: str,
+        where: str = "",
+        allowed: str = "",
+        fix: str = "",
         q: Sequence[float] = (),
         gaps: Mapping[str, str] | None = None,
     ) -> None:

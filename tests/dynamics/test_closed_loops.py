@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import armblocks as ab
 from armblocks.dynamics import (
     trace_accel,
     trace_constrained_motion,
@@ -17,7 +18,7 @@ from armblocks.dynamics import (
     trace_rne,
 )
 from armblocks.dynamics.mechanism import Mechanism
-from armblocks.errors import ArmblocksError, AssemblyError, RobotError
+from armblocks.errors import ArmblocksError, AssemblyError, InputError, RobotError, UnknownNameError
 from armblocks.robot import Link, Motor, Revolute, Robot
 from armblocks.robot.constraints import (
     Attachment,
@@ -248,3 +249,20 @@ def test_a_shaft_with_a_cardan_joint_has_its_ratio_of_speeds() -> None:
         omega = qd[0] * np.eye(3)[0] + qd[1] * x[:, 1] + qd[2] * y[:, 2]
         expected = np.cos(beta) / (1 - np.sin(beta) ** 2 * np.cos(angle) ** 2)
         assert axis @ omega == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_robot_without_closures_is_assembled_everywhere() -> None:
+    arm = ab.Arm(replace(four_bar(), constraints=()))
+    state = arm.assemble([0.1, 0.2, 0.3], [1.0, 2.0, 3.0])
+    assert state.q.tolist() == [0.1, 0.2, 0.3] and state.qd.tolist() == [1.0, 2.0, 3.0]
+    assert (state.degrees_of_freedom, state.redundant, str(state)) == (3, {}, "3 degrees of freedom")
+
+
+def test_assemble_refuses_other_sizes_and_unknown_joints() -> None:
+    arm = ab.Arm(four_bar())
+    with pytest.raises(InputError, match=r"q has the shape \(2,\)"):
+        arm.assemble([0.1, 0.2])
+    with pytest.raises(InputError, match="qd is not finite"):
+        arm.assemble(qd=[np.nan, 0.0, 0.0])
+    with pytest.raises(UnknownNameError, match="no joint named 'crnk'"):
+        arm.assemble(locked=("crnk",))

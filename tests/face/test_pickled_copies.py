@@ -21,6 +21,7 @@ import armblocks as ab
 from armblocks import errors, formats
 from armblocks.blocks import BLOCKS, FromFile, Gain, Integrator, PythonFunction, Scope, SineWave
 from armblocks.diagram import UserFunction, content_key
+from armblocks.robot import CONSTRAINT_TYPES, Closure
 from armblocks.simulation import Samples
 from armblocks.simulation.jumps import Jumps
 
@@ -60,6 +61,14 @@ def examples() -> Mapping[str, Any]:
     system = ab.linearize(diagram, "gain.gain", "integrator", at=0.5)
     values = [
         *(arm, robot, robot.links[0], ab.Motor(inertia=1.0), ab.Revolute(), ab.Prismatic(), ab.Fixed()),
+        *(
+            kind(name="c", first=ab.Attachment(), second=ab.Attachment(link="a"), **more)
+            for kind in CONSTRAINT_TYPES
+            if issubclass(kind, Closure)
+            for more in ([{"length": 1.0}] if kind is ab.Rod else [{}])
+        ),
+        *(ab.Attachment(), ab.Coupling(name="c", terms=(("a", 1.0), ("b", 2.0))), arm.assemble()),
+        *(ab.Cylindrical(), ab.Universal(), ab.Planar(), ab.Spherical(), ab.Free(), ab.Screw(pitch=0.1)),
         *(ab.FrictionModel.RELEASE_6, ab.JointLimits(speed=1.0), ab.standard_dh("one", a=1.0).dh),
         *(ab.Payload(mass=2.0), ab.Transform(), ab.jtraj([0, 0], [1, 1], 5)),
         *(diagram, small_builder(), compiled, ab.SimulationOptions(step=0.1), ab.formula("2*k")),

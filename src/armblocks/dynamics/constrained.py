@@ -77,7 +77,7 @@ class ConstrainedEquations:
         self._joints = joint_motions(tree, tree_q)
         equations = constraint_equations(tree, tree_q).only(relations)
         self.residuals = equations.residuals
-        self.J = reduced_columns(self._map, equations.jacobian) if relations else SX(0, robot.nv)
+        self.J = reduced_columns(self._map, equations.jacobian)
 
     def consistent_speeds(self, qd: SX) -> SX:
         """The speeds nearest to ``qd`` in the metric of the kinetic energy that satisfy the constraints."""

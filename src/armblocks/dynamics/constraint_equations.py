@@ -35,6 +35,7 @@ class ConstraintEquations:
     order of its speeds.
     """
 
+    n: int
     names: tuple[str, ...]
     residuals: tuple[Scalar, ...]
     rows: tuple[tuple[Scalar, ...], ...]
@@ -43,6 +44,7 @@ class ConstraintEquations:
         """The relations with these indices."""
         names, residuals, rows = self.names, self.residuals, self.rows
         return ConstraintEquations(
+            self.n,
             tuple(names[i] for i in indices),
             tuple(residuals[i] for i in indices),
             tuple(rows[i] for i in indices),
@@ -51,11 +53,13 @@ class ConstraintEquations:
     @property
     def residual_vector(self) -> SX:
         """The residuals as a column (m, 1)."""
-        return SX(vertcat(*(SX(value) for value in self.residuals)))
+        return SX(vertcat(*(SX(value) for value in self.residuals))) if self.residuals else SX(0, 1)
 
     @property
     def jacobian(self) -> SX:
         """J (m, n); entries that are zero for all q are structural zeros."""
+        if not self.rows:
+            return SX(0, self.n)
         return SX(vertcat(*(horzcat(*(_structural(entry) for entry in row)) for row in self.rows)))
 
 
@@ -73,7 +77,7 @@ def constraint_equations(tree: KinematicTree, q: SX) -> ConstraintEquations:
             names.append(closure.name)
             residuals.append(residual)
             rows.append(tuple(row))
-    return ConstraintEquations(tuple(names), tuple(residuals), tuple(rows))
+    return ConstraintEquations(tree.n, tuple(names), tuple(residuals), tuple(rows))
 
 
 def attached_frame(tree: KinematicTree, attachment: Attachment) -> Frame:
