@@ -19,7 +19,7 @@ SCHEMA = json.loads((Path(formats.__file__).parent / "schema" / "robot.schema.js
 
 
 def robots() -> list[Robot]:
-    coupling = Coupling(name="gear", terms=(("coupler", 2.0), ("crank", -1.0)), constant=0.25)
+    coupling = Coupling(name="gear", terms=(("rocker", 2.0), ("crank", -1.0)), constant=0.25)
     loop = four_bar()
     return [
         replace(loop, constraints=(*loop.constraints, coupling)),
@@ -47,10 +47,13 @@ def test_reading_inverts_writing_for_every_type() -> None:
             "did you mean 'crank'",
         ),
         (
-            '{"type": "coupling", "name": "r", "terms": {"crank": 1}, "length": 2}',
+            '{"type": "coupling", "name": "r", "terms": [], "length": 2}',
             "key 'length' is not known",
         ),
-        ('{"type": "coupling", "name": "r", "terms": {"crank": 0}}', "a coefficient is 0"),
+        (
+            '{"type": "coupling", "name": "r", "terms": [{"joint": "crank", "coefficient": 0}]}',
+            "a coefficient is 0",
+        ),
         (
             '{"type": "rod", "name": "r", "length": -1, '
             '"first": {"link": null}, "second": {"link": "crank"}}',

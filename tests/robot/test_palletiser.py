@@ -7,8 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armblocks.dynamics import trace_accel, trace_fkine, trace_link_poses, trace_rne
+import armblocks as ab
+from armblocks.blocks import Constant, ForwardDynamics
+from armblocks.dynamics import trace_accel, trace_fkine, trace_gravload, trace_link_poses, trace_rne
 from armblocks.errors import InputError
+from armblocks.formats.robot_json import read_robot, write_robot
 from armblocks.robot import Attachment, Motor, RevoluteClosure, Robot
 from armblocks.robot.palletiser import AxisConvention, Masses, palletiser
 from armblocks.spatial import transl
@@ -107,3 +110,13 @@ def test_motors_reflect_their_inertia_at_their_axes() -> None:
 def test_another_word_for_the_convention_is_refused() -> None:
     with pytest.raises(InputError, match="'absolute' or 'relative'"):
         m410("relativ")
+
+
+def test_the_torques_that_hold_the_arm_hold_it_in_a_run() -> None:
+    robot = read_robot(write_robot(m410("absolute", Masses.estimated(185.0, 1.22, 1.3))), "robot.json")
+    q = np.array([0.1, 0.2, -0.1, 0.3])
+    builder = ab.DiagramBuilder("hold")
+    torque = builder.add("torque", Constant(value=trace_gravload(robot)(q)[0]))
+    builder.add("arm", ForwardDynamics(robot=robot, q0=q), torque)
+    result = ab.simulate(builder.build(), stop_time=0.5)
+    assert result["arm/q"] == pytest.approx(np.tile(q, (len(result.time), 1)), abs=1e-9)

@@ -40,7 +40,7 @@ def constraint_from_json(node: Node, transform_from_json: Callable[[Node], Trans
             case "float":
                 values[field.name] = member.number()
             case _:
-                values[field.name] = tuple((name, entry.number()) for name, entry in member.members().items())
+                values[field.name] = tuple(_term_from_json(entry) for entry in member.elements())
     missing = [
         name for name in ("first", "second", "length", "terms") if name in names and name not in values
     ]
@@ -68,10 +68,16 @@ def constraint_to_json(
                 frame["pose"] = transform_to_json(value.pose)
             entry[field.name] = frame
         elif isinstance(value, tuple):
-            entry[field.name] = dict(cast("tuple[tuple[str, float], ...]", value))
+            terms = cast("tuple[tuple[str, float], ...]", value)
+            entry[field.name] = [{"joint": joint, "coefficient": factor} for joint, factor in terms]
         elif field.name != "constant" or value != 0.0:
             entry[field.name] = value
     return entry
+
+
+def _term_from_json(node: Node) -> tuple[str, float]:
+    members = closed_members(node, ("joint", "coefficient"), ("joint", "coefficient"))
+    return members["joint"].text(), members["coefficient"].number()
 
 
 def _attachment_from_json(node: Node, transform_from_json: Callable[[Node], Transform]) -> Attachment:

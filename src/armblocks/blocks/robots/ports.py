@@ -110,7 +110,7 @@ def check_start(block: Block, robot: Robot, name: str) -> None:
 
 def check_consistent_start(block: Block, robot: Robot, q_name: str, qd_name: str) -> None:
     """Raise ``InputError`` if the start values of q and qd violate the constraints of the robot."""
-    if not robot.constraints:
+    if not robot.closures:
         return
     functions = mechanism(robot)
     given = np.asarray(block.parameter_value(q_name), dtype=float)
