@@ -41,6 +41,22 @@ def test_sensitivity_to_a_mask_parameter_agrees_with_differences_of_runs() -> No
     assert np.abs(actual["x", "forward.a"]).max() > 0.01
 
 
+def test_sensitivity_to_an_entry_of_a_mask_parameter() -> None:
+    builder = DiagramBuilder("rates")
+    builder.parameter("rates", (1.0, 2.0), unit="1/s")
+    x = builder.add("x", Integrator(initial=(1.0, 1.0)))
+    builder.connect(builder.add("fall", Gain(gain=formula("-rates")), x), x["u"])
+    settings: dict[str, Any] = {"stop_time": 1.0, "rtol": 1e-10, "atol": 1e-12, "sample_time": 0.1}
+    result = ab.sensitivity(builder.build(), "rates[1]", "x", **settings)
+    t = result.time
+    assert np.allclose(result["x", "rates[1]"][:, 1], -t * np.exp(-2.0 * t), atol=1e-8)
+    assert not result["x", "rates[1]"][:, 0].any()
+    with pytest.raises(
+        InputError, match=r"'rates\[2\]' is not an entry of 'rates'.*rates\[0\] to rates\[1\]"
+    ):
+        ab.sensitivity(builder.build(), "rates[2]", "x")
+
+
 def test_linearisation_by_a_mask_parameter_uses_the_chain_rule() -> None:
     point = ab.linearize(loop(), inputs=["K", "forward.a", "back.gain"], outputs="x", at=1.0)
     u, x = np.sin(1.0), ab.simulate(loop(), stop_time=1.0)["x"][-1]

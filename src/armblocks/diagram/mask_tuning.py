@@ -100,10 +100,13 @@ def added_parameter(diagram: Diagram, path: str) -> AddedParameter:
 def with_mask_parameters(system: HybridSystem, diagram: Diagram, names: Iterable[str]) -> HybridSystem:
     """The equations of a diagram with the mask parameters among ``names`` as parameters.
 
-    Raises as :func:`added_parameter`.
+    A name may be that of one entry: ``servo.gains[1]``. Raises as :func:`added_parameter`.
     """
     parameters = mask_parameters(diagram)
-    added = [name for name in names if name in parameters and name not in system.parameters.ranges]
+    wholes = (name if name in parameters else name.rpartition("[")[0] for name in names)
+    added = [
+        name for name in dict.fromkeys(wholes) if name in parameters and name not in system.parameters.ranges
+    ]
     if not added:
         return system
     return with_added_parameters(system, tuple(added_parameter(diagram, name) for name in added))

@@ -53,7 +53,7 @@ def sensitivity_system(
     system: HybridSystem, parameters: Sequence[str], outputs: Sequence[str]
 ) -> HybridSystem:
     """The system with the derivatives of ``outputs`` (paths of signals) with respect to ``parameters``
-    (paths) as signals.
+    (paths, or entries such as ``g.gain[1]``) as signals.
 
     Raises ``UnknownNameError`` for unknown names. Raises ``InputError`` for a parameter that is a table read
     by index, that acts only through its integer part, or that moves an event at the start; also for implicit
@@ -68,7 +68,7 @@ def sensitivity_system(
 
 def _refuse_tables(system: HybridSystem, parameters: Sequence[str]) -> None:
     for name in parameters:
-        if name in parameters_read_by_index(system):
+        if system.parameters.slot_of(name).name in parameters_read_by_index(system):
             raise InputError(
                 f"the parameter '{name}' is a table that is read by index",
                 where=system.name,
@@ -100,7 +100,7 @@ def _refuse_whole_numbers(system: HybridSystem, parameters: Sequence[str]) -> No
                 continue
             p = traced.arguments[traced.inputs.names.index("p")]
             results = vertcat(*traced.results, SX(0, 1))
-            if results.numel() and depends_on(results, p[system.parameters.ranges[name]]):
+            if results.numel() and depends_on(results, p[system.parameters.range_of(name)]):
                 acts = True
                 smoothly = not jtimes(results, p, _direction(system, name)).is_zero()
         if acts and not smoothly:
@@ -122,7 +122,7 @@ def _functions(system: HybridSystem) -> list[TracedFunction]:
 def _direction(system: HybridSystem, name: str) -> SX:
     """A change of all entries of a parameter, in p."""
     direction = SX.zeros(system.parameters.size)
-    entries = system.parameters.ranges[name]
+    entries = system.parameters.range_of(name)
     for number, index in enumerate(range(entries.start, entries.stop)):
         direction[index] = 1.0 + 0.37 * number
     return direction
@@ -134,7 +134,7 @@ class _AugmentedSystem:
     def __init__(self, system: HybridSystem, parameters: Sequence[str], outputs: Sequence[str]) -> None:
         self.old = system
         (p,) = system.breakpoints.arguments
-        chosen = vertcat(*(p[system.parameters.ranges[name]] for name in parameters))
+        chosen = vertcat(*(p[system.parameters.range_of(name)] for name in parameters))
         sources = depends_on(vertcat(*system.breakpoints.results, SX(0, 1)), chosen)
         _refuse_implicit_jumps(system, sources=sources)
         self.moving = bool(system.guard_directions or system.delays is not None or sources)

@@ -19,8 +19,27 @@ def sensitivity_name(path: str, parameter: str) -> str:
     return f"{path} by {parameter}"
 
 
+def entry_name(slot: Slot, element: str) -> str:
+    """The name of a parameter entry in results: ``k.gain`` for a parameter of one entry, else
+    ``g.gain[1]``."""
+    return slot.name if slot.size == 1 else element
+
+
+def _entries(layout: Signature, parameters: Sequence[str]) -> dict[str, int]:
+    """The entries of parameters, without repetition: their names in results, and their indices in p."""
+    indices: dict[str, int] = {}
+    for name in parameters:
+        slot, entries = layout.slot_of(name), layout.range_of(name)
+        elements = slot.elements if name == slot.name else (name,)
+        names = (entry_name(slot, element) for element in elements)
+        indices.update(zip(names, range(entries.start, entries.stop)))
+    return indices
+
+
 class Columns:
     """The symbols ``t, x, z, w, p`` of a system, sensitivities of ``x``, ``z``, ``w``, and added variables.
+
+    ``parameters``: paths of parameters, or of entries of parameters (``g.gain[1]``).
 
     For parameter ``k``, with the unit vector ``seeds[k]``: ``S[k]`` = dx/dp (nx,), ``Z[k]`` = dz/dp (nz,) and
     ``W[k]`` = dw/dp (nw,). ``V`` = dw/dt (nw,). Further discrete variables are added one by one.
@@ -31,14 +50,11 @@ class Columns:
         self.t, self.x, self.z, self.w, self.p = system.derivative.arguments
         self.names: list[str] = []
         self.seeds: list[SX] = []
-        for name in parameters:
-            slot = system.parameters[name]
-            indices = range(*system.parameters.ranges[name].indices(system.parameters.size))
-            for element, index in zip(slot.elements, indices):
-                seed = SX.zeros(self.p.numel())
-                seed[index] = 1.0
-                self.names.append(name if slot.size == 1 else element)
-                self.seeds.append(seed)
+        for element, index in _entries(system.parameters, parameters).items():
+            seed = SX.zeros(self.p.numel())
+            seed[index] = 1.0
+            self.names.append(element)
+            self.seeds.append(seed)
         self.S = [SX.sym("S", self.x.numel()) for _ in self.names]
         self.Z = [SX.sym("Z", self.z.numel()) for _ in self.names]
         self.W = [SX.sym("W", self.w.numel()) for _ in self.names]

@@ -35,7 +35,7 @@ def refuse_moving_start(system: HybridSystem, parameters: Sequence[str]) -> None
         return
     start = _Start(system)
     for name in parameters:
-        entries = system.parameters.ranges[name]
+        entries = system.parameters.range_of(name)
         guards = [system.guard_names[guard] for guard in start.moving_guards(entries)]
         for block in [*guards, *start.held_states(entries)]:
             raise InputError(

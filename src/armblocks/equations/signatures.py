@@ -109,6 +109,35 @@ class Signature:
             raise UnknownNameError("quantity", name, self.names)
         return self._by_name[name]
 
+    def slot_of(self, name: str) -> Slot:
+        """The slot of this name, or the slot with an entry of this name: ``g.gain[1]``, ``g.gain[0,2]``.
+
+        Raises ``UnknownNameError`` for an unknown slot, ``InputError`` for an unknown entry.
+        """
+        head, bracket, _ = name.rpartition("[")
+        if name in self._by_name or not bracket or head not in self._by_name:
+            return self[name]
+        slot = self[head]
+        if name not in slot.elements:
+            first_and_last = dict.fromkeys((slot.elements[0], slot.elements[-1])) if slot.size else {}
+            raise InputError(
+                f"'{name}' is not an entry of '{head}', which "
+                + (f"has shape {slot.shape}" if slot.shape else "is a scalar"),
+                allowed=" to ".join(first_and_last) or "no entry",
+                fix="correct the index",
+                where="signature",
+            )
+        return slot
+
+    def range_of(self, name: str) -> slice:
+        """The slice of a slot, or of one entry of a slot, in the flat vector; raises as ``slot_of``."""
+        slot = self.slot_of(name)
+        entries = self.ranges[slot.name]
+        if name == slot.name:
+            return entries
+        index = entries.start + slot.elements.index(name)
+        return slice(index, index + 1)
+
     def with_entries(self, entries: Mapping[str, tuple[str, ...]]) -> Signature:
         """The same quantities, with names of entries for the quantities in ``entries``."""
         if not entries:

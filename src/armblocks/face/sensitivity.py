@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from armblocks.diagram import Diagram
 from armblocks.diagram.mask_tuning import mask_parameters, with_mask_parameters
-from armblocks.equations import Signature
-from armblocks.equations.sensitivity import MIXED, sensitivity_name, sensitivity_system
+from armblocks.equations import HybridSystem, Signature, Slot
+from armblocks.equations.sensitivity import MIXED, sensitivity_system
+from armblocks.equations.sensitivity_layout import entry_name, sensitivity_name
 from armblocks.errors import InputError, SimulationError, UnknownNameError
 from armblocks.face.linearizing import resolved_diagram
 from armblocks.face.model import CompiledDiagram, compile_diagram
@@ -39,7 +40,7 @@ class SensitivityResult:
     outputs: tuple[str, ...]
     parameters: tuple[str, ...]
     slots: Signature = field(repr=False)
-    """The parameters with their shapes."""
+    """The parameters with their shapes, also those of which only entries were chosen."""
 
     @property
     def time(self) -> Array:
@@ -49,15 +50,16 @@ class SensitivityResult:
     def __getitem__(self, key: tuple[str, str]) -> Array:
         output, parameter = key
         path = self.run.resolve(output)
-        for slot in self.slots:
-            if parameter == slot.name and slot.size > 1:
-                entries = [self.run[sensitivity_name(path, element)] for element in slot.elements]
-                stacked = np.stack(entries, axis=-1)
-                return stacked.reshape(*stacked.shape[:-1], *slot.shape)
-            if parameter == slot.name or parameter in slot.elements:
-                return self.run[sensitivity_name(path, parameter if slot.size > 1 else slot.name)]
-        valid_names = [*self.parameters, *(element for slot in self.slots for element in slot.elements)]
-        raise UnknownNameError("parameter", parameter, dict.fromkeys(valid_names), where=self.run.name)
+        whole = [slot for slot in self.slots if slot.name in self.parameters]
+        valid_names = dict.fromkeys([*self.parameters, *(entry for slot in whole for entry in slot.elements)])
+        if parameter not in valid_names:
+            raise UnknownNameError("parameter", parameter, valid_names, where=self.run.name)
+        slot = self.slots.slot_of(parameter)
+        if parameter != slot.name or slot.size == 1:
+            return self.run[sensitivity_name(path, entry_name(slot, parameter))]
+        entries = [self.run[sensitivity_name(path, element)] for element in slot.elements]
+        stacked = np.stack(entries, axis=-1)
+        return stacked.reshape(*stacked.shape[:-1], *slot.shape)
 
     def __repr__(self) -> str:
         head = f"<SensitivityResult {self.run.name}: {self.time.size} samples>"
@@ -77,7 +79,8 @@ def sensitivity(
     """Run a diagram together with the exact derivatives of ``outputs`` with respect to tunable
     ``parameters``.
 
-    Mask parameters are allowed; parameters that depend on them by formulas are included.
+    One entry of a parameter is ``"g.gain[1]"`` or ``"g.gain[0,2]"``, with indices from 0. Mask parameters are
+    allowed; parameters that depend on them by formulas are included.
 
     The traced equations are differentiated. The derivatives are integrated together with the equations,
     natively, with the same error control. The times of events, of jumps at known times and of the arrival of
@@ -88,6 +91,7 @@ def sensitivity(
     also raised if a parameter change would separate coinciding events, because the derivative does not exist.
     Raises ``InputError`` for
 
+    - an index that is out of range,
     - a table that is read by index,
     - a parameter of which only the integer part has an effect,
     - a parameter that shifts an event at the start,
@@ -105,10 +109,7 @@ def sensitivity(
             where=system.name,
             fix="name a parameter and an output",
         )
-    for name in names:
-        if name not in system.parameters.ranges:
-            parameter_names = [*mask_parameters(resolved), *system.parameters.names]
-            raise UnknownNameError("tunable parameter", name, parameter_names, where=system.name)
+    chosen = [_parameter(system, resolved, name) for name in names]
     paths = [system.aliases.get(name, name) for name in output_names]
     for path in paths:
         if path not in system.signals_layout.ranges:
@@ -119,8 +120,22 @@ def sensitivity(
     compiled = compile_system(augmented)
     run = run_system(compiled, options)
     _check_coinciding_events(compiled, run)
-    slots = Signature(tuple(system.parameters[name] for name in dict.fromkeys(names)))
+    slots = Signature(tuple(dict.fromkeys(chosen)))
     return SensitivityResult(run=run, outputs=output_names, parameters=names, slots=slots)
+
+
+def _parameter(system: HybridSystem, diagram: Diagram, name: str) -> Slot:
+    """The slot of a parameter, or of the parameter with this entry.
+
+    Raises ``UnknownNameError`` for an unknown parameter, ``InputError`` for an unknown entry.
+    """
+    try:
+        return system.parameters.slot_of(name)
+    except UnknownNameError:
+        parameter_names = [*mask_parameters(diagram), *system.parameters.names]
+        raise UnknownNameError("tunable parameter", name, parameter_names, where=system.name) from None
+    except InputError as error:
+        raise InputError(error.what, allowed=error.allowed, fix=error.fix, where=system.name) from None
 
 
 def _check_coinciding_events(compiled: CompiledSystem, run: SimulationResult) -> None:
