@@ -9,7 +9,8 @@ _FANUC = (0.5, 0.4, 0.1, 0.0, -0.9, 0.0)
 _KUKA = (-0.5, -1.2, 1.35, 0.0, 1.0, 0.0)
 _UR = (3.6, -1.3, 1.5, -1.8, -1.57, 0.0)
 _SEVEN = (0.5, 0.5, 0.0, -1.5, 0.0, 1.2, 0.0)
-_PALLETISER = (-0.5, -1.5, 1.7, -0.2, 0.0)
+_KUKA_PALLETISER = (-0.5, -1.5, 1.7, 0.0)
+_ABB_PALLETISER = (0.5, 0.2, 0.2, 0.0)
 _POSES: dict[str, tuple[float, ...]] = {
     "am120ib_10l": _FANUC,
     "baxter_left": (0.4, 0.2, 0.0, 1.1, 0.0, 0.7, 0.0),
@@ -31,25 +32,29 @@ _POSES: dict[str, tuple[float, ...]] = {
     "irb140": _ELBOW_UP,
     "irb2400": _ELBOW_UP,
     "irb2600": _ELBOW_UP,
+    "irb460": _ABB_PALLETISER,
     "irb4600": _ELBOW_UP,
+    "irb660": _ABB_PALLETISER,
     "irb6640": _ELBOW_UP,
+    "irb760": _ABB_PALLETISER,
     "jaco": (0.5, 2.6, 1.3, 4.2, 1.4, 0.0),
     "kr16_2": _KUKA,
+    "kr100_2_pa": _KUKA_PALLETISER,
     "kr180": (0.5, 0.2, 0.3, 0.0),
-    "kr180_2_pa": _PALLETISER,
+    "kr180_2_pa": _KUKA_PALLETISER,
     "kr180_cell": (0.5, 0.2, 0.3, 0.0),
     "kr3_r540": _KUKA,
-    "kr40_pa": _PALLETISER,
+    "kr40_pa": _KUKA_PALLETISER,
     "kr5_arc": _KUKA,
     "kr5_scara_r350": (0.5, 0.8, 0.1, 0.0),
     "kr6_r900": _KUKA,
-    "kr700_pa": _PALLETISER,
+    "kr700_pa": _KUKA_PALLETISER,
     "lite6": (0.5, 0.4, 1.6, 0.0, 1.2, 0.0),
     "lrmate200id": _FANUC,
     "lwr4": (0.5, 0.5, 0.0, -1.5, 0.0, 1.2, 0.0),
     "m10ia": _FANUC,
     "m16ib_20": _FANUC,
-    "m410ic_185": (0.5, -0.3, -0.1, 0.4, 0.0),
+    "m410ic_185": (0.5, 0.3, -0.2, 0.0),
     "m710ic_50": _FANUC,
     "mico": (0.5, 2.6, 1.3, 4.2, 1.4, 0.0),
     "nao_left_arm": (0.6, 0.3, -0.8, -1.0, 0.0),

@@ -20,6 +20,7 @@ from armblocks.robot.geometry import link_frames
 from robots_for_tests import evaluate
 
 ESTIMATES = runpy.run_path(str(Path(__file__).parents[2] / "scripts" / "estimated_masses.py"))
+PALLETISERS = runpy.run_path(str(Path(__file__).parents[2] / "scripts" / "palletisers.py"))["ARMS"]
 MOTIONS = json.loads((Path(__file__).parent / "catalogue_motions.json").read_text(encoding="utf-8"))
 PANDA = json.loads((Path(__file__).parent / "panda_dynamics.json").read_text(encoding="utf-8"))
 EXERCISES = {"kr180", "kr180_cell", "planar3r", "puma560", "twolink"}
@@ -52,7 +53,8 @@ def test_the_catalogue_has_more_than_fifty_arms_with_sources() -> None:
         assert ("estimated" in facts.notes) == (facts.masses is MassOrigin.ESTIMATED) or name == "stanford", (
             name
         )
-        assert "D-H rows" in facts.notes, f"{name}: the notes state the convention"
+        convention = "Parallelogram linkages" if name in PALLETISERS else "D-H rows"
+        assert convention in facts.notes, f"{name}: the notes state the convention"
 
 
 @pytest.mark.parametrize("name", list_robots())
@@ -93,11 +95,26 @@ def test_the_panda_has_the_torques_of_the_program_of_its_authors() -> None:
 def test_the_palletiser_of_fanuc_has_the_envelope_of_its_data_sheet() -> None:
     """Heights of the faceplate: 2.397 m (J2 = 0, J3 = 10 deg), -0.561 m (100, -90); J3 is absolute."""
     robot = load_robot("m410ic_185")
-    for back, up, height in ((0, 10, 2.397), (-100, -90, -0.561)):
-        j2, j3 = math.radians(back), math.radians(up - back)
-        pose = tool_pose(robot, np.array([0, j2, j3, -j2 - j3, 0]))
+    for forward, up, height in ((0, 10, 2.397), (100, -90, -0.561)):
+        pose = tool_pose(robot, np.radians([0, forward, up, 0]))
         assert pose[2, 3] == pytest.approx(height, abs=1e-3)
         np.testing.assert_allclose(pose[:3, 2], [0, 0, -1], atol=1e-12)
+
+
+@pytest.mark.parametrize("name", PALLETISERS)
+def test_the_palletisers_have_the_lengths_and_linkages_of_the_table(name: str) -> None:
+    """The file is that of the table, and its flange is level wherever its four joints are."""
+    path = Path(__file__).parents[2] / "robots" / name / "robot.json"
+    assert path.read_bytes() == PALLETISERS[name].document
+    robot = load_robot(name)
+    assert robot.joint_letters == "RRRR" and len(robot.links) == 10
+    np.testing.assert_allclose(tool_pose(robot, sample(robot, 4))[:3, 2], [0, 0, -1], atol=1e-12)
+
+
+def test_the_poses_of_the_palletisers_of_kuka_and_abb_are_those_of_the_source() -> None:
+    """Height and distance of the flange at q = 0, from the lengths: the arm stretched, the arm bent."""
+    for name, point in (("kr180_2_pa", (3.2, 0.0, 0.49)), ("irb660", (1.91, 0.0, 1.833))):
+        np.testing.assert_allclose(tool_pose(load_robot(name), np.zeros(4))[:3, 3], point, atol=1e-12)
 
 
 REACHES = {name: facts for name in CATALOGUE if (facts := shipped_facts(name)).reach is not None}

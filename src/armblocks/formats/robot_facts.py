@@ -39,7 +39,7 @@ class MassOrigin(StrEnum):
     PACKAGE = "package"
     """Those of a package that does not state their origin."""
     ESTIMATED = "estimated"
-    """Estimated from the kinematics, see ``scripts/estimated_masses.py``."""
+    """Estimated from the kinematics, see ``scripts/estimated_masses.py`` and ``scripts/palletisers.py``."""
     CHOSEN = "chosen"
     """Chosen for exercises; there is no real robot."""
 
@@ -100,9 +100,12 @@ def shipped_summary(name: str) -> RobotSummary:
     path = shipped_folder("robots") / name / ROBOT_FILE
     document = cast("dict[str, Any]", json.loads(path.read_bytes()))
     letters = {kind.__name__.lower(): "" if kind is Fixed else kind.letter for kind in JOINT_TYPES}
+    coupled = [entry for entry in document.get("constraints", ()) if entry["type"] == "coupling"]
+    dependent = {entry["terms"][0]["joint"] for entry in coupled}
     kinds = (
         link["dh"].get("joint", "revolute") if "dh" in link else link.get("joint", {}).get("type", "revolute")
         for link in document["links"]
+        if link["name"] not in dependent
     )
     return RobotSummary(
         title=document["name"],

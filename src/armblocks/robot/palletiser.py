@@ -13,6 +13,7 @@ from armblocks.robot.fields import number
 from armblocks.robot.joints import JointLimits, Revolute
 from armblocks.robot.link import Link, Motor
 from armblocks.robot.robot import Robot
+from armblocks.robot.shapes import Cylinder, Material, Pose
 from armblocks.spatial import Transform, rotation_about, transl
 
 LEVER = 0.3
@@ -21,6 +22,8 @@ TRIANGLE = 0.15
 """Distance of the level rods from the axes of the arms, as a fraction of the upper arm; not published."""
 SLENDERNESS = 0.12
 """Side of the square section of arms and rods as a fraction of their length, for their inertias."""
+ROD_RADIUS = 0.02
+"""Radius of the drawn rods as a fraction of the upper arm."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,20 +158,21 @@ def _links(
 
     m = masses
     rods = m.level_rods if m else (0.0, 0.0)
+
+    def rod(name: str, parent: str, at: tuple[float, float, float], mass: float, axis: int) -> Link:
+        length = {"drive_lever": -lever, "triangle": offset}.get(name, lower if axis == 2 else upper)
+        shape = _drawn_rod(length, axis, ROD_RADIUS * upper)
+        return link(name, parent, transl(*at), geometry=(shape,), **_beam(mass, length, axis=axis))
+
     return (
         link("turret", None, Transform(), **_beam(m and m.turret, z / 2, axis=2, side=0.5 * z)),
         link("lower_arm", "turret", transl(*shoulder), **_beam(m and m.lower_arm, lower, axis=2)),
         link("upper_arm", "lower_arm", transl(0, 0, lower), **_beam(m and m.upper_arm, upper, axis=0)),
-        link("drive_lever", "turret", transl(*shoulder), **_beam(m and m.drive_lever, -lever, axis=0)),
-        link("drive_rod", "drive_lever", transl(-lever, 0, 0), **_beam(m and m.drive_rod, lower, axis=2)),
-        link(
-            "lower_level_rod",
-            "turret",
-            transl(x - offset, 0, z + offset),
-            **_beam(m and rods[0], lower, axis=2),
-        ),
-        link("triangle", "lower_arm", transl(0, 0, lower), **_beam(m and m.triangle, offset, axis=2)),
-        link("upper_level_rod", "triangle", transl(0, 0, offset), **_beam(m and rods[1], upper, axis=0)),
+        rod("drive_lever", "turret", shoulder, m.drive_lever if m else 0.0, 0),
+        rod("drive_rod", "drive_lever", (-lever, 0.0, 0.0), m.drive_rod if m else 0.0, 2),
+        rod("lower_level_rod", "turret", (x - offset, 0.0, z + offset), rods[0], 2),
+        rod("triangle", "lower_arm", (0.0, 0.0, lower), m.triangle if m else 0.0, 2),
+        rod("upper_level_rod", "triangle", (0.0, 0.0, offset), rods[1], 0),
         link("wrist", "upper_arm", transl(upper, 0, 0), **_beam(m and m.wrist, forward, axis=0)),
         link("flange", "wrist", flange, **_beam(m and m.flange, -drop / 2, axis=2)),
     )
@@ -184,6 +188,16 @@ def _beam(mass: float | None, length: float, *, axis: int, side: float | None = 
     moments = [mass * (length**2 + side**2) / 12] * 3
     moments[axis] = mass * side**2 / 6
     return {"mass": mass, "centre_of_mass": tuple(centre), "inertia": tuple(moments)}
+
+
+def _drawn_rod(length: float, axis: int, radius: float) -> Cylinder:
+    """The drawing of a rod from the origin to ``length`` along the x or the z axis."""
+    middle = length / 2
+    poses: dict[int, Pose] = {
+        0: ((0.0, 0.0, 1.0, middle), (0.0, 1.0, 0.0, 0.0), (-1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)),
+        2: ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, middle), (0.0, 0.0, 0.0, 1.0)),
+    }
+    return Cylinder(radius=radius, length=abs(length), material=Material.FLANGE, pose=poses[axis])
 
 
 def _couplings(axes: tuple[AxisConvention, ...], relative: bool) -> tuple[Coupling, ...]:
