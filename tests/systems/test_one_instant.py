@@ -16,6 +16,7 @@ from armblocks.blocks import (
     Relay,
     ResettableIntegrator,
     Saturation,
+    SignalGenerator,
     Sign,
     Step,
     Sum,
@@ -97,3 +98,15 @@ def test_two_steps_at_almost_the_same_time_make_no_pulse(solver: str) -> None:
         assert not result[name].any(), name
         assert not result.jumps[name][0].size, name
     assert np.allclose(result["clock"], result.time, atol=1e-12)
+
+
+def test_a_sample_after_the_end_of_a_step_and_before_an_edge_within_rounding_has_the_values_after_it() -> None:
+    """The sawtooth makes a step end two units in the last place before 0.875, and the edge follows."""
+    builder = ab.DiagramBuilder("edge")
+    square = builder.add("square", SignalGenerator(waveform="square", frequency=4.0))
+    integral = builder.add("integral", ResettableIntegrator(), square)
+    builder.connect(square, integral["reset"])
+    builder.add("sawtooth", SignalGenerator(waveform="sawtooth", frequency=1.1457337343252456))
+    result = ab.simulate(builder.build(), stop_time=1.0, sample_time=0.025)
+    edges = np.floor(8.0 * result.time * (1.0 + 1e-12))
+    assert np.array_equal(result["square"], np.where(edges % 2.0 == 1.0, 1.0, -1.0))

@@ -15,6 +15,7 @@ from armblocks.integration.frame import SAME_BELOW, Frame, copy
 from armblocks.integration.guard_functions import GuardFunctions
 from armblocks.integration.method import Method
 from armblocks.integration.records import Records
+from armblocks.integration.undecided_modes import UndecidedModes
 from armblocks.integration.workspace import Count, Scalar, Status
 from armblocks.routines.arithmetic import select
 from armblocks.routines.memory import IntegerVariable, Reals, RealVariable
@@ -41,8 +42,13 @@ class Events:
         self.point = point
         self.guards = len(frame.sizes.directions)
         self.modes = len(frame.sizes.modes)
-        self.functions = GuardFunctions(frame.r.program, frame.workspace, frame.sizes)
-        workspace = frame.workspace
+        program, workspace, sizes = frame.r.program, frame.workspace, frame.sizes
+        self.functions = GuardFunctions(program, workspace, sizes)
+        self.undecided = (
+            UndecidedModes(program, workspace, sizes, self.functions, evaluation.implicit)
+            if sizes.may_be_undecided
+            else None
+        )
         self.x, self.new_x = frame.vector(workspace.x), frame.vector(workspace.new_x)
 
     def mark_fired(self, time: Real, x: Reals) -> Integer:
@@ -52,7 +58,10 @@ class Events:
         self.point.value = time
         t = self.point.memory
         self.evaluation.solve(t, x)
-        return f.r.call(self.functions.mark_fired, t, x, f.reals, f.p)
+        count = f.r.call(self.functions.mark_fired, t, x, f.reals, f.p)
+        if self.undecided is None:
+            return count
+        return count - f.r.call(self.undecided.accept, t, x, f.reals, f.p)
 
     def make_modes_consistent(self, time: Real) -> None:
         """At the start of the run, apply resets without events until states and modes are consistent.
@@ -230,11 +239,18 @@ class Events:
                 z[momentary[i]] = 0.0
 
     def _count_iteration_without_event(self, time: Real, iterations: IntegerVariable) -> None:
-        """Count an iteration without an event; return from the loop after too many of them."""
+        """Count an iteration without an event. After too many of them the inconsistent modes become
+        undecided; if no further mode can, return from the loop."""
+        f = self.frame
         self._count_events(time, iterations.value == 0, bounds=False)
         iterations.value = iterations.value + 1
-        allowed = iterations.value < MAX_ITERATIONS_PER_MODE * self.modes
-        self.frame.leave_unless(allowed, Status.INCONSISTENT_MODES)
+        with f.r.unless(iterations.value < MAX_ITERATIONS_PER_MODE * self.modes):
+            if self.undecided is None:
+                f.leave(Status.INCONSISTENT_MODES)
+            else:
+                marked = f.r.call(self.undecided.mark, f.reals)
+                f.leave_unless(marked != 0, Status.INCONSISTENT_MODES)
+                iterations.value = 1
 
     def _restrict_mode_changes(self, iterations: IntegerVariable, *, follows: bool) -> None:
         """Keep the values of consistent modes. After many iterations only the first inconsistent mode

@@ -236,8 +236,10 @@ class Instants(Schedule):
                 self.point.value = minimum(new_time, f.clamp.value)
                 self.evaluation.solve(self.point.memory, self.x)
                 self.evaluation.accept_unknowns()
-            # A sample time within rounding of the end of the piece is recorded with the values there.
-            records.samples(new_time, minimum(new_time * SAME_ABOVE, f.end.value * SAME_BELOW), None)
+            # A sample time within rounding of the end of the step is recorded with the values there, unless
+            # an event may come before it.
+            until = new_time if self.search else new_time * SAME_ABOVE
+            records.samples(new_time, minimum(until, f.end.value * SAME_BELOW), None)
             stages.go(STEP)
         with r.when(new_time >= self.segment_end.value):
             f.increase(Count.SEGMENT)

@@ -134,6 +134,8 @@ class CompiledSystem:
                 (int(guard), int(place)) for guard, place in description["silenced_guards"]
             ),
             locating_guards=tuple(int(guard) for guard in description["locating_guards"]),
+            parameters=self.parameters.size,
+            looped=bool(self.loops) or self.algebraic.size > 0,
             tangents=None if description["tangents"] is None else tuple(description["tangents"]),
         )
         self._breakpoint_count = int(description["breakpoints"])

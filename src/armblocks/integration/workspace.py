@@ -157,6 +157,8 @@ class LoopSizes:
     - ``silenced_guards``: guards, each with an index of ``momentary_states``. While that value is nonzero,
       the guard does not fire.
     - ``locating_guards``: the guards that only locate mode changes.
+    - ``parameters``: the number of parameters.
+    - ``looped``: whether the system has algebraic loops.
     - ``tangents``: the first entries of ``x``, ``z`` and the guards that belong to derivatives, if there are
       any.
     """
@@ -176,12 +178,19 @@ class LoopSizes:
     momentary_states: tuple[int, ...] = ()
     silenced_guards: tuple[tuple[int, int], ...] = ()
     locating_guards: tuple[int, ...] = ()
+    parameters: int = 0
+    looped: bool = False
     tangents: tuple[int, int, int] | None = None
 
     @property
     def hybrid(self) -> bool:
         """Whether the system has ticks, events, delays or implicit equations."""
         return bool(self.discrete or self.algebraic or self.delays or self.clocks or self.directions)
+
+    @property
+    def may_be_undecided(self) -> bool:
+        """Whether a following mode may depend on itself."""
+        return self.looped and any(self.followers)
 
 
 class Workspace:
@@ -209,6 +218,7 @@ class Workspace:
     - ``repeats``: the number of its events among the latest consecutive close events.
     - ``contradictions``: nonzero for inconsistent modes.
     - ``ticking``: the marks of the clocks.
+    - ``undecided`` …: see :class:`UndecidedModes`.
     - ``residual``, ``jacobian``, ``before``, ``pivots``, ``swaps`` (integers): memory of Newton's method.
     - ``taus``: the present delays; ``bounds``: all shortest, then all longest delays; ``longest``: the
       longest of all.
@@ -246,6 +256,16 @@ class Workspace:
         self.pivots = self.before + nw
         self.swaps = self.pivots + nw
         self.size = self.swaps + nw
+        if sizes.may_be_undecided:
+            self.undecided = self.size
+            self.remaining_contradictions = self.undecided + len(sizes.modes)
+            self.saved_z = self.remaining_contradictions + len(sizes.modes)
+            self.saved_w = self.saved_z + nz
+            self.saved_guards = self.saved_w + nw
+            self.changed_t = self.saved_guards + ng
+            self.changed_x = self.changed_t + 1
+            self.changed_p = self.changed_x + n
+            self.size = self.changed_p + sizes.parameters
         lines = len(sizes.delays)
         self.taus = self.size
         self.bounds = self.taus + lines
