@@ -116,6 +116,11 @@ class Enable(_ControlBlock):
         }
         return np.array([values[port]])
 
+    def pending(self) -> bool:
+        """Return whether the control is about to act."""
+        on, previous = self.value("out", "on")[0], self.arrays["x:previous"][0]
+        return bool(previous >= 0.0 and on != previous)
+
     def act(self, t: float) -> bool:
         on, previous = self.value("out", "on")[0], self.arrays["x:previous"][0]
         self.arrays["x:previous"][:] = on
@@ -146,6 +151,11 @@ class Trigger(_ControlBlock):
             "elapsed": self.arrays["t"][0] - self.arrays["x:last"][0],
         }
         return np.array([values[port]])
+
+    def pending(self) -> bool:
+        """Return whether the sign of the trigger has changed."""
+        side, previous = self.arrays["x:side"][0], self.arrays["x:previous"][0]
+        return bool(previous >= 0.0 and side != previous)
 
     def act(self, t: float) -> bool:
         side, previous = self.arrays["x:side"][0], self.arrays["x:previous"][0]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any
 
 import numpy as np
 from reference_block import BlockNumbers, UnsupportedError
-from reference_controls import CONTROLS, Enable
+from reference_controls import CONTROLS, Enable, Trigger
+from reference_events import event_ranks, has_own_events
 from reference_order import EvaluationOrder, Node, assign_clocks
 
 from armblocks.diagram import Diagram, PortRef, flat_diagram, infer_shapes
@@ -45,6 +46,7 @@ class Network:
         self._locate_states()
         self.clocks = assign_clocks(flat, self.blocks, self.drivers)
         self.order = EvaluationOrder(self.blocks, self.drivers, flat.gates)
+        self.ranks = event_ranks(self.order)
         self.links = {b.name: [self._link(b, port) for port in b.inputs_read] for b in self.blocks.values()}
         self.links_of_node: dict[Node, list[Link]] = {}
         self.plans: dict[tuple[bool, bool], list[Work]] = {}
@@ -333,10 +335,10 @@ class Network:
                 events[name, guard] = e
         return events
 
-    def take_signs(self, only: Iterable[tuple[str, str]] | None = None) -> None:
+    def take_signs(self, only: Iterable[tuple[str, str]] | None = None, later: Collection[str] = ()) -> None:
         for key in self.signs if only is None else only:
             block = self.blocks[key[0]]
-            if not block.on:
+            if not block.on or key[0] in later:
                 continue
             self._feed_all(block)
             sign = np.sign(block.value("guard", key[1]))
@@ -399,8 +401,13 @@ class Network:
         for block in eventful:
             block.set_modes(old[block.name])
         fired = {} if first else self.fired()
+        lowest = math.inf if first else self._lowest_rank(fired)
+        fired = {key: e for key, e in fired.items() if self.ranks[key[0]] <= lowest}
+        later = {block.name for block in self.blocks.values() if self.ranks[block.name] > lowest}
         if not first:
-            self.take_signs()
+            self.take_signs(later=later)
+        if self._hold_controls(later):
+            self.evaluate(t, frozen=True)
         new: list[tuple[np.ndarray, np.ndarray]] = []
         for block in eventful if fired or first else ():
             # An event determines the new modes of its block; without an event the signals do.
@@ -411,12 +418,30 @@ class Network:
         for block in eventful:
             block.set_modes(consistent[block.name])
         if fired:
-            self._remember()
+            self._remember(later)
         acted = self._act(t, new)
         self.evaluate(t)
         if fired:
             self.take_signs(fired)
-        return bool(fired) or acted or self.fingerprint() != before
+        for block in eventful:
+            if block.name in later:
+                block.set_modes(old[block.name])
+        return bool(fired) or acted or bool(later) or self.fingerprint() != before
+
+    def _lowest_rank(self, fired: Iterable[tuple[str, str]]) -> float:
+        """Return the lowest rank of the blocks with pending events, or infinity."""
+        controls = [b for b in self.blocks.values() if isinstance(b, Enable | Trigger)]
+        pending = {name for name, _ in fired if has_own_events(self.blocks[name])}
+        pending |= {control.name for control in controls if control.pending()}
+        return min((self.ranks[name] for name in pending), default=math.inf)
+
+    def _hold_controls(self, later: set[str]) -> bool:
+        """Set pending controls that act later to their previous values; return whether there are any."""
+        held = [self.blocks[name] for name in later if isinstance(self.blocks[name], Enable | Trigger)]
+        held = [control for control in held if control.pending()]
+        for control in held:
+            control.arrays["x:side"][:] = control.arrays["x:previous"]
+        return bool(held)
 
     def hold_zeros(self, below: float) -> bool:
         """Let the quantities of conditions that are almost 0 count as 0; return whether there are any.
@@ -465,9 +490,12 @@ class Network:
             block.restart()
         return acted
 
-    def _remember(self) -> None:
-        """Store the consistent modes with hysteresis as the previous modes."""
+    def _remember(self, later: Collection[str] = ()) -> None:
+        """Store the consistent modes with hysteresis as the previous modes, except those of blocks whose
+        events come later."""
         for block in self.blocks.values():
+            if block.name in later:
+                continue
             self._feed_all(block)
             block.remember()
 

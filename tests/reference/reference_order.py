@@ -121,7 +121,7 @@ class EvaluationOrder:
         for block in self.blocks.values():
             if block.states or block.modes or block.guards or block.lines:
                 ports = {*block.inputs_read, *(line.input for line in block.lines)}
-                nodes |= self._inputs_of(block, {f"u:{port}" for port in ports})
+                nodes |= self.inputs_of(block, {f"u:{port}" for port in ports})
         return nodes
 
     def needs(self, node: Node) -> tuple[set[Node], set[Node]]:
@@ -131,7 +131,7 @@ class EvaluationOrder:
         if kind == "modes":
             hard = set[Node]()
             for mode in block.modes:
-                hard |= self._inputs_of(block, block.needs("mode", mode.name))
+                hard |= self.inputs_of(block, block.needs("mode", mode.name))
             gate = self.gates.get(name, {})
             return hard, {("out", ref.block, ref.port) for key, ref in gate.items() if key == "?on"}
         soft: set[Node] = {("modes", name, "")} if getattr(block, "modes", ()) else set()
@@ -142,7 +142,7 @@ class EvaluationOrder:
             if port in block.block.time_derivatives:
                 return {self._rate_of(name, block.block.time_derivatives[port])}, set()
             unknown = {node} if port in block.block.implicit_outputs else set[Node]()
-            return self._inputs_of(block, block.needs("out", port)) | unknown, soft
+            return self.inputs_of(block, block.needs("out", port)) | unknown, soft
         if kind == "rate":
             if port in block.block.time_derivatives:
                 raise UnsupportedError(f"'{name}' is differentiated twice")
@@ -156,7 +156,7 @@ class EvaluationOrder:
                 rates = {self._rate_of(name, entry) for entry in block.inputs_followed(port)}
                 return {("out", name, port)} | rates, soft
             keys = block.needs("out", port)
-            hard = self._inputs_of(block, keys) | {("out", name, port)}
+            hard = self.inputs_of(block, keys) | {("out", name, port)}
             for key in keys:
                 letter, _, entry = key.partition(":")
                 if letter == "u":
@@ -166,13 +166,13 @@ class EvaluationOrder:
                 if letter == "x" and any(state.name == entry for state in block.states):
                     hard.add(("xdot", name, entry))
             return hard, soft
-        return self._inputs_of(block, block.needs("xdot", port)), soft
+        return self.inputs_of(block, block.needs("xdot", port)), soft
 
     def _rate_of(self, name: str, port: str) -> Node:
         ref = self.drivers[name, port]
         return ("rate", ref.block, ref.port)
 
-    def _inputs_of(self, block: Any, keys: set[str]) -> set[Node]:
+    def inputs_of(self, block: Any, keys: set[str]) -> set[Node]:
         nodes: set[Node] = set()
         for key in keys:
             letter, _, port = key.partition(":")

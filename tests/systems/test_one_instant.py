@@ -16,8 +16,8 @@ from armblocks.blocks import (
     Relay,
     ResettableIntegrator,
     Saturation,
-    SignalGenerator,
     Sign,
+    SignalGenerator,
     Step,
     Sum,
     TransportDelay,
@@ -100,7 +100,9 @@ def test_two_steps_at_almost_the_same_time_make_no_pulse(solver: str) -> None:
     assert np.allclose(result["clock"], result.time, atol=1e-12)
 
 
-def test_a_sample_after_the_end_of_a_step_and_before_an_edge_within_rounding_has_the_values_after_it() -> None:
+def test_a_sample_after_the_end_of_a_step_and_before_an_edge_within_rounding_has_the_values_after_it() -> (
+    None
+):
     """The sawtooth makes a step end two units in the last place before 0.875, and the edge follows."""
     builder = ab.DiagramBuilder("edge")
     square = builder.add("square", SignalGenerator(waveform="square", frequency=4.0))

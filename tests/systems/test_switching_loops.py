@@ -1,7 +1,8 @@
 """Algebraic loops through continuous switching blocks, with signals at the boundaries of modes.
 
-Each loop is ``u = r + A y``, ``y_i = f_i(u_i)`` with ``|A| < 1`` in the maximum norm and functions of slope at
-most 1, so it has exactly one solution. At a boundary the modes on both sides give equal signals up to rounding.
+Each loop is ``u = r + A y``, ``y_i = f_i(u_i)`` with ``|A| < 1`` in the maximum norm and functions of slope
+at most 1, so it has exactly one solution. At a boundary the modes on both sides give equal signals up to
+rounding.
 """
 
 from __future__ import annotations
@@ -63,9 +64,9 @@ def add_loop(
 ) -> tuple[NDArray[np.float64], list[Function]]:
     """Add a random loop of one to three unknowns; return ``A`` and the functions of the blocks."""
     n = int(random.integers(1, 4))
-    A = random.uniform(-1.0, 1.0, (n, n))
-    A *= random.uniform(0.3, 0.95) / np.abs(A).sum(axis=1).max()
-    A = np.round(A, 1) if random.random() < 0.4 else A
+    entries = random.uniform(-1.0, 1.0, (n, n))
+    entries *= random.uniform(0.3, 0.95) / np.abs(entries).sum(axis=1).max()
+    A = np.round(entries, 1) if random.random() < 0.4 else entries
     functions: list[Function] = []
     for i in range(n):
         builder.add(f"{name} r{i}", source(random))

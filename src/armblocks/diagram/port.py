@@ -14,7 +14,8 @@ class Port:
 
     ``shape`` is the only allowed shape, or ``None`` if it follows from the connections. ``unit`` is SI, or
     ``""`` if the port has no unit or the unit of its signal. ``names`` are the names of the entries of a
-    vector, such as joints, where the block knows them.
+    vector, such as joints, where the block knows them. ``before_events``: an output with the value before the
+    events of its block at the same instant, such as the state of an integrator before a reset.
     """
 
     name: str
@@ -22,6 +23,7 @@ class Port:
     unit: str = ""
     shape: Shape | None = None
     names: tuple[str, ...] = ()
+    before_events: bool = False
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,9 @@ from casadi import (
 
 from armblocks.diagram.block_equations import BlockSlot
 from armblocks.diagram.conditional_equations import FIRE, ON
+from armblocks.diagram.controls import EnableControl, TriggerControl
 from armblocks.diagram.diagram import Diagram
+from armblocks.diagram.event_order import event_ranks
 from armblocks.diagram.features import SlotKind
 from armblocks.diagram.flat_values import broadcast_column
 from armblocks.diagram.hierarchy import FlatForm, flatten_hierarchy
@@ -37,6 +39,7 @@ from armblocks.diagram.tracing import Implicit, Symbols, Tracing
 from armblocks.diagram.units import infer_units
 from armblocks.equations import (
     Delays,
+    EventRanks,
     HybridSystem,
     LinearLoops,
     Signature,
@@ -117,6 +120,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
         recaptured_states=_recaptured_states(model, symbols),
         momentary_states=tuple(momentary.values()),
         silenced_guards=_silenced_guards(entries, momentary),
+        ranks=_ranks(model, symbols, entries),
         locating_guards=tuple(number for number, (_, guard) in enumerate(entries) if guard.locates),
         contradictions=function("contradictions", point, c=contradictions) if modes else None,
         reset=function("reset", point | e, **_reset(model, symbols, flow)),
@@ -293,6 +297,25 @@ def _recaptured_states(model: Model, symbols: Symbols) -> tuple[int, ...]:
         for state in equations.discrete
         if state.hysteresis and (SlotKind.CAPTURE, state.name) in equations.group_of
         for index in _indices(ranges[f"{name}/{state.name}"])
+    )
+
+
+def _ranks(model: Model, symbols: Symbols, guards: Sequence[tuple[str, Guard]]) -> EventRanks | None:
+    """The ranks of all events; ``None`` if all events are processed together."""
+    rank_of = event_ranks(model.flow)
+    if not rank_of:
+        return None
+    names = [name for slot in symbols.discrete_slots for name in [slot.name.rpartition("/")[0]] * slot.size]
+    ranges = signature(*symbols.discrete_slots).ranges
+    return EventRanks(
+        guards=tuple(rank_of[name] for name, _ in guards),
+        hysteresis_modes=tuple(rank_of[names[mode]] for mode, _, _ in _hysteresis_modes(model, symbols)),
+        recaptured_states=tuple(rank_of[names[index]] for index in _recaptured_states(model, symbols)),
+        controls=tuple(
+            (ranges[f"{name}/side"].start, ranges[f"{name}/previous"].start, rank_of[name])
+            for name, block in model.flow.diagram.blocks.items()
+            if isinstance(block, EnableControl | TriggerControl)
+        ),
     )
 
 

@@ -13,7 +13,13 @@ if TYPE_CHECKING:
     )
     from armblocks.equations.continuous import continuous_system
     from armblocks.equations.flow_jacobian import FlowJacobian, trace_flow_jacobian
-    from armblocks.equations.hybrid_system import Delays, HybridSystem, LinearLoops, SampleClock
+    from armblocks.equations.hybrid_system import (
+        Delays,
+        EventRanks,
+        HybridSystem,
+        LinearLoops,
+        SampleClock,
+    )
     from armblocks.equations.options import SimulationOptions
     from armblocks.equations.signatures import Shape, Signature, Slot, signature
     from armblocks.equations.symbols import flatten, matrix_shape, unflatten
@@ -26,6 +32,7 @@ else:
             "FlowJacobian": "armblocks.equations.flow_jacobian",
             "Delays": "armblocks.equations.hybrid_system",
             "HybridSystem": "armblocks.equations.hybrid_system",
+            "EventRanks": "armblocks.equations.hybrid_system",
             "LinearLoops": "armblocks.equations.hybrid_system",
             "SampleClock": "armblocks.equations.hybrid_system",
             "Shape": "armblocks.equations.signatures",
@@ -50,6 +57,7 @@ else:
 
 __all__ = [
     "Delays",
+    "EventRanks",
     "FlowJacobian",
     "HybridSystem",
     "LinearLoops",

@@ -64,6 +64,22 @@ class LinearLoops:
     matrices: TracedFunction
 
 
+@dataclass(frozen=True, kw_only=True)
+class EventRanks:
+    """The ranks of events at one instant: events of a lower rank are processed first.
+
+    ``guards``, ``hysteresis_modes``, ``recaptured_states``: the ranks of the entries of the fields of
+    :class:`HybridSystem` with these names. ``controls``: for each control of a conditional subsystem, the
+    index in ``z`` of the mode with the sign of its signal, of the value of this mode at its last event, and
+    its rank. While events of a lower rank are processed, the mode has its old value.
+    """
+
+    guards: tuple[int, ...]
+    hysteresis_modes: tuple[int, ...]
+    recaptured_states: tuple[int, ...]
+    controls: tuple[tuple[int, int, int], ...]
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HybridSystem:
     """Continuous flow, sampled parts, events and implicit equations of one diagram.
@@ -146,6 +162,8 @@ class HybridSystem:
     not fire; at the end of the instant its stored sign becomes that of its value."""
     locating_guards: tuple[int, ...] = ()
     """The guards that only locate changes of following modes."""
+    ranks: EventRanks | None = None
+    """The order of events at one instant; ``None`` if all events are processed together."""
     tangents: tuple[int, int, int] | None = None
     """The first indices in ``x``, ``z`` and the guards that belong to derivatives, if there are any."""
     contradictions: TracedFunction | None = None

@@ -232,6 +232,7 @@ class _AugmentedSystem:
             ),
             update=c.function("update", {"m": m}, z=update),
             guards=c.function("guards", {}, g=guards),
+            ranks=None if old.ranks is None or instants is None else instants.ranks(old.ranks),
             tangents=(old.states.size, old.discrete.size, len(old.guard_directions)),
             contradictions=None
             if old.contradictions is None

@@ -22,6 +22,7 @@ has just fired cannot fire again at once.
 
 from __future__ import annotations
 
+import dataclasses
 from itertools import accumulate
 
 from casadi import (
@@ -31,6 +32,7 @@ from casadi import (
     dot,
     fabs,
     fmax,
+    fmin,
     if_else,
     is_equal,
     jtimes,
@@ -41,6 +43,7 @@ from casadi import (
     vertsplit,
 )
 
+from armblocks.equations.hybrid_system import EventRanks
 from armblocks.equations.sensitivity_delays import DelayedSensitivities
 from armblocks.equations.sensitivity_layout import Columns
 
@@ -127,6 +130,16 @@ class Instants:
     def directions(self) -> tuple[int, ...]:
         """The directions of the added guards."""
         return 0, 0, *[1] * (len(self.moving_breakpoints) + 2 * self.delays.n)
+
+    def ranks(self, own: EventRanks) -> EventRanks:
+        """The ranks of all guards. Added guards come first; those of delay inputs that jumped come last."""
+        last, n = max(own.guards) + 1, self.delays.n
+        added = (0, 0, *[0] * len(self.moving_breakpoints), *[0] * n, *[last] * n)
+        return dataclasses.replace(
+            own,
+            guards=(*own.guards, *added),
+            recaptured_states=own.recaptured_states * (len(self.columns.names) + 1),
+        )
 
     # Just before an instant.
 
@@ -240,6 +253,9 @@ class Instants:
         jumped = logic_and(own != 0.0, logic_not(self.located))
         follows = vertcat(jumped, SX.zeros(2), sources != 0.0, SX.zeros(arrived.numel()))
         follows = logic_and(follows, _any_marked(vertcat(*at_fixed)))
+        later = vertcat(
+            self._fire_later(own, vertcat(sources, arrived)), SX.zeros(marks.numel() - self.guards)
+        )
         instants: list[SX] = []
         arrivals = self.delays.arrivals(arrived)
         differing = SX.zeros(marks.numel())
@@ -249,13 +265,26 @@ class Instants:
             derivatives = vertcat(by_guards, SX.zeros(2), self._times_by_parameter(k), arrivals[k])
             mean = dot(if_else(marks, derivatives, 0.0), marks) / fmax(dot(marks, marks), 1.0)
             differs = fabs(derivatives - mean) > SAME_DERIVATIVE * (1.0 + fabs(mean))
-            differs = logic_or(logic_and(marks, differs), logic_and(follows, mean != 0.0))
+            differs = logic_or(logic_and(logic_or(marks, later), differs), logic_and(follows, mean != 0.0))
             differing = logic_or(differing, differs)
             instants.append(if_else(self.known, known, mean))
         last = SX(0.0)
         for number in range(differing.numel()):
             last = if_else(differing[number], float(number + 1), last)
         return instants, if_else(self.known, 0.0, last)
+
+    def _fire_later(self, own: SX, others: SX) -> SX:
+        """Whether each guard has a located zero now and a higher rank than the guards that fire."""
+        system = self.columns.system
+        if system.ranks is None:
+            return SX.zeros(self.guards)
+        rank = if_else(_any_marked(others), 0.0, float(max(system.ranks.guards)))
+        for number, own_rank in enumerate(system.ranks.guards):
+            rank = if_else(own[number] != 0.0, fmin(rank, float(own_rank)), rank)
+        later = SX(system.ranks.guards) > rank
+        locates = SX([float(number in system.locating_guards) for number in range(self.guards)])
+        passes = self.g_rate * SX(system.guard_directions) >= 0.0
+        return logic_and(logic_and(later, logic_not(locates)), logic_and(self.located, passes))
 
     def _is_now(self, k: int) -> SX:
         """Whether breakpoint ``k`` is this instant."""

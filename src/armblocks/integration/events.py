@@ -14,6 +14,7 @@ from armblocks.integration.evaluation import Evaluation
 from armblocks.integration.frame import SAME_BELOW, Frame, copy
 from armblocks.integration.guard_functions import GuardFunctions
 from armblocks.integration.method import Method
+from armblocks.integration.ranked_events import RankedEvents
 from armblocks.integration.records import Records
 from armblocks.integration.undecided_modes import UndecidedModes
 from armblocks.integration.workspace import Count, Scalar, Status
@@ -44,6 +45,7 @@ class Events:
         self.modes = len(frame.sizes.modes)
         program, workspace, sizes = frame.r.program, frame.workspace, frame.sizes
         self.functions = GuardFunctions(program, workspace, sizes)
+        self.ranked = RankedEvents(program, workspace, sizes) if sizes.guard_ranks else None
         self.undecided = (
             UndecidedModes(program, workspace, sizes, self.functions, evaluation.implicit)
             if sizes.may_be_undecided
@@ -129,7 +131,8 @@ class Events:
 
         1. Following modes are made consistent. Before that the signals do not have their values of this
            instant, so no state or stateful mode may change.
-        2. All other guards that fire cause one reset.
+        2. All other guards that fire cause one reset. Guards of higher ranks wait: see
+           :mod:`armblocks.diagram.event_order`.
         3. If none fires, inconsistent stateful modes take their consistent values.
 
         In the first iterations all inconsistent modes change together, then only the first of them. With this
@@ -152,10 +155,14 @@ class Events:
                     loop.leave_unless(r.call(functions.any_inconsistent, f.reals, no))
                     self._iterate_stateful_modes(time, iterations)
                     loop.again()
-            r.call(functions.store_signs, f.reals, no)
+            if self.ranked is None:
+                rank = None
+                r.call(functions.store_signs, f.reals, no)
+            else:
+                rank = self._begin_reset(self.ranked)
             self._count_events(time, yes, bounds=True)
-            self._recapture()
-            self._store_previous_modes()
+            self._recapture(rank)
+            self._store_previous_modes(rank)
             self.reset()
             self.apply_reset()
             self._store_fired_signs()
@@ -190,8 +197,19 @@ class Events:
         self.apply_reset()
         self._store_fired_signs()
 
-    def _recapture(self) -> None:
-        """Capture the present values that belong to hysteresis modes, before the reset of this iteration."""
+    def _begin_reset(self, ranked: RankedEvents) -> Integer:
+        """Select the marked guards of the lowest rank for the next reset, and return this rank."""
+        f, r = self.frame, self.frame.r
+        rank = r.call(ranked.select_lowest, f.reals)
+        r.call(ranked.store_signs, f.reals, rank)
+        if ranked.hold_controls is not None:
+            r.call(ranked.hold_controls, f.reals, rank)
+            self.evaluation.solve(self.point.memory, self.x)
+        return rank
+
+    def _recapture(self, rank: Integer | None) -> None:
+        """Capture the present values that belong to hysteresis modes, before the reset of this iteration;
+        with a ``rank``, only values up to this rank."""
         f, r, workspace = self.frame, self.frame.r, self.frame.workspace
         if not f.sizes.recaptured_states:
             return
@@ -204,28 +222,37 @@ class Events:
         r.call(system_functions.update, t, self.x, z, unknowns, f.p, ticking, new_z)
         recaptured = r.integers("captured.again", f.sizes.recaptured_states)
         for i in r.each(len(f.sizes.recaptured_states)):
-            z[recaptured[i]] = new_z[recaptured[i]]
+            value = new_z[recaptured[i]]
+            if rank is not None:
+                ranks = r.integers("captured.ranks", f.sizes.recaptured_ranks)
+                value = select(ranks[i] > rank, z[recaptured[i]], value)
+            z[recaptured[i]] = value
 
-    def _store_previous_modes(self) -> None:
+    def _store_previous_modes(self, rank: Integer | None = None) -> None:
         """Store the present values of hysteresis modes as their previous values.
 
-        In a subsystem that is being enabled, the previous values are those from before the instant.
+        In a subsystem that is being enabled, the previous values are those from before the instant. With a
+        ``rank``, only modes up to this rank are stored.
         """
         f, r = self.frame, self.frame.r
         z = f.vector(f.workspace.z)
-        always = [places for places in f.sizes.hysteresis_modes if places[2] < 0]
-        gated = [places for places in f.sizes.hysteresis_modes if places[2] >= 0]
+        ranks = f.sizes.hysteresis_ranks or (0,) * len(f.sizes.hysteresis_modes)
+        places = [(*entry, rank) for entry, rank in zip(f.sizes.hysteresis_modes, ranks)]
+        always = [entry for entry in places if entry[2] < 0]
+        gated = [entry for entry in places if entry[2] >= 0]
         for kind, entries in (("always", always), ("gated", gated)):
             if not entries:
                 continue
-            modes, before, working = (
+            modes, before, working, of_rank = (
                 r.integers(f"mode.{role}.{kind}", indices)
-                for role, indices in zip(("remembering", "before", "working"), zip(*entries))
+                for role, indices in zip(("remembering", "before", "working", "rank"), zip(*entries))
             )
             for i in r.each(len(entries)):
                 value = z[modes[i]]
                 if kind == "gated":
                     value = select(z[working[i]] != 0.0, value, z[before[i]])
+                if rank is not None:
+                    value = select(of_rank[i] > rank, z[before[i]], value)
                 z[before[i]] = value
 
     def _end_instant(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import dataclasses
 import json
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
@@ -134,6 +135,7 @@ class CompiledSystem:
                 (int(guard), int(place)) for guard, place in description["silenced_guards"]
             ),
             locating_guards=tuple(int(guard) for guard in description["locating_guards"]),
+            **_sizes_of_ranks(description["ranks"]),
             parameters=self.parameters.size,
             looped=bool(self.loops) or self.algebraic.size > 0,
             tangents=None if description["tangents"] is None else tuple(description["tangents"]),
@@ -304,6 +306,18 @@ def _functions(system: HybridSystem) -> dict[str, TracedFunction]:
     return functions
 
 
+def _sizes_of_ranks(ranks: Mapping[str, Any] | None) -> dict[str, Any]:
+    """The fields of ``LoopSizes`` for the ranks of events."""
+    if ranks is None:
+        return {}
+    return {
+        "guard_ranks": tuple(int(rank) for rank in ranks["guards"]),
+        "hysteresis_ranks": tuple(int(rank) for rank in ranks["hysteresis_modes"]),
+        "recaptured_ranks": tuple(int(rank) for rank in ranks["recaptured_states"]),
+        "controls": tuple((int(mode), int(old), int(rank)) for mode, old, rank in ranks["controls"]),
+    }
+
+
 def _describe(system: HybridSystem, tapes: Mapping[str, Tape]) -> dict[str, Any]:
     """All of a system except its equations, as plain values that JSON reproduces exactly."""
 
@@ -321,6 +335,7 @@ def _describe(system: HybridSystem, tapes: Mapping[str, Tape]) -> dict[str, Any]
         "momentary_states": list(system.momentary_states),
         "silenced_guards": [list(places) for places in system.silenced_guards],
         "locating_guards": list(system.locating_guards),
+        "ranks": None if system.ranks is None else dataclasses.asdict(system.ranks),
         "tangents": system.tangents,
         "guard_directions": list(system.guard_directions),
         "guard_names": list(system.guard_names),

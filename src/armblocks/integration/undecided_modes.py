@@ -1,9 +1,9 @@
 """Modes that only rounding errors decide.
 
 In an algebraic loop a signal depends on the modes that depend on it. At the boundary of a mode the signals of
-both choices are equal up to rounding. Rounding can then make each choice inconsistent. An example is ``y =
-dead_zone(u)`` with ``u = K (r - y)`` at the end of the zone: within the zone ``y`` is 0 and ``u`` may be above
-the end, above the zone ``y`` is positive and ``u`` may be below it.
+both choices are equal up to rounding. Rounding can then make each choice inconsistent. An example is a dead
+zone with the output ``y`` and the input ``u = K (r - y)`` at the end of the zone: with ``y = 0``, ``u`` may
+be above the end; with the small positive ``y`` above the zone, ``u`` may be below the end.
 
 If mode iteration finds no consistent modes, the inconsistent following modes are marked as *undecided* for
 the rest of the run. From then on an undecided mode counts as inconsistent only if it is also inconsistent
@@ -36,7 +36,12 @@ class UndecidedModes:
     """The functions of a program for undecided modes. ``solve`` solves the implicit equations, if any."""
 
     def __init__(
-        self, program: Program, workspace: Workspace, sizes: LoopSizes, guards: GuardFunctions, solve: Solve | None
+        self,
+        program: Program,
+        workspace: Workspace,
+        sizes: LoopSizes,
+        guards: GuardFunctions,
+        solve: Solve | None,
     ) -> None:
         self.workspace = workspace
         self.sizes = sizes

@@ -157,6 +157,10 @@ class LoopSizes:
     - ``silenced_guards``: guards, each with an index of ``momentary_states``. While that value is nonzero,
       the guard does not fire.
     - ``locating_guards``: the guards that only locate mode changes.
+    - ``guard_ranks``: the rank of each guard; empty if all events are processed together.
+      ``hysteresis_ranks``, ``recaptured_ranks``: those of the entries of ``hysteresis_modes`` and
+      ``recaptured_states``. ``controls``: the indices in ``z`` of a mode and of its old value, and a rank;
+      while events of a lower rank are processed, the mode has its old value.
     - ``parameters``: the number of parameters.
     - ``looped``: whether the system has algebraic loops.
     - ``tangents``: the first entries of ``x``, ``z`` and the guards that belong to derivatives, if there are
@@ -178,6 +182,10 @@ class LoopSizes:
     momentary_states: tuple[int, ...] = ()
     silenced_guards: tuple[tuple[int, int], ...] = ()
     locating_guards: tuple[int, ...] = ()
+    guard_ranks: tuple[int, ...] = ()
+    hysteresis_ranks: tuple[int, ...] = ()
+    recaptured_ranks: tuple[int, ...] = ()
+    controls: tuple[tuple[int, int, int], ...] = ()
     parameters: int = 0
     looped: bool = False
     tangents: tuple[int, int, int] | None = None

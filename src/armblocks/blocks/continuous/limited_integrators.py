@@ -80,7 +80,7 @@ class ResettableIntegrator(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         saturated = (_SATURATED,) if self.limit_output else ()
-        state = (Port("state", "the integral before a reset"),) if self.state_port else ()
+        state = (Port("state", "the integral before a reset", before_events=True),) if self.state_port else ()
         return (Port("y", "the integral"), *saturated, *state)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:

@@ -96,7 +96,7 @@ class DiscreteIntegrator(Block):
         return (
             Port("y", "the integral"),
             *((saturated,) if self.saturation_port else ()),
-            *((Port("state", "the integral before a reset"),) if self.state_port else ()),
+            *((Port("state", "the integral before a reset", before_events=True),) if self.state_port else ()),
         )
 
     def assumed_output_shapes(self) -> Shapes:

@@ -1,0 +1,148 @@
+"""Events at one instant: a block reacts to the signals that are recorded, not to values in between.
+
+Sources jump at the same times. Conditional subsystems and resettable integrators read sums of earlier
+signals, so that all signals are constant between jumps. Observers read one sum each. They must agree with
+state machines that read the recorded values of this sum before and after each jump.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import armblocks as ab
+from armblocks.blocks import (
+    ActionSubsystem,
+    Bias,
+    Constant,
+    EnabledSubsystem,
+    Gain,
+    HitCrossing,
+    If,
+    Inport,
+    Integrator,
+    Outport,
+    PulseGenerator,
+    Relay,
+    ResettableIntegrator,
+    ResettableSubsystem,
+    Step,
+    Sum,
+    TriggeredSubsystem,
+    UnitDelay,
+)
+from armblocks.diagram import Diagram
+
+STOP = 2.0
+JUMPS = (0.3, 0.5, 0.8, 1.1, 1.6)
+
+
+def scaled(gain: float) -> Diagram:
+    """A subsystem: its input times ``gain``."""
+    inner = ab.DiagramBuilder("scaled")
+    inner.add("out", Outport(), inner.add("gain", Gain(gain=gain), inner.add("in", Inport())))
+    return inner.build()
+
+
+def counter() -> Diagram:
+    """A subsystem that adds its input to its output at each execution."""
+    inner = ab.DiagramBuilder("counter")
+    total = inner.add("total", Sum(signs="++"), inner.add("in", Inport()))
+    inner.connect(inner.add("delay", UnitDelay(), total), total["u2"])
+    inner.add("out", Outport(), total)
+    return inner.build()
+
+
+def resting() -> Diagram:
+    """A subsystem with an integrator of 0 that starts from 1: its output jumps only at its reset."""
+    inner = ab.DiagramBuilder("resting")
+    zero = inner.add("zero", Gain(gain=0.0), inner.add("in", Inport()))
+    inner.add("out", Outport(), inner.add("integral", Integrator(initial=1.0), zero))
+    return inner.build()
+
+
+def random_diagram(random: np.random.Generator) -> tuple[Diagram, list[str]]:
+    """A random diagram and the names of the observed sums."""
+    builder = ab.DiagramBuilder("order")
+    signals = [builder.add("pulse", PulseGenerator(period=0.8, width=50.0, amplitude=2.0, delay=0.3))]
+    for k in range(3):
+        levels = random.uniform(-1.0, 1.0, 2)
+        time = float(random.choice(JUMPS))
+        signals.append(
+            builder.add(f"step{k}", Step(time=time, initial=float(levels[0]), final=float(levels[1])))
+        )
+    zero = builder.add("zero", Constant(value=0.0))
+
+    def combination(name: str) -> ab.BlockHandle:
+        chosen = random.choice(len(signals), size=3, replace=False)
+        gains = [
+            builder.add(f"{name} gain{i}", Gain(gain=float(random.uniform(-2.0, 2.0))), signals[j])
+            for i, j in enumerate(chosen)
+        ]
+        total = builder.add(f"{name} sum", Sum(signs="+++"), *gains)
+        return builder.add(name, Bias(bias=float(random.uniform(-0.5, 0.5))), total)
+
+    for k in range(6):
+        data, control = combination(f"data{k}"), combination(f"control{k}")
+        inner = scaled(float(random.uniform(-2.0, 2.0)))
+        kind = int(random.integers(5))
+        if kind == 0:
+            block = builder.add(f"part{k}", EnabledSubsystem(diagram=inner), data, enable=control)
+        elif kind == 1:
+            edge = str(random.choice(["rising", "falling", "either"]))
+            block = builder.add(
+                f"part{k}", TriggeredSubsystem(diagram=inner, edge=edge), data, trigger=control
+            )
+        elif kind == 2:
+            condition = builder.add(f"if{k}", If(expressions="u > 0"), control)
+            block = builder.add(f"part{k}", ActionSubsystem(diagram=inner), data, action=condition["if1"])
+        elif kind == 3:
+            block = builder.add(f"part{k}", ResettableSubsystem(diagram=resting()), data, reset=control)
+        else:
+            rule = ResettableIntegrator(external_reset="either", initial_condition_source="external")
+            block = builder.add(f"part{k}", rule, zero, control, data)
+        signals.append(block)
+    one = builder.add("one", Constant(value=1.0))
+    observed = [combination(f"v{k}") for k in range(4)]
+    for k, v in enumerate(observed):
+        builder.add(f"count{k}", TriggeredSubsystem(diagram=counter()), one, trigger=v)
+        builder.add(f"since{k}", ResettableIntegrator(external_reset="rising"), one, v)
+        builder.add(f"relay{k}", Relay(on_point=0.5, off_point=-0.5), v)
+        builder.add(f"hit{k}", HitCrossing(), v)
+    return builder.build(), [f"v{k}" for k in range(4)]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_blocks_react_to_the_recorded_values_only(seed: int) -> None:
+    diagram, names = random_diagram(np.random.default_rng(seed))
+    result = ab.simulate(diagram, stop_time=STOP, sample_time=0.05)
+    for k, name in enumerate(names):
+        jumps = result.jumps[name]
+        on, rises, crossings, last = result[name][0] >= 0.5, 0, 0, 0.0
+        for time, before, after in zip(*jumps):
+            on = after >= 0.5 or (on and after > -0.5)
+            if before <= 0.0 < after:
+                rises, last = rises + 1, time
+            crossings += (before <= 0.0) != (after <= 0.0)
+        assert result[f"count{k}"][-1] == rises
+        assert result[f"hit{k}/count"][-1] == crossings
+        assert result[f"relay{k}"][-1] == on
+        assert np.isclose(result[f"since{k}"][-1], STOP - last)
+
+
+def test_a_state_port_gives_the_value_before_a_reset_at_the_same_instant() -> None:
+    """Two integrators exchange their values at each reset through their state ports."""
+    builder = ab.DiagramBuilder("exchange")
+    pulse = builder.add("pulse", PulseGenerator(period=1.0, width=50.0, delay=0.5))
+    zero = builder.add("zero", Constant(value=0.0))
+    rule = ResettableIntegrator(
+        external_reset="rising", initial_condition_source="external at resets", state_port=True
+    )
+    one = builder.add("one", rule.with_parameters(initial=1.0), zero, pulse)
+    two = builder.add("two", rule.with_parameters(initial=2.0), zero, pulse)
+    builder.connect(one["state"], two["initial"])
+    builder.connect(two["state"], one["initial"])
+    result = ab.simulate(builder.build(), stop_time=3.0, sample_time=0.25)
+    resets = np.floor(result.time + 0.5)
+    assert np.array_equal(result["one/y"], np.where(resets % 2, 2.0, 1.0))
+    assert np.array_equal(result["two/y"], np.where(resets % 2, 1.0, 2.0))
