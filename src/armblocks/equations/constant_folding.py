@@ -103,15 +103,15 @@ def call_with_constants(function: Function, arguments: Sequence[SX]) -> list[SX]
             work[target[0]] = whole[sources[0]][sources[1]]
         elif number == casadi.OP_CALL:
             called = function.instructions_sx()[k].which_function()
-            for slot, value in zip(target, _called(called, [work[source] for source in sources])):
+            for slot, value in zip(target, called_entries(called, [work[source] for source in sources])):
                 if slot >= 0:
                     work[slot] = value
         else:
-            work[target[0]] = _operation(number, [work[source] for source in sources])
+            work[target[0]] = operation_value(number, [work[source] for source in sources])
     return results
 
 
-def _called(function: Function, entries: Sequence[SX]) -> list[SX]:
+def called_entries(function: Function, entries: Sequence[SX]) -> list[SX]:
     """The entries of all results of a nested function call, from the entries of its arguments."""
     starts = [0, *accumulate(function.nnz_in(k) for k in range(function.n_in()))]
     arguments = [
@@ -121,7 +121,8 @@ def _called(function: Function, entries: Sequence[SX]) -> list[SX]:
     return [entry for result in function.call(arguments) for entry in result.nonzeros()]
 
 
-def _operation(number: int, operands: Sequence[SX]) -> SX:
+def operation_value(number: int, operands: Sequence[SX]) -> SX:
+    """The value of one operation of CasADi, by its number."""
     name = _OPERATIONS.get(number)
     if name is not None and all(operand.is_constant() for operand in operands):
         function: Callable[..., float] = rounded_functions.FUNCTIONS[name]

@@ -16,6 +16,7 @@ from casadi import SX, Function, densify, depends_on, jacobian, jtimes, vertcat
 
 from armblocks.equations.evaluation import refuse_called
 from armblocks.equations.hybrid_system import HybridSystem, LinearLoops
+from armblocks.equations.located_jumps import with_located_jumps
 from armblocks.equations.sensitivity_delays import DelayedSensitivities
 from armblocks.equations.sensitivity_instants import Instants
 from armblocks.equations.sensitivity_layout import PREFIX, Columns, sensitivity_name
@@ -61,9 +62,16 @@ def sensitivity_system(
     """
     refuse_called(system, "derivatives")
     _refuse_tables(system, parameters)
+    system = with_located_jumps(system, [k for name in parameters for k in _indices(system, name)])
     _refuse_whole_numbers(system, parameters)
     refuse_moving_start(system, parameters)
     return _AugmentedSystem(system, parameters, outputs).system()
+
+
+def _indices(system: HybridSystem, name: str) -> range:
+    """The indices in p of a parameter, or of an entry of a parameter."""
+    entries = system.parameters.range_of(name)
+    return range(entries.start, entries.stop)
 
 
 def _refuse_tables(system: HybridSystem, parameters: Sequence[str]) -> None:
@@ -122,8 +130,7 @@ def _functions(system: HybridSystem) -> list[TracedFunction]:
 def _direction(system: HybridSystem, name: str) -> SX:
     """A change of all entries of a parameter, in p."""
     direction = SX.zeros(system.parameters.size)
-    entries = system.parameters.range_of(name)
-    for number, index in enumerate(range(entries.start, entries.stop)):
+    for number, index in enumerate(_indices(system, name)):
         direction[index] = 1.0 + 0.37 * number
     return direction
 

@@ -79,7 +79,7 @@ class _Start:
                 direction = self.system.guard_directions[guard]
                 # A guard of one direction fires in that direction only.
                 fires = direction * rate[guard] > 0.0
-                if fires or (direction == 0 and self._sides_differ(guard, rate[guard])):
+                if fires or (direction == 0 and self._sides_differ(guard)):
                     guards.add(guard)
         return sorted(guards)
 
@@ -141,14 +141,17 @@ class _Start:
         )
         return [np.array(value, dtype=np.float64).ravel() for value in values]
 
-    def _sides_differ(self, guard: int, rate: float) -> bool:
+    def _sides_differ(self, guard: int) -> bool:
         """Whether the flow or a signal jumps where a guard of both directions fires."""
-        event = np.zeros(len(self.system.guard_directions))
-        event[guard] = -np.sign(rate)
-        other = self._at(self.system.reset, *self.after, event)
-        before, after = (
+        sides: list[tuple[Array, ...]] = [self.after]
+        for direction in (-1.0, 1.0):
+            event = np.zeros(len(self.system.guard_directions))
+            event[guard] = direction
+            sides.append(self._at(self.system.reset, *self.after, event))
+        present, *others = (
             np.concatenate([*self._at(self.system.derivative, *side), *self._at(self.system.signals, *side)])
-            for side in (self.after, other)
+            for side in sides
         )
         with np.errstate(invalid="ignore"):
-            return bool((np.abs(before - after) > DERIVATIVE_TOLERANCE * (1.0 + np.abs(before))).any())
+            limit = DERIVATIVE_TOLERANCE * (1.0 + np.abs(present))
+            return any((np.abs(present - other) > limit).any() for other in others)

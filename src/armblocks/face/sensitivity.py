@@ -84,8 +84,8 @@ def sensitivity(
 
     The traced equations are differentiated. The derivatives are integrated together with the equations,
     natively, with the same error control. The times of events, of jumps at known times and of the arrival of
-    delayed jumps are differentiated too, and so are implicit equations. ``values``: other values of
-    parameters. The settings of the run are as in :func:`simulate`.
+    delayed jumps are differentiated too, and so are implicit equations and jumps inside formulas. ``values``:
+    other values of parameters. The settings of the run are as in :func:`simulate`.
 
     Raises ``UnknownNameError`` for unknown names, and ``SimulationError`` like a run. ``SimulationError`` is
     also raised if a parameter change would separate coinciding events, because the derivative does not exist.
