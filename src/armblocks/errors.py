@@ -4,7 +4,9 @@
 
     ArmblocksError(ValueError)
     ├── InputError            a call was given a wrong shape, dtype, value or option
+    │   └── ArgumentError     a missing, repeated or unknown argument; also a TypeError
     ├── UnknownNameError      an unknown name; suggests the nearest known names
+    │   └── UnknownArgumentError   an unknown keyword argument; also an ArgumentError
     ├── RobotError            a robot description that contradicts itself
     │   └── AssemblyError     no configuration satisfies the constraints
     ├── DiagramError          a diagram that cannot be built
@@ -21,10 +23,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 import difflib
+import inspect
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from types import FrameType
 
 
 def compose_message(what: str, where: str = "", allowed: str = "", fix: str = "") -> str:
@@ -36,6 +39,11 @@ def compose_message(what: str, where: str = "", allowed: str = "", fix: str = ""
     if fix:
         parts.append(f"Fix: {fix}")
     return " ".join(part if part.endswith(("?", "!")) else part.rstrip(".") + "." for part in parts)
+
+
+def counted(count: int, singular: str, plural: str = "") -> str:
+    """A number of things as text: ``1 argument``, ``2 arguments``. The default plural has an ``s``."""
+    return f"{count} {singular if count == 1 else plural or singular + 's'}"
 
 
 class ArmblocksError(ValueError):
@@ -85,12 +93,12 @@ class UnknownNameError(ArmblocksError):
         super().__init__(
             f"there is no {kind} named '{shortened_name}'",
             where=where,
-            allowed=_shortened_list(self.known, name),
+            allowed=shortened_list(self.known, name),
             fix=f"did you mean '{folded[nearest[0]]}'?" if nearest else "use one of the names above",
         )
 
 
-def _shortened_list(names: Sequence[str], unknown: str) -> str:
+def shortened_list(names: Sequence[str], unknown: str = "") -> str:
     """All names if they are few, else the names most similar to the unknown one and the number of others."""
     if not names:
         return "none exist"
@@ -111,25 +119,18 @@ def _shortened_list(names: Sequence[str], unknown: str) -> str:
     return f"{', '.join(shown_names)}, and {len(names) - len(nearest_names)} more"
 
 
-def check_arguments(kind: type, values: Sequence[object], named: Mapping[str, object]) -> None:
-    """Raise an error for arguments that the constructor of a dataclass does not accept.
+class ArgumentError(InputError, TypeError):
+    """A call lacks an argument, or has an argument that its signature does not accept.
 
-    Its ``__new__`` calls this, so that the error names the nearest field, before ``__init__`` raises Python's
-    own. Raises ``InputError`` for positional arguments and ``UnknownNameError`` for unknown keywords.
+    It is a ``TypeError``, too, like Python's own errors of this kind.
     """
-    known: Mapping[str, dataclasses.Field[Any]] = getattr(kind, "__dataclass_fields__", {})
-    if not values and named.keys() <= known.keys():
-        return
-    fields = [entry.name for entry in dataclasses.fields(kind) if entry.init and entry.repr]
-    for name in named:
-        if name not in known:
-            raise UnknownNameError("argument", name, fields, where=kind.__name__)
-    raise InputError(
-        f"{len(values)} arguments are given without names",
-        where=kind.__name__,
-        allowed=f"arguments by name: {', '.join(fields) or 'none'}",
-        fix=f"write {kind.__name__}({fields[0]}=…)" if fields else f"write {kind.__name__}()",
-    )
+
+
+class UnknownArgumentError(UnknownNameError, ArgumentError):
+    """A call has a keyword argument that does not exist."""
+
+    def __init__(self, name: str, known: Iterable[str], *, where: str = "") -> None:
+        super().__init__("argument", name, known, where=where)
 
 
 def check_type(
@@ -245,3 +246,17 @@ class InertiaWarning(ArmblocksWarning):
 
 class LimitWarning(ArmblocksWarning):
     """A joint exceeded its position, speed or torque limit. The message contains joint, time and value."""
+
+
+def warn(text: str, category: type[ArmblocksWarning] = ArmblocksWarning) -> None:
+    """Issue a warning whose location is the line of the user's code that called the package."""
+    frame, depth = inspect.currentframe(), 1
+    while frame is not None and frame.f_back is not None and _in_package(frame):
+        frame, depth = frame.f_back, depth + 1
+    warnings.warn(text, category, stacklevel=depth)
+
+
+def _in_package(frame: FrameType) -> bool:
+    """Whether a frame runs code of the package, including the generated methods of dataclasses."""
+    package = __name__.partition(".")[0]
+    return str(frame.f_globals.get("__name__", "")).partition(".")[0] == package

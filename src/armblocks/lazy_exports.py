@@ -9,14 +9,19 @@ from __future__ import annotations
 import importlib
 import sys
 from collections.abc import Callable, Mapping
+from types import FunctionType
 from typing import Any
 
 
-def lazy_exports(package: str, modules: Mapping[str, str]) -> Callable[[str], object]:
+def lazy_exports(
+    package: str, modules: Mapping[str, str], *, argument_errors: bool = False
+) -> Callable[[str], object]:
     """The module-level ``__getattr__`` (PEP 562) of ``package``.
 
     ``modules`` maps each name to the module that defines it. A name whose module is
     ``package.name`` is that module itself. After the first lookup a name is an ordinary attribute.
+    ``argument_errors``: exported functions answer wrong arguments as described in
+    :mod:`armblocks.argument_errors`.
     """
 
     def find(name: str) -> object:
@@ -25,10 +30,19 @@ def lazy_exports(package: str, modules: Mapping[str, str]) -> Callable[[str], ob
             raise AttributeError(f"module '{package}' has no attribute '{name}'", name=name, obj=package)
         module = importlib.import_module(module_name)
         value: object = module if module_name == f"{package}.{name}" else getattr(module, name)
+        if argument_errors and isinstance(value, FunctionType):
+            value = _exported_function(package, value)
         setattr(sys.modules[package], name, value)
         return value
 
     return find
+
+
+def _exported_function(package: str, function: FunctionType) -> object:
+    """The function with the errors of wrong arguments; it pickles by its name in the package."""
+    explained = importlib.import_module("armblocks.argument_errors").with_argument_errors(function)
+    explained.__module__ = package
+    return explained
 
 
 def display_method(module: str, function: str) -> Callable[[Any], str]:

@@ -19,7 +19,7 @@ GOOD = np.ones(3)
 
 def test_a_wrong_number_of_arguments_is_refused(kernel: Kernel) -> None:
     with pytest.raises(
-        InputError, match=r"mixed: 1 arguments were given. Allowed: a \(3,\), b \(3,\). Fix: call mixed"
+        InputError, match=r"mixed: 1 argument is given. Allowed: a \(3,\), b \(3,\). Fix: call mixed"
     ):
         kernel(GOOD)
 

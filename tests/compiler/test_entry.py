@@ -121,7 +121,7 @@ def test_the_builtin_refuses_all_arguments_that_the_kernel_refuses(kernel: Kerne
 def test_wrong_counts_and_keywords_are_refused_with_the_message_of_the_kernel(kernel: Kernel) -> None:
     a, b = arguments(3)
     for inputs in ((), (a,), (a, b, a)):
-        with pytest.raises(InputError, match="arguments were given"):
+        with pytest.raises(InputError, match=r"arguments? (is|are) given"):
             kernel.entry(*inputs)
     with pytest.raises(UnknownNameError, match="no argument named 'speed'"):
         kernel.entry(a, b, speed=3)

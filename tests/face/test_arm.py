@@ -72,7 +72,7 @@ def test_arguments_may_be_given_by_name(puma: ab.Arm, states: list[np.ndarray]) 
 
 def test_errors_about_wrong_calls_state_the_correct_call(puma: ab.Arm) -> None:
     q = np.zeros(6)
-    with pytest.raises(InputError, match=r"rne: 0 arguments were given.*Fix: call rne\(q, qd, qdd\)"):
+    with pytest.raises(InputError, match=r"rne: 0 arguments are given.*Fix: call rne\(q, qd, qdd\)"):
         puma.rne(payload=2.0)  # pyright: ignore[reportCallIssue]
     with pytest.raises(InputError, match=r"rne: 'qdd' is missing.*Fix: call rne\(q, qd, qdd\)"):
         puma.rne(q, qd=q)  # pyright: ignore[reportCallIssue]

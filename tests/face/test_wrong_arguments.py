@@ -23,7 +23,7 @@ def add_block(*args: object, **named: object) -> object:
 
 WRONG: dict[str, tuple[Callable[[], object], str]] = {
     "name of a parameter": (lambda: Gain(gian=2.0), r"Gain: there is no argument named 'gian'.*'gain'\?"),
-    "no name": (lambda: Gain(2.0), r"1 arguments are given without names.*Fix: write Gain\(gain=…\)"),
+    "no name": (lambda: Gain(2.0), r"1 argument is given without names.*Fix: write Gain\(gain=…\)"),
     "field of a robot": (lambda: ab.Robot(nme="x"), r"Robot: there is no argument named 'nme'.*'name'"),
     "field of a link": (lambda: ab.Link(mas=3), r"Link: there is no argument named 'mas'.*'mass'"),
     "field of a motor": (lambda: ab.Motor(gear=3), r"Motor: there is no argument named 'gear'.*'gear_ratio'"),

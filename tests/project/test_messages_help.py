@@ -18,6 +18,7 @@ TREE = {
 }
 PROVIDED = {
     "UnknownNameError": {"where", "fix"},  # contains the nearest name and the kind of name
+    "UnknownArgumentError": {"where", "fix"},
     "MissingLibraryError": {"where", "fix"},  # states its purpose and the install command
     "AlgebraicLoopError": {"where", "fix"},  # the loop is the place
 }

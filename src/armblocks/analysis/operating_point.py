@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.argument_errors import ArgumentErrors
 from armblocks.equations import Signature
 from armblocks.equations.evaluation import EvaluatedSystem, Point
 from armblocks.errors import SimulationError
@@ -19,7 +20,7 @@ MAX_ITERATIONS = 60
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class OperatingPoint:
+class OperatingPoint(metaclass=ArgumentErrors):
     """The values of all variables of a system at ``time`` (s), each by its path and in its shape.
 
     They are states, discrete variables with modes, unknowns of implicit equations, tunable parameters and

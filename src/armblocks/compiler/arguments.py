@@ -11,16 +11,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from armblocks.compiler.result_memory import new_result
 from armblocks.equations import Shape, Signature, Slot
-from armblocks.errors import InputError, UnknownNameError
+from armblocks.errors import ArgumentError, InputError, UnknownArgumentError, counted
 
 Array = NDArray[np.float64]
 
 
 def check_count(name: str, signature: Signature, values: Sequence[object]) -> None:
-    """Raise :class:`InputError` unless there is one value per slot."""
+    """Raise :class:`ArgumentError` unless there is one value per slot."""
     if len(values) != len(signature):
-        raise InputError(
-            f"{len(values)} arguments were given",
+        raise ArgumentError(
+            f"{counted(len(values), 'argument is', 'arguments are')} given",
             where=name,
             allowed=_listing(signature),
             fix=f"call {name}({', '.join(signature.names)})",
@@ -36,18 +36,18 @@ def in_order(
 ) -> tuple[ArrayLike, ...]:
     """All inputs in the order of the slots: the first ones are ``values``, the others ``named``.
 
-    Raises :class:`UnknownNameError` for a name that is neither an input nor one of the ``options`` of the
-    call, :class:`InputError` for a missing or duplicate input.
+    Raises :class:`UnknownArgumentError` for a name that is neither an input nor one of the ``options`` of
+    the call, :class:`ArgumentError` for a missing or duplicate input.
     """
     remaining = signature.names[len(values) :]
     if set(named) == set(remaining):
         return (*values, *[named[slot_name] for slot_name in remaining])
     for argument in named:
         if argument not in signature.names:
-            raise UnknownNameError("argument", argument, [*signature.names, *options], where=name)
+            raise UnknownArgumentError(argument, [*signature.names, *options], where=name)
     duplicates = [argument for argument in named if argument not in remaining]
     missing = [slot_name for slot_name in remaining if slot_name not in named]
-    raise InputError(
+    raise ArgumentError(
         f"'{duplicates[0]}' is given twice" if duplicates else f"'{missing[0]}' is missing",
         where=name,
         allowed=_listing(signature),

@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Self
 
 from casadi import SX, logic_or
 
+from armblocks.argument_errors import ArgumentErrors
 from armblocks.diagram.mask import ParameterFormula, Scope, formula_names, formula_value
 from armblocks.diagram.parameter import Parameter, Value, shape_of
 from armblocks.diagram.port import Condition, DelayLine, Guard, Port, State, View, name_before
@@ -18,7 +19,7 @@ from armblocks.diagram.shape_rules import broadcast
 from armblocks.diagram.signs import FaceSign, Outline, Title, value_text
 from armblocks.diagram.worked_example import WorkedExample
 from armblocks.equations import Shape
-from armblocks.errors import UnknownNameError, check_arguments
+from armblocks.errors import UnknownNameError
 
 _MAX_FORMULA_LENGTH = 16
 """Maximum number of characters of a formula that a block's face shows instead of the value."""
@@ -29,7 +30,7 @@ Signals = Mapping[str, SX]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Block(ABC):
+class Block(ABC, metaclass=ArgumentErrors):
     """Base class of block types. Subclasses are final frozen dataclasses whose fields are parameters.
 
     A subclass sets ``title``, declares its parameters with :func:`~armblocks.diagram.parameter.parameter`,
@@ -93,10 +94,6 @@ class Block(ABC):
 
     formulas: tuple[tuple[str, str], ...] = field(default=(), repr=False, metadata={"formulas": True})
     """The parameters that are formulas, by name, with their texts."""
-
-    def __new__(cls, *values: object, **named: object) -> Self:
-        check_arguments(cls, values, named)
-        return super().__new__(cls)
 
     sign: ClassVar[FaceSign | None] = None
     """The sign on the block's face, if it does not depend on parameters; by default the title."""
@@ -215,7 +212,7 @@ class Block(ABC):
         """A copy with other parameter values; formulas that are not replaced are kept."""
         return dataclasses.replace(self, **values)
 
-    def check(self) -> None:  # noqa: B027 - optional, most blocks have no such checks
+    def check(self) -> None:
         """Raise ``InputError`` for inconsistent parameters. Each single parameter is already checked."""
 
     # -- ports and states --------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+from armblocks.argument_errors import ArgumentErrors
 from armblocks.diagram.block import Block
 from armblocks.diagram.bookmarks import Bookmark, check_bookmark_name
 from armblocks.diagram.check import check_diagram
@@ -29,7 +30,7 @@ from armblocks.equations import SimulationOptions
 from armblocks.errors import DiagramError, InputError, UnknownNameError
 
 
-class BlockHandle:
+class BlockHandle(metaclass=ArgumentErrors):
     """A block in a builder: ``handle["q"]`` is its port q, for use as a source or a target."""
 
     def __init__(self, name: str, block: Block) -> None:
@@ -51,7 +52,7 @@ Source = PortRef | BlockHandle
 """A signal source for an input: an output port, or a block with exactly one output."""
 
 
-class DiagramBuilder:
+class DiagramBuilder(metaclass=ArgumentErrors):
     """Builds a diagram step by step::
 
         builder = DiagramBuilder("falling")

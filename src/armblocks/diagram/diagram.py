@@ -10,6 +10,7 @@ from operator import itemgetter
 from types import MappingProxyType
 from typing import Any, TypeVar, cast
 
+from armblocks.argument_errors import ArgumentErrors
 from armblocks.diagram.block import Block
 from armblocks.diagram.bookmarks import Bookmark
 from armblocks.diagram.mask import Scope, checked_mask, values_of
@@ -24,7 +25,7 @@ _Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True, order=True)
-class Connection:
+class Connection(metaclass=ArgumentErrors):
     """A connection from an output port to an input port."""
 
     source: PortRef
@@ -35,7 +36,7 @@ class Connection:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Placement:
+class Placement(metaclass=ArgumentErrors):
     """Position and appearance of a block on the sheet: top left corner and size in pixels, y downwards.
 
     ``width`` and ``height`` ``None``: chosen by the drawing code. ``flipped``: inputs on the right.
@@ -130,7 +131,7 @@ def block_in_scope(name: str, block: Block, scope: Scope) -> Block:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Diagram:
+class Diagram(metaclass=ArgumentErrors):
     """An immutable diagram of blocks and connections. ``DiagramBuilder.build`` creates and checks it.
 
     ``blocks`` is sorted by name and ``connections`` by ends, so that equal diagrams compare equal. ``layout``

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import cast
 
+from armblocks.argument_errors import ArgumentErrors
 from armblocks.diagram.block import Block
 from armblocks.diagram.diagram import Connection, Diagram
 from armblocks.diagram.parameter import Parameter, ParameterKind
@@ -69,7 +70,7 @@ class PlacedPort:
 
 
 @dataclass(frozen=True, kw_only=True)
-class DiagramDifference:
+class DiagramDifference(metaclass=ArgumentErrors):
     """All differences between two diagrams and their subsystems; false if there are none.
 
     ``types`` are blocks of another type under the same name; their parameters are listed too, with ``None``

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from armblocks.argument_errors import ArgumentErrors
 from armblocks.diagram.block import Block
 from armblocks.errors import DiagramError, UnknownNameError
 
@@ -28,7 +29,7 @@ class UnimportedBlock:
         return block_type
 
 
-class BlockLibrary(Mapping[str, type[Block]]):
+class BlockLibrary(Mapping[str, type[Block]], metaclass=ArgumentErrors):
     """Block types by name, ``library["Gain"]``; an unknown name raises an error with the nearest names.
 
     ``families``: the types of each family, in display order. Types that are not imported yet are imported

@@ -12,6 +12,7 @@ from typing import Any, Protocol, cast, runtime_checkable
 
 import numpy as np
 
+from armblocks.argument_errors import ArgumentErrors, with_argument_errors
 from armblocks.diagram.time_table import TimeTable
 from armblocks.diagram.user_function import UserFunction
 from armblocks.equations import Shape
@@ -48,7 +49,7 @@ class RobotHolder(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameter:
+class Parameter(metaclass=ArgumentErrors):
     """One parameter of a block type.
 
     ``tunable``: the value is an input of the compiled system (numbers and arrays only; an array's shape is
@@ -106,6 +107,7 @@ class Parameter:
         return ", ".join([words, *bounds, *(["finite"] if numeric and self.finite else [])])
 
 
+@with_argument_errors
 def parameter(
     default: Any = REQUIRED,
     *,

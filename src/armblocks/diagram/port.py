@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from armblocks.argument_errors import ArgumentErrors
 from armblocks.equations import Shape
 
 
 @dataclass(frozen=True)
-class Port:
+class Port(metaclass=ArgumentErrors):
     """One input or output of a block.
 
     ``shape`` is the only allowed shape, or ``None`` if it follows from the connections. ``unit`` is SI, or
@@ -27,7 +28,7 @@ class Port:
 
 
 @dataclass(frozen=True)
-class State:
+class State(metaclass=ArgumentErrors):
     """One state or mode of a block; the integrator stores its value, the block does not.
 
     ``follows``: whether a mode is a following mode, that is, a function of the present signals. Following

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
 
-from armblocks.errors import check_arguments
+from armblocks.argument_errors import ArgumentErrors
 
 
 @dataclass(frozen=True, kw_only=True)
-class SimulationOptions:
+class SimulationOptions(metaclass=ArgumentErrors):
     """Settings of one run. ``None`` leaves the choice to the simulation, which reports it.
 
     ``stop_time``: end of the run, s. ``solver``: a name of ``armblocks.simulation.tableaux``, or ``"auto"``.
@@ -27,7 +26,3 @@ class SimulationOptions:
     rtol: float = 1e-6
     atol: float = 1e-9
     record_jumps: bool = True
-
-    def __new__(cls, *values: object, **named: object) -> Self:
-        check_arguments(cls, values, named)
-        return super().__new__(cls)

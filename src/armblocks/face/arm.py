@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armblocks.argument_errors import ArgumentErrors
 from armblocks.compiler import Kernel, OperationCount, cached_kernel
 from armblocks.compiler.arguments import check_count, in_order
 from armblocks.errors import InputError, UnknownNameError
@@ -100,7 +101,7 @@ _NO_WRENCH.flags.writeable = False
 _OPTIONS = ("wrench", "payload", "out", "threads")
 
 
-class Arm:
+class Arm(metaclass=ArgumentErrors):
     """A robot with compiled kinematics and dynamics.
 
     Arguments are positional or keywords, ``rne(q, qd, qdd)`` or ``rne(q=q, qd=qd, qdd=qdd)``; positional

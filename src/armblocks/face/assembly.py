@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armblocks.argument_errors import ArgumentErrors
 from armblocks.errors import InputError
 from armblocks.robot import Robot
 from armblocks.robot.fields import numbers
@@ -17,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Assembly:
+class Assembly(metaclass=ArgumentErrors):
     """A state that satisfies the constraints of a robot.
 
     ``q`` (nq,) rad or m and ``qd`` (n,) rad/s or m/s. ``degrees_of_freedom``: of the mechanism at

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.argument_errors import ArgumentErrors
 from armblocks.diagram import Diagram, flat_diagram, with_parameters
 from armblocks.diagram.mask_tuning import dependent_parameters, mask_parameters, tunable_parameters
 from armblocks.errors import InputError
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class DiagramRun:
+class DiagramRun(metaclass=ArgumentErrors):
     """A run of a diagram, created by :func:`armblocks.begin`.
 
     >>> run = begin("van_der_pol_pid")

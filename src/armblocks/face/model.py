@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.analysis.operating_point import OperatingPoint
+from armblocks.argument_errors import ArgumentErrors
 from armblocks.diagram import Diagram, content_key, trace_diagram, with_parameters
 from armblocks.diagram.entry_names import entry_names
 from armblocks.diagram.signal_names import signal_titles
@@ -30,7 +31,7 @@ from armblocks.simulation.plan import changed_parameters
 from armblocks.simulation.whole_run import Progress, run_to_the_end
 
 
-class CompiledDiagram:
+class CompiledDiagram(metaclass=ArgumentErrors):
     """A diagram with its equations and native code, created at first use."""
 
     def __init__(self, diagram: Diagram) -> None:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armblocks.errors import InputError, check_arguments
+from armblocks.argument_errors import ArgumentErrors
+from armblocks.errors import InputError
 
 
 @dataclass(frozen=True, kw_only=True)
-class Payload:
+class Payload(metaclass=ArgumentErrors):
     """A rigid body fixed to the tool.
 
     ``mass`` kg; ``centre`` (3,) m: its centre of mass in the tool frame; ``inertia`` (6,) kg m2: xx yy zz xy
@@ -23,10 +23,6 @@ class Payload:
     mass: float
     centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
     inertia: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-    def __new__(cls, *values: object, **named: object) -> Self:
-        check_arguments(cls, values, named)
-        return super().__new__(cls)
 
     def __post_init__(self) -> None:
         try:

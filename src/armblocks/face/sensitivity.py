@@ -10,6 +10,7 @@ from typing import Unpack
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.argument_errors import ArgumentErrors
 from armblocks.diagram import Diagram
 from armblocks.diagram.mask_tuning import mask_parameters, with_mask_parameters
 from armblocks.equations import HybridSystem, Signature, Slot
@@ -27,7 +28,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SensitivityResult:
+class SensitivityResult(metaclass=ArgumentErrors):
     """A run with the derivatives of some of its signals with respect to some parameters.
 
     ``result[output, parameter]`` is d output / d parameter at ``time`` (N,) s: ``(N, *shape of the output)``

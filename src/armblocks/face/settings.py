@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, TypedDict, TypeVar, cast, get_type_hints
 
 from armblocks.equations import SimulationOptions
-from armblocks.errors import UnknownNameError
+from armblocks.errors import UnknownArgumentError
 
 Call = TypeVar("Call", bound=Callable[..., Any])
 
@@ -56,11 +56,11 @@ def takes_settings(call: Call) -> Call:
 
 
 def check_settings(settings: Mapping[str, object], call: Callable[..., object]) -> None:
-    """Raise ``UnknownNameError`` for a keyword argument that ``call`` does not have."""
+    """Raise ``UnknownArgumentError`` for a keyword argument that ``call`` does not have."""
     for name in settings:
         if name not in _NAMES:
             argument_names = [entry for entry in inspect.signature(call).parameters if entry != name]
-            raise UnknownNameError("argument", name, argument_names, where=call.__name__)
+            raise UnknownArgumentError(name, argument_names, where=call.__name__)
 
 
 def with_settings(options: SimulationOptions, settings: RunSettings) -> SimulationOptions:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armblocks.argument_errors import ArgumentErrors
 from armblocks.equations import Slot
 from armblocks.errors import InputError
 from armblocks.robot.plausibility import warn_of_degrees
@@ -16,7 +17,7 @@ from armblocks.trajectories import Quintic
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class JointTrajectory:
+class JointTrajectory(metaclass=ArgumentErrors):
     """Samples of a joint motion: ``t`` (N,) s, ``q`` (N, n) rad or m, ``qd`` and ``qdd`` (N, n) its rates."""
 
     t: NDArray[np.float64]

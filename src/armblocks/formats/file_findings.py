@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from armblocks.errors import ArmblocksWarning, compose_message
+from armblocks.errors import compose_message, warn
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,11 +66,11 @@ class FileContext:
     lines: dict[str, int] = field(default_factory=dict[str, int])
 
 
-def warn_of_findings(findings: Sequence[FileFinding], *, stacklevel: int = 3) -> None:
+def warn_of_findings(findings: Sequence[FileFinding]) -> None:
     """Issue one ArmblocksWarning for each code: its first finding, and the number of others."""
     by_code: dict[str, list[FileFinding]] = {}
     for finding in findings:
         by_code.setdefault(finding.rule.code, []).append(finding)
     for first, *others in by_code.values():
         more = f" {len(others)} more of this kind; armblocks lint lists them." if others else ""
-        warnings.warn(f"{first}{more}", ArmblocksWarning, stacklevel=stacklevel)
+        warn(f"{first}{more}")

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.errors import ArmblocksWarning
+from armblocks.errors import warn
 from armblocks.robot import FrictionModel, Robot
 
 
@@ -53,12 +52,10 @@ def read_script(
     interpreter = Interpreter(source)
     interpreter.run(statements)
     if joined_lines := sorted({*restored_lines, *interpreter.joined_lines}):
-        warnings.warn(
+        warn(
             f"{name}: lines {', '.join(map(str, joined_lines))} are split as on a printed page and were "
             "joined with the next line. MATLAB does not join them. Fix: check the robot's numbers, and write "
-            "every statement on one line.",
-            ArmblocksWarning,
-            stacklevel=2,
+            "every statement on one line."
         )
     robots: dict[str, Robot] = {}
     variables: dict[str, NDArray[np.float64] | str] = {}

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-import warnings
 from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
-from armblocks.errors import ArmblocksWarning, FormatError
+from armblocks.errors import FormatError, counted, warn
 from armblocks.robot import Coupling, Joint, JointLimits, Link, Robot, with_tip
 from armblocks.robot.shapes import Shape
 from armblocks.spatial import Transform
@@ -36,7 +35,7 @@ def check_joint(robot: Robot, link: Link, kinds: Collection[type[Joint]], format
     if link.joint.nv > 1 and link.joint.limits != JointLimits():
         kind = type(link.joint).__name__.lower()
         what = f"the limits of its {kind} joint are not part of the {format} file"
-        warn(f"robot '{robot.name}', link '{link.name}'", what)
+        warn_of_loss(f"robot '{robot.name}', link '{link.name}'", what)
 
 
 class Mimic(NamedTuple):
@@ -82,9 +81,11 @@ def joint_friction(robot: Robot, link: Link, format: str) -> JointFriction:
     damping, friction = viscous * link.motor.viscous_friction, (plus - minus) / 2
     place = f"robot '{robot.name}', link '{link.name}'"
     if not math.isclose(plus, -minus, rel_tol=1e-12, abs_tol=0.0):
-        warn(place, f"Coulomb friction {plus:g}, {minus:g} depends on the direction; the mean is written")
+        warn_of_loss(
+            place, f"Coulomb friction {plus:g}, {minus:g} depends on the direction; the mean is written"
+        )
     if damping < 0 or friction < 0:
-        warn(place, f"friction that accelerates the joint is not part of {format} files")
+        warn_of_loss(place, f"friction that accelerates the joint is not part of {format} files")
         damping, friction = max(damping, 0.0), max(friction, 0.0)
     return JointFriction(damping, friction)
 
@@ -107,7 +108,8 @@ def warn_of_shapes(robot: Robot, kinds: Sequence[type[Shape]], format: str) -> N
     others = [shape for link in robot.links for shape in link.geometry or () if type(shape) not in kinds]
     if others:
         names = ", ".join(sorted({type(shape).__name__ for shape in others}))
-        warn(f"robot '{robot.name}'", f"{len(others)} shapes ({names}) are not part of the {format} file")
+        count = counted(len(others), "shape is", "shapes are")
+        warn_of_loss(f"robot '{robot.name}'", f"{count} not part of the {format} file: {names}")
 
 
 def warn_of_order(robot: Robot, tip: str, copy: Robot, format: str) -> None:
@@ -117,11 +119,11 @@ def warn_of_order(robot: Robot, tip: str, copy: Robot, format: str) -> None:
     """
     where = f"robot '{robot.name}'"
     if copy.links[-1].name != tip:
-        warn(where, f"the tip is not part of the {format} file; load this one with tip={tip!r}")
+        warn_of_loss(where, f"the tip is not part of the {format} file; load this one with tip={tip!r}")
         copy = with_tip(copy, tip)
     if copy.joint_names != robot.joint_names and sorted(copy.joint_names) == sorted(robot.joint_names):
         order = ", ".join(copy.joint_names)
-        warn(where, f"the coordinates of the file are in another order: {order}")
+        warn_of_loss(where, f"the coordinates of the file are in another order: {order}")
 
 
 def file_names(robot: Robot, is_reserved: Callable[[str], bool], format: str) -> dict[str | None, str]:
@@ -133,7 +135,7 @@ def file_names(robot: Robot, is_reserved: Callable[[str], bool], format: str) ->
         if is_reserved(link.name):
             new = free_name(link.name.strip()[:100].replace("::", "_").strip("_") + "_", used)
             names[link.name] = new
-            warn(
+            warn_of_loss(
                 f"robot '{robot.name}'",
                 f"the name of link '{link.name[:60]}' becomes '{new[:60]}', as {format} requires",
             )
@@ -165,6 +167,6 @@ def quoted(name: str, robot: Robot) -> str:
     return quoteattr(name)
 
 
-def warn(where: str, what: str) -> None:
+def warn_of_loss(where: str, what: str) -> None:
     """Warn of data that the file does not contain."""
-    warnings.warn(f"{where}: {what}.", ArmblocksWarning, stacklevel=4)
+    warn(f"{where}: {what}.")

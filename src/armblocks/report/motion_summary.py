@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -16,7 +15,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.errors import LimitWarning
+from armblocks.errors import LimitWarning, warn
 from armblocks.pictures.numbers import table_number
 from armblocks.robot import Robot
 
@@ -218,7 +217,7 @@ def limit_findings(
 def warn_of_limits(findings: Sequence[LimitFinding]) -> None:
     """Issue a :class:`LimitWarning` for each finding."""
     for finding in findings:
-        warnings.warn(finding.text, LimitWarning, stacklevel=2)
+        warn(finding.text, LimitWarning)
 
 
 def _exceeded(

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 
-from armblocks.errors import ArmblocksWarning, RobotError
+from armblocks.errors import RobotError, warn
 from armblocks.robot.fields import check_kind
 from armblocks.robot.joints import AxisMotion, Joint, JointLimits
 from armblocks.robot.link import Link, Motor
@@ -136,12 +135,10 @@ def _check_motor(where: str, motor: Motor) -> None:
         )
     plus, minus = motor.coulomb_friction
     if motor.viscous_friction < 0 or plus < 0 or minus > 0:
-        warnings.warn(
+        warn(
             f"{where}: friction accelerates the joint instead of braking it: viscous B = "
             f"{motor.viscous_friction:g}, Coulomb Tc+ = {plus:g}, Tc- = {minus:g}. "
-            "Allowed: B >= 0, Tc+ >= 0, Tc- <= 0.",
-            ArmblocksWarning,
-            stacklevel=5,
+            "Allowed: B >= 0, Tc+ >= 0, Tc- <= 0."
         )
 
 

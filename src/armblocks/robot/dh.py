@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from numpy.typing import ArrayLike
 
+from armblocks.argument_errors import with_argument_errors
 from armblocks.robot.dh_row import DhConvention, DhRow
 from armblocks.robot.joints import JointLimits
 from armblocks.robot.link import ZERO3, Link, Motor, inertia_matrix
@@ -116,6 +117,7 @@ def modified_dh(
     )
 
 
+@with_argument_errors
 def serial_chain(links: Sequence[Link]) -> tuple[Link, ...]:
     """The links as a chain: the parent of each link is the previous link, or the base for the first link."""
     parents = (None, *(link.name for link in links))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Self
 
-from armblocks.errors import RobotError, check_arguments
+from armblocks.argument_errors import ArgumentErrors
+from armblocks.errors import RobotError
 from armblocks.robot.fields import number
 from armblocks.robot.joints import Joint, JointLimits, Prismatic, Revolute
 from armblocks.spatial import Transform, transl, trotx, trotz
@@ -22,7 +22,7 @@ class DhConvention(Enum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class DhRow:
+class DhRow(metaclass=ArgumentErrors):
     """One row of a Denavit-Hartenberg table: a joint and the link that it carries.
 
     ``alpha`` rad, ``a`` m, ``d`` m, ``theta`` rad, ``sigma`` 0 revolute or 1 prismatic, ``offset`` rad, m.
@@ -40,10 +40,6 @@ class DhRow:
     sigma: int = 0
     offset: float = 0.0
     convention: DhConvention = DhConvention.STANDARD
-
-    def __new__(cls, *values: object, **named: object) -> Self:
-        check_arguments(cls, values, named)
-        return super().__new__(cls)
 
     def __post_init__(self) -> None:
         for name in ("alpha", "a", "d", "theta", "offset"):

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armblocks.errors import InputError, RobotError, check_arguments
+from armblocks.argument_errors import ArgumentErrors
+from armblocks.errors import InputError, RobotError
 from armblocks.robot.dh_row import DhRow
 from armblocks.robot.fields import check_kind, number, numbers, pose
 from armblocks.robot.joints import Joint, Revolute
@@ -19,7 +19,7 @@ ZERO3: Matrix3 = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 @dataclass(frozen=True, kw_only=True)
-class Motor:
+class Motor(metaclass=ArgumentErrors):
     """A motor and its gear, all numbers at the motor's side of the gear.
 
     ``inertia`` Jm of the rotor, kg m2; ``gear_ratio`` G, motor turns per joint turn (motor rad per m of a
@@ -31,10 +31,6 @@ class Motor:
     gear_ratio: float = 1.0
     viscous_friction: float = 0.0
     coulomb_friction: tuple[float, float] = (0.0, 0.0)
-
-    def __new__(cls, *values: object, **named: object) -> Self:
-        check_arguments(cls, values, named)
-        return super().__new__(cls)
 
     def __post_init__(self) -> None:
         for name in ("inertia", "gear_ratio", "viscous_friction"):
@@ -57,7 +53,7 @@ class Motor:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Link:
+class Link(metaclass=ArgumentErrors):
     """A rigid body, and the joint that connects it to ``parent``.
 
     ``parent`` is the name of a link; ``None`` is the robot's base. Pose in the parent's frame:
@@ -86,10 +82,6 @@ class Link:
     inertia: Matrix3 = ZERO3
     motor: Motor | None = None
     geometry: tuple[Shape, ...] | None = None
-
-    def __new__(cls, *values: object, **named: object) -> Self:
-        check_arguments(cls, values, named)
-        return super().__new__(cls)
 
     def __post_init__(self) -> None:
         link = f"link '{self.name}'"

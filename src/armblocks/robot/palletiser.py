@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from armblocks.argument_errors import ArgumentErrors, with_argument_errors
 from armblocks.errors import InputError
 from armblocks.robot.constraints import Coupling
 from armblocks.robot.fields import number
@@ -27,7 +28,7 @@ ROD_RADIUS = 0.02
 
 
 @dataclass(frozen=True, kw_only=True)
-class Masses:
+class Masses(metaclass=ArgumentErrors):
     """Masses of the moving parts, kg. ``level_rods``: the rods along the lower and the upper arm."""
 
     turret: float
@@ -62,7 +63,7 @@ class Masses:
 
 
 @dataclass(frozen=True, kw_only=True)
-class AxisConvention:
+class AxisConvention(metaclass=ArgumentErrors):
     """The angle φ of an axis from its coordinate: ``φ = sign (q + zero)``, rad; ``sign`` is 1 or -1."""
 
     zero: float = 0.0
@@ -76,6 +77,7 @@ class AxisConvention:
             )
 
 
+@with_argument_errors
 def palletiser(
     name: str,
     *,

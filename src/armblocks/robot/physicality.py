@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
 
-from armblocks.errors import InertiaWarning
+from armblocks.argument_errors import ArgumentErrors, with_argument_errors
+from armblocks.errors import InertiaWarning, warn
 from armblocks.robot.robot import Robot
 from armblocks.spatial import Vector3
 
@@ -16,7 +16,7 @@ TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
-class InertiaFinding:
+class InertiaFinding(metaclass=ArgumentErrors):
     """A reason why no rigid body has the inertia of a link; ``moments``: principal moments, kg m2."""
 
     robot: str
@@ -32,6 +32,7 @@ class InertiaFinding:
         )
 
 
+@with_argument_errors
 def inertia_findings(robot: Robot) -> tuple[InertiaFinding, ...]:
     """A finding for every link whose inertia about the centre of mass is impossible.
 
@@ -60,4 +61,4 @@ def inertia_findings(robot: Robot) -> tuple[InertiaFinding, ...]:
 def warn_of_inertias(robot: Robot) -> None:
     """Issue an InertiaWarning for every finding; called when a robot is loaded."""
     for finding in inertia_findings(robot):
-        warnings.warn(str(finding), InertiaWarning, stacklevel=3)
+        warn(str(finding), InertiaWarning)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armblocks.errors import ArmblocksWarning
+from armblocks.errors import warn
 from armblocks.robot.link import Link
 from armblocks.robot.robot import Robot
 
@@ -55,18 +54,16 @@ def warn_of_degrees(angles: ArrayLike, where: str) -> None:
     values = np.abs(np.asarray(angles, dtype=np.float64)).ravel()
     beyond = values[np.isfinite(values) & (values > MAX_MOTION_ANGLE)]
     if beyond.size:
-        warnings.warn(
+        warn(
             f"{where}: an angle of {beyond[0]:g} rad is more than two full turns. Is this in degrees? "
-            "It is used as given; np.radians converts degrees to rad.",
-            ArmblocksWarning,
-            stacklevel=3,
+            "It is used as given; np.radians converts degrees to rad."
         )
 
 
 def warn_of_implausible_values(robot: Robot) -> None:
     """Issue an ArmblocksWarning for every finding; called when a robot is loaded."""
     for finding in plausibility_findings(robot):
-        warnings.warn(str(finding), ArmblocksWarning, stacklevel=3)
+        warn(str(finding))
 
 
 def _findings(robot: Robot) -> Iterator[PlausibilityFinding]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.errors import UnknownNameError, check_arguments
+from armblocks.argument_errors import ArgumentErrors
+from armblocks.errors import UnknownNameError
 from armblocks.lazy_exports import display_method
 from armblocks.robot.checks import check_robot
 from armblocks.robot.constraint_checks import check_constraints
@@ -25,7 +25,7 @@ STANDARD_GRAVITY: Vector3 = (0.0, 0.0, -9.81)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Robot:
+class Robot(metaclass=ArgumentErrors):
     """Links that form a chain or a tree on one base.
 
     ``base`` pose of the base frame in the world; ``tool`` pose of the tool in the frame of the tip, which is
@@ -55,10 +55,6 @@ class Robot:
     friction_model: FrictionModel = FrictionModel.SQUARED_GEAR
     constraints: tuple[Constraint, ...] = ()
     source: str = field(default="", compare=False)
-
-    def __new__(cls, *values: object, **named: object) -> Self:
-        check_arguments(cls, values, named)
-        return super().__new__(cls)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "links", tuple(self.links))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.argument_errors import ArgumentErrors
 from armblocks.equations import Signature, Slot
 from armblocks.simulation.jumps import Jumps, JumpTable, merged, merged_states
 from armblocks.simulation.signal_names import element_names, signal_path
@@ -22,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunReport:
+class RunReport(metaclass=ArgumentErrors):
     """The statistics of a run.
 
     ``solver``: name of the integrator, ``"none"`` without integration. ``reason``: reason for its choice.
@@ -67,7 +68,7 @@ class LoggedFile:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class RunData:
+class RunData(metaclass=ArgumentErrors):
     """Signals of one run. ``result["block/port"]`` is ``(N, *shape)``, a view.
 
     ``time (N,)`` s. ``signals (ny, N)``: ``signals_layout`` has the names, shapes and units of its rows.

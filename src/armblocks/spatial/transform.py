@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armblocks.errors import InputError
+from armblocks.argument_errors import ArgumentErrors
+from armblocks.errors import ArgumentError, InputError, counted
 from armblocks.rounded_functions import atan2, cos, hypot, sin
 from armblocks.spatial.rotation import (
     IDENTITY3,
@@ -27,7 +28,7 @@ ORTHONORMALITY = 1e-8
 
 
 @dataclass(frozen=True, init=False)
-class Transform:
+class Transform(metaclass=ArgumentErrors):
     """The pose of frame b in frame a: ``p_a = rotation p_b + translation`` (m).
 
     Transforms are values: they are equal if their numbers are equal. ``T_ac = T_ab @ T_bc``. Raises
@@ -45,8 +46,8 @@ class Transform:
         translation: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
         if unnamed:
-            raise InputError(
-                f"{len(unnamed)} arguments are given without names",
+            raise ArgumentError(
+                f"{counted(len(unnamed), 'argument is', 'arguments are')} given without names",
                 where="Transform",
                 allowed="rotation and translation by name",
                 fix="write Transform.from_matrix(T) for a (4, 4) matrix, else Transform(rotation=…)",

@@ -28,7 +28,7 @@ from armblocks.formats.robot_writing import (
     mimics_of,
     numbers,
     quoted,
-    warn,
+    warn_of_loss,
     warn_of_order,
     warn_of_shapes,
 )
@@ -105,13 +105,15 @@ def _warn_of_losses(robot: Robot) -> None:
     warn_of_shapes(robot, (Box, Cylinder, Sphere, Mesh), "MJCF")
     moving = [link for link in robot.links if link.joint.moves]
     if any(link.motor is not None and link.motor.gear_ratio != 1.0 for link in moving):
-        warn(where, "gear ratios are not part of an MJCF file; inertia and friction are those at the joint")
+        warn_of_loss(
+            where, "gear ratios are not part of an MJCF file; inertia and friction are those at the joint"
+        )
     if any(limits.speed is not None for limits in robot.limits):
-        warn(where, "speed limits are not part of an MJCF file")
+        warn_of_loss(where, "speed limits are not part of an MJCF file")
     for link in moving:
         low, high = limits_of(link).position or (0.0, 1.0)
         if low == high:
-            warn(
+            warn_of_loss(
                 f"{where}, link '{link.name}'", f"a range of zero width, {low:g}, is not part of an MJCF file"
             )
 
@@ -127,7 +129,9 @@ def _check_quaternions(robot: Robot, link: Link) -> None:
             fix="save the robot as .json",
         )
     if link.after.rotation != IDENTITY3 or (isinstance(link.joint, Free) and not link.after.is_identity):
-        warn(where, "the coordinates of its joint are relative to the axes of the link in the MJCF file")
+        warn_of_loss(
+            where, "the coordinates of its joint are relative to the axes of the link in the MJCF file"
+        )
 
 
 def _tool_name(robot: Robot, names: Mapping[str | None, str]) -> str:

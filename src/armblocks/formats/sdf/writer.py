@@ -25,7 +25,7 @@ from armblocks.formats.robot_writing import (
     mimics_of,
     numbers,
     quoted,
-    warn,
+    warn_of_loss,
     warn_of_order,
     warn_of_shapes,
 )
@@ -138,7 +138,7 @@ def _joint_lines(robot: Robot, link: Link, names: Mapping[str | None, str], name
         lines.append(f"    <screw_thread_pitch>{joint.pitch!r}</screw_thread_pitch>")
     if isinstance(joint, Spherical) and link.motor is not None:
         what = "friction and rotor inertia of its ball joint are not part of the SDF file"
-        warn(f"robot '{robot.name}', link '{link.name}'", what)
+        warn_of_loss(f"robot '{robot.name}', link '{link.name}'", what)
     if joint.nv == 1:
         lines += ["    <axis>", f"      <xyz>{numbers(joint.axis)}</xyz>"]
         lines += [f"      {line}" for line in (_limit(link), _dynamics(robot, link)) if line]

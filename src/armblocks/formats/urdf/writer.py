@@ -23,7 +23,7 @@ from armblocks.formats.robot_writing import (
     mimics_of,
     numbers,
     quoted,
-    warn,
+    warn_of_loss,
     warn_of_order,
     warn_of_shapes,
 )
@@ -52,7 +52,7 @@ def write_urdf(robot: Robot) -> bytes:
     """
     if not np.allclose(robot.gravity, STANDARD_GRAVITY, rtol=1e-15, atol=0.0):
         what = f"gravity {robot.gravity} is not part of a URDF file, which is read with -9.81 along z"
-        warn(f"robot '{robot.name}'", what)
+        warn_of_loss(f"robot '{robot.name}'", what)
     warn_of_shapes(robot, (Box, Cylinder, Sphere), "URDF")
     mimics = mimics_of(robot, "URDF", supported=True)
     names = {link.name for link in robot.links}

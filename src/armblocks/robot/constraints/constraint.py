@@ -7,14 +7,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Self
 
-from armblocks.errors import RobotError, check_arguments
+from armblocks.argument_errors import ArgumentErrors
+from armblocks.errors import RobotError
 from armblocks.robot.constraints.relations import NoDisplacement, Perpendicular, Relation
 from armblocks.robot.fields import check_kind, pose
 from armblocks.spatial import Transform
 
 
 @dataclass(frozen=True, kw_only=True)
-class Attachment:
+class Attachment(metaclass=ArgumentErrors):
     """A frame that is fixed to a link: ``pose`` in the frame of the link named ``link`` (None: the base).
 
     ``pose`` may be a (4, 4) matrix.
@@ -23,17 +24,13 @@ class Attachment:
     link: str | None = None
     pose: Transform = field(default_factory=Transform)
 
-    def __new__(cls, *values: object, **named: object) -> Self:
-        check_arguments(cls, values, named)
-        return super().__new__(cls)
-
     def __post_init__(self) -> None:
         where = f"pose of an attachment to {'the base' if self.link is None else f'link {self.link!r}'}"
         object.__setattr__(self, "pose", pose(self.pose, where=where))
 
 
 @dataclass(frozen=True, kw_only=True)
-class Constraint(ABC):
+class Constraint(ABC, metaclass=ArgumentErrors):
     """Equations that the coordinates of a robot satisfy at all times, beside the tree of its joints.
 
     ``name`` is unique in the robot.
@@ -43,10 +40,6 @@ class Constraint(ABC):
 
     title: ClassVar[str] = ""
     """The name of the type in messages and files."""
-
-    def __new__(cls, *values: object, **named: object) -> Self:
-        check_arguments(cls, values, named)
-        return super().__new__(cls)
 
     def __post_init__(self) -> None:
         if not self.name:

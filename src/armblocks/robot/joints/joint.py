@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Self, cast
 
-from armblocks.errors import RobotError, check_arguments
+from armblocks.argument_errors import ArgumentErrors
+from armblocks.errors import RobotError
 from armblocks.robot.fields import check_kind, number
 from armblocks.robot.joints.limits import JointLimits
 from armblocks.robot.joints.motions import AxisMotion, Coordinate, Motion
@@ -17,7 +18,7 @@ from armblocks.spatial import Transform, Vector3, vector3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Joint(ABC):
+class Joint(ABC, metaclass=ArgumentErrors):
     """A joint: a sequence of elementary motions from the parent to the link.
 
     Its coordinates q (nq,) are those of its motions, one after the other, and its speeds qd (nv,) as well.
@@ -36,10 +37,6 @@ class Joint(ABC):
     """The letter of the type, as in the toolbox's ``RRRRRR``."""
     parameters: ClassVar[tuple[str, ...]] = ("axis", "offset")
     """The parameters of the type beside the limits, which are also its members in files."""
-
-    def __new__(cls, *values: object, **named: object) -> Self:
-        check_arguments(cls, values, named)
-        return super().__new__(cls)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", unit_axis(self.axis))

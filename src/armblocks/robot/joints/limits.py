@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
-from armblocks.errors import RobotError, check_arguments
+from armblocks.argument_errors import ArgumentErrors
+from armblocks.errors import RobotError
 from armblocks.robot.fields import number, numbers
 
 
 @dataclass(frozen=True, kw_only=True)
-class JointLimits:
+class JointLimits(metaclass=ArgumentErrors):
     """The limits of a joint coordinate; ``None`` if unknown.
 
     ``position``: lowest and highest joint coordinate (rad or m). ``speed``: maximum magnitude (rad/s or m/s).
@@ -22,10 +22,6 @@ class JointLimits:
     position: tuple[float, float] | None = None
     speed: float | None = None
     torque: float | None = None
-
-    def __new__(cls, *values: object, **named: object) -> Self:
-        check_arguments(cls, values, named)
-        return super().__new__(cls)
 
     def __post_init__(self) -> None:
         if self.position is not None:
