@@ -6,13 +6,13 @@ import { change, useStudio } from '../store'
 import { connectAt } from './connecting'
 import { followPointer } from './pointer_drag'
 
-/** Distance from an input within which a new line ends there, screen px. */
+/** Distance from an input within which a new wire ends there, screen px. */
 const SNAP_PX = 24
-/** Movement from which a press on a line is a drag, screen px. */
+/** Movement from which a press on a wire is a drag, screen px. */
 const DRAG_PX = 3
 
 interface Branch {
-  /** The output at the start of the line. */
+  /** The output at the start of the branch. */
   source: string
   from: Point
   to: Point
@@ -24,7 +24,7 @@ interface Branch {
 export const useBranch = create<{ branch: Branch | null }>(() => ({ branch: null }))
 
 /**
- * Draw a branch from a point of a line: to an input, to a block, or to the empty sheet, where the list of
+ * Draw a branch from a point of a wire: to an input, to a block, or to the empty sheet, where the list of
  * blocks opens. Escape cancels it.
  */
 export function drawBranch(

@@ -15,7 +15,7 @@ export function endConnection(event: MouseEvent | TouchEvent, state: FinalConnec
 }
 
 /**
- * End a new line at a point of the window. On the body of a block, connect the line to the first free port.
+ * End a new wire at a point of the window. On the body of a block, connect the wire to the first free port.
  * On the empty sheet, the list of blocks opens and the chosen block is connected.
  */
 export function connectAt(at: { x: number; y: number }, port: string, isOutput: boolean): void {

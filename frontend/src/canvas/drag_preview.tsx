@@ -13,7 +13,7 @@ export const useDraggedCopies = create<{ names: readonly string[]; shift: [numbe
 
 export const clearCopies = (): void => useDraggedCopies.setState({ names: [] })
 
-/** The preview of a drag: copies of blocks, or a branch of a line; and the alignment of dragged blocks. */
+/** The preview of a drag: copies of blocks, or a branch of a wire; and the alignment of dragged blocks. */
 export function DragPreview() {
   const { names, shift } = useDraggedCopies()
   const branch = useBranch((s) => s.branch)

@@ -34,7 +34,7 @@ export function useRightButton(
   }
 }
 
-/** A drag with the right button: it duplicates blocks and notes, and branches from a line. */
+/** A drag with the right button: it duplicates blocks and notes, and draws branches of wires. */
 function rightDrag(flow: Flow, edges: readonly WireEdgeType[]) {
   return (event: React.PointerEvent): void => {
     if (event.button !== 2 || hasOwnMenu(event.target)) return

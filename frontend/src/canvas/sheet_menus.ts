@@ -18,7 +18,7 @@ import { nameSignal } from './signal_names'
 
 type Point = { x: number; y: number }
 
-/** Open the context menu of an element of the sheet: a port, block, note, line, or the sheet itself. */
+/** Open the context menu of an element of the sheet: a port, block, note, wire, or the sheet itself. */
 export function openSheetMenu(point: Point, element: Element, selectWire: (key: string) => void): void {
   const { document, selection, select } = useStudio.getState()
   if (!document) return
@@ -34,7 +34,7 @@ export function openSheetMenu(point: Point, element: Element, selectWire: (key: 
     openMenu(block?.name ?? 'Note', point, block ? blockEntries(document, block) : noteEntries(node))
   } else if (wire) {
     selectWire(wireKey(wire))
-    openMenu(`Line from ${wire.source}`, point, lineEntries(document, wire, point))
+    openMenu(`Wire from ${wire.source}`, point, wireEntries(document, wire, point))
   } else openMenu('Sheet', point, sheetEntries(document, point))
 }
 
@@ -108,7 +108,7 @@ function blockEntries(document: OpenDocument, block: SheetBlock): Entries {
 /** The sides without ports, and the present one. */
 function nameEntries(chosen: SheetBlock[]): Entries {
   const titles = {
-    auto: 'At a side without lines',
+    auto: 'At a side without wires',
     below: 'Below',
     above: 'Above',
     left: 'Left',
@@ -178,7 +178,7 @@ function signalEntries(document: OpenDocument, port: string): Entries {
   ]
 }
 
-function lineEntries(document: OpenDocument, wire: Wire, point: Point): Entries {
+function wireEntries(document: OpenDocument, wire: Wire, point: Point): Entries {
   const end = { port: wire.source, isOutput: true }
   return [
     { title: 'Branch to a new block …', run: () => showDialog('insert', '', point, end) },
@@ -218,7 +218,7 @@ function portEntries(document: OpenDocument, port: string, isOutput: boolean, po
       run: () => showDialog('connect', '', null, { port, isOutput }),
     },
     {
-      title: wires.length > 1 ? 'Delete its lines' : 'Delete its line',
+      title: wires.length > 1 ? 'Delete its wires' : 'Delete its wire',
       enabled: wires.length > 0,
       run: () => void change({ kind: 'remove', wires }),
     },

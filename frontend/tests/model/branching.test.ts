@@ -3,7 +3,7 @@ import { nearestInput, nearestPointOn } from '../../src/model/branching'
 import type { Point } from '../../src/model/wire_lines'
 import { seeded } from './random'
 
-test('the start of a branch is on the line, and no other point of the line is nearer', () => {
+test('the start of a branch is on the wire, and no other point of the wire is nearer', () => {
   const random = seeded(5)
   for (let round = 0; round < 200; round++) {
     const path: Point[] = [[400 * random(), 400 * random()]]

@@ -87,7 +87,7 @@ def test_context_menus_of_blocks_lines_ports_the_sheet_and_charts(sheet: Page) -
     entry(sheet, "Log the signal").click()
     expect(sheet.get_by_label(f"{name}/y is logged")).to_be_visible()
     block(sheet, name).locator('[data-handleid="u"]').click(button="right")
-    entry(sheet, "Delete its line").click()
+    entry(sheet, "Delete its wire").click()
     expect(edge(sheet, f"error/y -> {name}/u")).to_have_count(0)
     sheet.keyboard.press("Control+z")
     expect(edge(sheet, f"error/y -> {name}/u")).to_have_count(1)
