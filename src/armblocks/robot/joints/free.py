@@ -13,10 +13,10 @@ from armblocks.robot.joints.motions import AxisMotion, BallMotion, Motion
 class Free(Joint):
     """No connection: six degrees of freedom relative to the parent, or to the world for a floating base.
 
-    q (7,) = position x y z (m) of the link's side in the joint frame on the parent, then a quaternion w x y z
-    of length 1. qd (6,) = linear velocity of the origin in the axes of the joint frame on the *parent* (the
-    rate of the position, m/s), then angular velocity in the axes of the joint frame on the *link's* side,
-    rad/s. tau (6,): forces and moments in the same axes. These are the conventions of MuJoCo.
+    The proximal frame is the joint frame that is fixed to the parent, the distal frame the one that is fixed
+    to the link. q (7,) = position x y z (m) of the distal frame in the proximal frame, then a quaternion w x
+    y z of length 1. qd (6,) = rate of the position, m/s, in *proximal* axes, then angular velocity, rad/s, in
+    *distal* axes. tau (6,): forces and moments in the same axes. These are the conventions of MuJoCo.
     """
 
     letter: ClassVar[str] = "6"

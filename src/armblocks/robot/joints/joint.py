@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar, Self, cast
 
 from armblocks.argument_errors import ArgumentErrors
-from armblocks.errors import RobotError
+from armblocks.errors import RobotError, counted
 from armblocks.robot.fields import check_kind, number
 from armblocks.robot.joints.limits import JointLimits
 from armblocks.robot.joints.motions import AxisMotion, Coordinate, Motion
@@ -60,7 +60,7 @@ class Joint(ABC, metaclass=ArgumentErrors):
                 check_kind(entry, JointLimits, where="limits of a joint")
             if len(entries) != self.nv:
                 raise RobotError(
-                    f"{len(entries)} limits are given",
+                    f"{counted(len(entries), 'limit is', 'limits are')} given",
                     where="limits of a joint",
                     allowed=f"{self.nv} for a {type(self).__name__} joint, or one for all coordinates",
                     fix="give JointLimits(), where nothing is known",
@@ -144,7 +144,7 @@ class Joint(ABC, metaclass=ArgumentErrors):
         return replace(self, offset=self.offset + added)
 
     def motion(self, q: Sequence[float]) -> Transform:
-        """The pose of the distal side in the joint frame at the coordinates ``q`` (nq,), offset included."""
+        """The pose of the distal frame in the proximal frame at ``q`` (nq,), offset included."""
         pose, first = Transform(), 0
         for motion in self.motions:
             count = len(motion.positions)

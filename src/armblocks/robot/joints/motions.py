@@ -26,7 +26,7 @@ class Coordinate(NamedTuple):
 class AxisMotion:
     """Rotation about an axis, translation along it, or both, by one coordinate q; its speed is q̇.
 
-    With ``s = q + offset`` the distal side rotates by ``angular s`` rad about the unit vector ``axis`` and
+    With ``s = q + offset`` the distal frame rotates by ``angular s`` rad about the unit vector ``axis`` and
     translates by ``linear s`` m along it.
     """
 
@@ -52,7 +52,7 @@ class AxisMotion:
         return (0.0,)
 
     def pose(self, q: Sequence[float]) -> Transform:
-        """The pose of the distal side at the coordinates ``q`` (1,)."""
+        """The pose of the distal frame in the proximal frame at the coordinates ``q`` (1,)."""
         s = q[0] + self.offset
         x, y, z = self.axis
         shift = self.linear * s
@@ -66,10 +66,10 @@ class AxisMotion:
 class BallMotion:
     """Any rotation about one point.
 
-    The coordinates are a quaternion w x y z: the rotation of the distal side relative to the proximal side,
+    The coordinates are a quaternion w x y z: the rotation of the distal frame in the proximal frame,
     ``p_proximal = R p_distal``. R depends only on the direction of the quaternion, whose length may be any
-    number above zero. The speeds are the angular velocity of the distal side relative to the proximal side,
-    in the axes of the distal side, rad/s: ``d/dt (w x y z) = (w x y z) (0 wx wy wz) / 2``.
+    number above zero. The speeds are the angular velocity of the distal frame relative to the proximal frame,
+    in the axes of the distal frame, rad/s: ``d/dt (w x y z) = (w x y z) (0 wx wy wz) / 2``.
     """
 
     @property
@@ -79,7 +79,7 @@ class BallMotion:
 
     @property
     def speeds(self) -> tuple[Coordinate, ...]:
-        """The angular velocity in the axes of the distal side; its integral has the unit rad."""
+        """The angular velocity in the axes of the distal frame; its integral has the unit rad."""
         return tuple(Coordinate(name, "rad") for name in ("wx", "wy", "wz"))
 
     @property
@@ -88,7 +88,7 @@ class BallMotion:
         return (1.0, 0.0, 0.0, 0.0)
 
     def pose(self, q: Sequence[float]) -> Transform:
-        """The pose of the distal side for the quaternion ``q`` (4,). Raises InputError if it is zero."""
+        """The pose of the distal frame in the proximal frame at ``q`` (4,). Raises InputError for zeros."""
         length = hypot(*q)
         if length == 0.0:
             raise InputError(

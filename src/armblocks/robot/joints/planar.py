@@ -11,10 +11,10 @@ from armblocks.robot.joints.motions import AxisMotion, Motion
 
 @dataclass(frozen=True, kw_only=True)
 class Planar(Joint):
-    """Motion in a plane: q = (x, y, angle), translation along x and y of the joint frame (m), then rotation
-    about z (rad).
+    """Motion in the x-y plane of the joint frame: translation along x and y, then rotation about z.
 
-    The speeds qd are the rates of q: the linear velocity is in the axes of the joint frame on the parent.
+    q is (x, y, angle) in m and rad. qd are the rates of q: the linear velocity is in the axes of the joint
+    frame that is fixed to the parent.
     """
 
     letter: ClassVar[str] = "E"
