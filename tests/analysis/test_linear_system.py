@@ -338,11 +338,11 @@ def test_inconsistent_shapes_and_unsuitable_systems_are_refused() -> None:
     system = random_system(0)
     with pytest.raises(InputError, match="B has shape"):
         LinearSystem(system.A, system.B[:2], system.C, system.D)
-    with pytest.raises(InputError, match=r"A has 1 axes.*Allowed: matrices, two axes"):
+    with pytest.raises(InputError, match=r"A has 1 axis.*Allowed: matrices, two axes"):
         LinearSystem(system.A[0], system.B, system.C, system.D)
     with pytest.raises(InputError, match="A contains NaN or infinity"):
         LinearSystem(system.A * np.nan, system.B, system.C, system.D)
-    with pytest.raises(InputError, match="1 names and 5 units are given for the states"):
+    with pytest.raises(InputError, match="1 name and 5 units are given for the states"):
         LinearSystem(system.A, system.B, system.C, system.D, states=("x",))
     with pytest.raises(InputError, match=r"the sample time is -1"):
         LinearSystem(system.A, system.B, system.C, system.D, dt=-1.0)

@@ -42,7 +42,7 @@ def test_the_caller_may_give_the_gains() -> None:
 
 
 def test_a_locus_of_several_channels_is_refused() -> None:
-    with pytest.raises(InputError, match="a root locus of 2 inputs, 2 outputs and 1 states is requested"):
+    with pytest.raises(InputError, match="a root locus of 2 inputs, 2 outputs and 1 state is requested"):
         root_locus(LinearSystem(-np.eye(1), np.ones((1, 2)), np.ones((2, 1)), np.zeros((2, 2))))
 
 

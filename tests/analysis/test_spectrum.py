@@ -78,7 +78,7 @@ def test_samples_before_begin_are_ignored_and_several_signals_are_columns() -> N
 
 
 def test_unsuitable_signals_and_unknown_options_are_refused() -> None:
-    with pytest.raises(InputError, match=r"3 segments of 6 samples are requested"):
+    with pytest.raises(InputError, match=r"3 segments of 6 samples in all: fewer than 4 samples in each"):
         signal_spectrum(np.arange(7.0), np.arange(7.0), averages=3)
     with pytest.raises(InputError, match=r"there are fewer than two recorded times"):
         signal_spectrum([1.0], [1.0])

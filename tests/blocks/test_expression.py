@@ -151,7 +151,7 @@ def test_messages_name_the_position_and_a_fix() -> None:
         Formula("1e999", "here").trace({})
     with pytest.raises(InputError, match=r"'t' cannot be the name of a constant"):
         Expression(names="t")
-    with pytest.raises(InputError, match=r"there are 2 names and 1 values"):
+    with pytest.raises(InputError, match=r"2 names and 1 value are given"):
         Expression(names="a b", values=1.0)
 
 

@@ -92,7 +92,7 @@ def test_a_circular_path_agrees_with_its_closed_form() -> None:
 
 
 def test_invalid_path_parameters_are_refused() -> None:
-    with pytest.raises(InputError, match=r"3 points make 2 segments but 1 durations are given"):
+    with pytest.raises(InputError, match=r"there are 3 points and 1 duration"):
         MultiSegment(durations=[1.0])
     with pytest.raises(InputError, match=r"blends of 2 s do not fit into a segment of 1 s"):
         MultiSegment(blend=2.0)

@@ -148,7 +148,7 @@ def test_inconsistent_break_points_and_tables_are_refused() -> None:
         LookupTable1D(positions=[0, 0])
     with pytest.raises(InputError, match=r"positions1 has 3 positions for 2 entries of the table"):
         LookupTable2D(positions1=[0, 1, 2])
-    with pytest.raises(InputError, match=r"there are 3 positions for a table of shape \(2, 2\)"):
+    with pytest.raises(InputError, match=r"3 positions are given for a table of shape \(2, 2\)"):
         LookupTableND(positions=[0, 1, 0])
     with pytest.raises(InputError, match=r"InterpolationUsingPrelookup: the table has shape \(1,\)"):
         InterpolationUsingPrelookup(table=[1.0])

@@ -142,7 +142,7 @@ def test_a_file_keeps_zeros_and_poles(tmp_path: Path) -> None:
 
 
 def test_invalid_zeros_poles_and_filters_are_refused() -> None:
-    with pytest.raises(InputError, match=r"ZeroPole: there are 2 zeros and 1 poles.*is not causal"):
+    with pytest.raises(InputError, match=r"ZeroPole: the system has 2 zeros and 1 pole.*is not causal"):
         ZeroPole(zeros=[1.0, 2.0], poles=[-1.0])
     with pytest.raises(InputError, match="complex numbers in conjugate pairs"):
         ZeroPole(zeros=[], poles=[-1 + 2j, -1 - 3j])

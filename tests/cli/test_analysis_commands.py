@@ -71,7 +71,7 @@ def test_unreadable_or_unknown_options_are_refused(refusal: Callable[..., str]) 
     assert "--free is given without --trim" in refusal("linearize", "falling_pendulum", "--free", "a.b")
     assert "is not of the form NAME=VALUE" in refusal("trim", "falling_pendulum", "--fix", "q")
     assert "'up' is not a number" in refusal("trim", "falling_pendulum", "--fix", "pendulum/q=up")
-    assert "the bounds of 'pendulum/q' have 1 numbers" in refusal(
+    assert "the bounds of 'pendulum/q' have 1 number" in refusal(
         "trim", "falling_pendulum", "--bound", "pendulum/q=1"
     )
     assert "no operating point was found" in refusal("trim", "falling_pendulum")

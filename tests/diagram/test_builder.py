@@ -164,7 +164,7 @@ def test_too_many_inputs_are_refused() -> None:
     clock = builder.add("clock", Clock())
     with pytest.raises(DiagramError, match=r"block 'gain' \(Gain\): 2 inputs are given. Allowed: 1: u"):
         builder.add("gain", Gain(), clock, clock)
-    with pytest.raises(DiagramError, match=r"1 inputs are given. Allowed: no inputs"):
+    with pytest.raises(DiagramError, match=r"1 input is given. Allowed: no inputs"):
         builder.add("constant", Constant(), clock)
 
 

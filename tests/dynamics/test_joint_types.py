@@ -301,7 +301,7 @@ def test_every_joint_type_has_consistent_coordinates():
         (lambda: Universal(offset=0.1), "a Universal joint has no offset"),
         (lambda: Screw(), "the pitch of a screw joint is 0 m"),
         (lambda: Screw(pitch=float("nan")), "the pitch of a screw joint is nan m"),
-        (lambda: Universal(limits=(JointLimits(),)), "1 limits are given.*2 for a Universal joint"),
+        (lambda: Universal(limits=(JointLimits(),)), "1 limit is given.*2 for a Universal joint"),
         (
             lambda: Spherical(limits=JointLimits(position=(-1, 1))),
             "coordinate wx of a Spherical joint has position",
@@ -337,7 +337,7 @@ def test_limits_of_several_coordinates_are_in_the_order_of_the_speeds():
     assert robot.neutral.tolist() == [0, 0, 0, 1, 0, 0, 0, 0, 0]
     assert [entry.name for entry in robot.positions[2:5]] == ["root.z", "root.qw", "root.qx"]
     assert links[1].joint.travel == (0.0, 0.5)
-    with pytest.raises(InputError, match=r"1 coordinates are given\. Allowed: 7 for a Free joint"):
+    with pytest.raises(InputError, match=r"1 coordinate is given\. Allowed: 7 for a Free joint"):
         links[0].pose(0.3)
 
 

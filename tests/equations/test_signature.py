@@ -64,5 +64,5 @@ def test_a_traced_function_can_be_called_with_numbers() -> None:
 
 
 def test_equations_with_a_wrong_number_of_outputs_are_refused() -> None:
-    with pytest.raises(InputError, match=r"the equations of 'f' return 2 values. Allowed: 1 values"):
+    with pytest.raises(InputError, match=r"the equations of 'f' return 2 values. Allowed: 1 value"):
         TracedFunction.trace("f", signature(("a", ())), signature(("b", ())), lambda a: (a, a))

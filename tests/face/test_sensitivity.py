@@ -448,7 +448,7 @@ def test_unknown_names_and_empty_lists_are_refused() -> None:
         ab.sensitivity(decay(), "k.gian", "x")
     with pytest.raises(UnknownNameError, match="there is no signal named 'y'"):
         ab.sensitivity(decay(), "k.gain", "y")
-    with pytest.raises(InputError, match="0 parameters and 1 outputs are given"):
+    with pytest.raises(InputError, match="0 parameters and 1 output are given"):
         ab.sensitivity(decay(), [], "x")
     result = ab.sensitivity(decay(), "k.gain", "x", **TIGHT)
     with pytest.raises(UnknownNameError, match="there is no parameter named 'k'"):

@@ -385,7 +385,7 @@ FAULTS: list[tuple[bytes, type[ArmblocksError], str]] = [
     (
         with_change(*GAIN, value={"type": "JTraj", "parameters": {"q0": [0], "qf": [0, 1]}}),
         FormatError,
-        "q0 has 1 joints and qf has 2",
+        "q0 has 1 joint and qf has 2",
     ),
     (
         with_change("blocks", "a/b", value={"type": "Clock"}),

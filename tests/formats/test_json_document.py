@@ -160,7 +160,7 @@ def test_type_errors_name_the_expected_type() -> None:
         root["i"].members()
     with pytest.raises(FormatError, match=r"Allowed: an array \[…\]"):
         root["i"].elements()
-    with pytest.raises(FormatError, match=r"1 numbers are given. Allowed: 3 numbers"):
+    with pytest.raises(FormatError, match=r"1 number is given. Allowed: 3 numbers"):
         root["l"].numbers(3)
     with pytest.raises(FormatError, match=r"'x' is not known here. Allowed: xy, z. Fix: did you mean 'xy'"):
         root["t"].choice(["xy", "z"])

@@ -201,7 +201,7 @@ INVALID_DOCUMENTS = [
     (with_change(*LINK, "dh", "alpha", value="90 deg/s"), "'90 deg/s' is not an angle"),
     (with_change(*LINK, "dh", "alpha", value="\u0669 deg"), "is not an angle"),
     (with_change(*LINK, "dh", "alpha", value="9" * 400 + " deg"), "is not an angle"),
-    (with_change(*LINK, "limits", value={"position": [1]}), "1 limits are given"),
+    (with_change(*LINK, "limits", value={"position": [1]}), "1 limit is given"),
     (with_change("links", 0, value={"name": "a", "joint": {"type": "ball"}}), "'ball' is not known here"),
     (
         with_change("links", 0, value={"name": "a", "joint": {"type": "free", "axis": [1, 0, 0]}}),
@@ -213,7 +213,7 @@ INVALID_DOCUMENTS = [
     ),
     (
         with_change("links", 0, value={"name": "a", "joint": {"type": "planar"}, "limits": [{}]}),
-        "1 limits are given. Allowed: 3, one for each speed",
+        "1 limit is given. Allowed: 3, one for each speed",
     ),
     (with_change(*LINK, "limits", value={"position": [1, 0]}), "the position limits are reversed"),
     (with_change(*LINK, "limits", value={"speed": "3 deg"}), "'3 deg' is not an angle"),
@@ -228,13 +228,13 @@ INVALID_DOCUMENTS = [
     ),
     (
         with_change(*LINK, "geometry", value=[{"shape": "sphere", "radius": 1, "pose": [[1, 0, 0, 0]]}]),
-        "1 rows are given",
+        "1 row is given",
     ),
     (
         with_change(*LINK, "geometry", value=[{"shape": "mesh", "vertices": [], "faces": [[0, 1, 0.5]]}]),
         "a face is not a list of vertex numbers",
     ),
-    (with_change("base", value={"rotation": [[1, 0, 0]]}), "1 rows are given"),
+    (with_change("base", value={"rotation": [[1, 0, 0]]}), "1 row is given"),
     (
         with_change("base", value={"rotation": [[2, 0, 0], [0, 1, 0], [0, 0, 1]]}),
         "is not orthonormal",

@@ -272,7 +272,7 @@ REFUSED_DATA = [
     (DATA.replace("mm", "furlong"), "the unit is 'furlong'"),
     (DATA.replace("[0 0 0]; %", "[0 nan 0]; %"), "'[0 nan 0]' is not 3 numbers"),
     (DATA.replace("[0 0 0]; %", "[0 1e999 0]; %"), "is too large"),
-    (DATA.replace(".angle = 0", ".angle = system('rm')"), "is not 1 numbers"),
+    (DATA.replace(".angle = 0", ".angle = system('rm')"), "is not 1 number"),
     (DATA.replace(".axis", ".other"), "the entry has no field 'axis'"),
     (DATA.replace("(1)", "(999999)"), "the table has an entry 999999"),
     (

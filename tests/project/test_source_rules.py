@@ -131,6 +131,13 @@ def test_lines_of_the_front_end_have_at_most_110_characters() -> None:
     ] == []
 
 
+def test_plurals_of_counts_come_from_counted() -> None:
+    """``counted`` of ``armblocks.errors`` writes "1 row" and "2 rows"; no other code appends an s."""
+    plural = re.compile(r"""(["'])\1 if [^"']* else (["'])s\2|(["'])s\3 \*""")
+    assert plural.search("""row{'' if n == 1 else 's'}""") and plural.search("""row{'s' * (n != 1)}""")
+    assert [name for name, path in zip(NAMES, MODULES) if plural.search(path.read_text("utf-8"))] == []
+
+
 def test_files_do_not_have_generic_names() -> None:
     assert [name for name in NAMES if set(Path(name).with_suffix("").parts) & VAGUE_NAMES] == []
 

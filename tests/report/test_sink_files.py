@@ -147,5 +147,5 @@ def test_a_too_short_run_shows_a_message_instead_of_its_spectrum(tmp_path: Path)
     model = spectra(Spectrum(averages=200))
     result = ab.simulate(model)
     (figure,) = view_figures(model, result)
-    assert "200 segments of 256 samples are requested" in figure.picture.description
+    assert "200 segments of 256 samples in all" in figure.picture.description
     assert ab.write_report(tmp_path, model, result, formats=("svg",), data=()).page.exists()

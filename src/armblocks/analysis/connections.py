@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from armblocks.analysis.state_space import StateSpaceModel, SystemT
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 
 
 def _common_sample_time(first: StateSpaceModel, second: StateSpaceModel) -> float:
@@ -47,7 +47,8 @@ def series(second: SystemT, first: StateSpaceModel) -> SystemT:
     dt = _common_sample_time(first, second)
     if second.D.shape[1] != first.D.shape[0]:
         raise _size_error(
-            f"{first.D.shape[0]} outputs are connected to {second.D.shape[1]} inputs",
+            f"{counted(first.D.shape[0], 'output is', 'outputs are')} connected to "
+            f"{counted(second.D.shape[1], 'input')}",
             "equal numbers of signals",
         )
     zero = np.zeros((first.order, second.order))
@@ -97,7 +98,10 @@ def feedback(forward: SystemT, back: StateSpaceModel | float, sign: int) -> Syst
     ny, nu = forward.D.shape
     if isinstance(back, int | float):
         if ny != nu:
-            raise _size_error(f"{ny} outputs are fed back to {nu} inputs", "as many outputs as inputs")
+            raise _size_error(
+                f"{counted(ny, 'output is', 'outputs are')} fed back to {counted(nu, 'input')}",
+                "as many outputs as inputs",
+            )
         empty = np.zeros((0, 0))
         back = dataclasses.replace(
             forward,

@@ -21,7 +21,7 @@ from armblocks.analysis.frequency import (
 from armblocks.analysis.reduction import minimal
 from armblocks.analysis.shown_values import EPSILON, is_stable, response_errors, shown_dcgain
 from armblocks.analysis.state_space import StateSpaceModel
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -88,7 +88,8 @@ def margins(system: StateSpaceModel) -> Margins:
     """
     if not system.is_siso:
         raise InputError(
-            f"margins of {system.D.shape[1]} inputs and {system.D.shape[0]} outputs are requested",
+            f"margins of {counted(system.D.shape[1], 'input')} and "
+            f"{counted(system.D.shape[0], 'output')} are requested",
             where=system.name,
             allowed="one of each",
             fix="choose with system.select(output, input)",
@@ -174,7 +175,8 @@ def bandwidth(system: StateSpaceModel, drop: float) -> float:
     """See :meth:`LinearSystem.bandwidth`; ``inf`` if the gain never decreases by ``drop``."""
     if not system.is_siso:
         raise InputError(
-            f"the bandwidth of {system.D.shape[1]} inputs and {system.D.shape[0]} outputs is requested",
+            f"the bandwidth of {counted(system.D.shape[1], 'input')} and "
+            f"{counted(system.D.shape[0], 'output')} is requested",
             where=system.name,
             allowed="one of each",
             fix="choose with system.select(output, input)",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 from armblocks.extras import from_extra
 
 if TYPE_CHECKING:
@@ -42,8 +42,9 @@ def root_locus(system: LinearSystem, gains: Array | None = None) -> RootLocus:
     """
     if not system.is_siso or not system.order:
         raise InputError(
-            f"a root locus of {system.D.shape[1]} inputs, {system.D.shape[0]} outputs and {system.order} "
-            "states is requested",
+            f"a root locus of {counted(system.D.shape[1], 'input')}, {counted(system.D.shape[0], 'output')} "
+            "and "
+            f"{counted(system.order, 'state')} is requested",
             where=system.name,
             allowed="one input, one output, and one state or more",
             fix="choose with system.select(output, input)",

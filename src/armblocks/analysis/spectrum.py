@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armblocks.errors import InputError, UnknownNameError
+from armblocks.errors import InputError, UnknownNameError, counted
 
 Array = NDArray[np.float64]
 
@@ -75,7 +75,8 @@ def signal_spectrum(
     length -= length % 2
     if length < 4:
         raise InputError(
-            f"{averages} segments of {len(samples)} samples are requested",
+            f"{counted(averages, 'segment')} of {counted(len(samples), 'sample')} in all: fewer than 4 "
+            "samples in each",
             where="spectrum",
             allowed="4 samples or more in each segment",
             fix="simulate longer, decrease the sample time, or decrease averages",

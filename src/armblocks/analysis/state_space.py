@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.argument_errors import ArgumentErrors
-from armblocks.errors import InputError, UnknownNameError
+from armblocks.errors import InputError, UnknownNameError, counted
 
 if TYPE_CHECKING:
     from armblocks.analysis.operating_point import OperatingPoint
@@ -53,7 +53,8 @@ class StateSpaceModel(metaclass=ArgumentErrors):
             units: tuple[str, ...] = tuple(getattr(self, f"{kind}_units")) or ("",) * size
             if len(names) != size or len(units) != size:
                 raise InputError(
-                    f"{len(names)} names and {len(units)} units are given for the {kind}s",
+                    f"{counted(len(names), 'name')} and {counted(len(units), 'unit')} are given "
+                    f"for the {kind}s",
                     allowed=f"one for each of the {size}",
                     where="linear system",
                     fix="give a name and a unit for each, or omit them",
@@ -131,7 +132,7 @@ def _checked_matrices(system: StateSpaceModel) -> tuple[int, int, int]:
         matrix = np.array(getattr(system, letter), dtype=np.float64)
         if matrix.ndim != 2:
             raise InputError(
-                f"{letter} has {matrix.ndim} axes",
+                f"{letter} has {counted(matrix.ndim, 'axis', 'axes')}",
                 allowed="matrices, two axes",
                 where="linear system",
                 fix=f"give {letter} as a list of rows",
@@ -150,7 +151,7 @@ def _checked_matrices(system: StateSpaceModel) -> tuple[int, int, int]:
         if getattr(system, letter).shape != shape:
             raise InputError(
                 f"{letter} has shape {getattr(system, letter).shape}",
-                allowed=f"shape {shape}, as A has {nx} rows and D has shape {system.D.shape}",
+                allowed=f"shape {shape}, as A has {counted(nx, 'row')} and D has shape {system.D.shape}",
                 where="linear system",
                 fix=f"change the rows or columns of {letter}",
             )

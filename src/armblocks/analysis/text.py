@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from armblocks.analysis.shown_values import growth, shown_matrices, shown_modes, shown_poles
 from armblocks.analysis.state_space import StateSpaceModel
+from armblocks.errors import counted
 
 Array = NDArray[np.float64]
 
@@ -44,7 +45,7 @@ def heading(system: StateSpaceModel) -> str:
     """One line with the name, the type, the sizes and the stability of a system."""
     kind = f"sampled every {system.dt:g} s" if system.is_discrete else "continuous"
     counts = ", ".join(
-        f"{count} {word}{'' if count == 1 else 's'}"
+        counted(count, word)
         for count, word in (
             (system.order, "state"),
             (len(system.inputs), "input"),

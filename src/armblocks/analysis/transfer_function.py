@@ -13,7 +13,7 @@ from armblocks.analysis.modes import poles
 from armblocks.analysis.reduction import minimal
 from armblocks.analysis.state_space import StateSpaceModel
 from armblocks.analysis.zeros import zeros
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -61,7 +61,8 @@ def transfer_function(system: StateSpaceModel) -> TransferFunction:
     """
     if not system.is_siso:
         raise InputError(
-            f"the system has {system.D.shape[1]} inputs and {system.D.shape[0]} outputs",
+            f"the system has {counted(system.D.shape[1], 'input')} and "
+            f"{counted(system.D.shape[0], 'output')}",
             where=system.name,
             allowed="one of each",
             fix="choose with system.select(output, input)",

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from armblocks.analysis.operating_point import OperatingPoint, operating_point, solved
 from armblocks.equations import HybridSystem, Signature
 from armblocks.equations.evaluation import EvaluatedSystem, Jacobians, Point
-from armblocks.errors import SimulationError
+from armblocks.errors import SimulationError, counted
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -86,8 +86,9 @@ class TrimResult:
 
     def __repr__(self) -> str:
         head = (
-            f"<TrimResult of {self.point.name} at {self.point.time:g} s: {len(self.residuals)} equations to "
-            f"{self.largest_residual:.2g} in {self.iterations} iterations>"
+            f"<TrimResult of {self.point.name} at {self.point.time:g} s: "
+            f"{counted(len(self.residuals), 'equation')} to "
+            f"{self.largest_residual:.2g} in {counted(self.iterations, 'iteration')}>"
         )
         parts = [*self.point.states.items(), *self.point.discrete.items(), *self.free.items()]
         width = max((len(name) for name, _ in parts), default=0)

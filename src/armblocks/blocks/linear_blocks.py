@@ -28,7 +28,7 @@ from armblocks.diagram import (
     shape_of,
 )
 from armblocks.diagram.signs import BANDS, FaceSign
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 
 _FILTER_DESIGNS = ("butterworth", "chebyshev1", "chebyshev2")
 _FILTER_TYPES = ("low_pass", "high_pass", "band_pass", "band_stop")
@@ -102,7 +102,7 @@ class RationalBlock(Block):
         b, a = np.asarray(self.numerator), np.asarray(self.denominator)
         if a[0] == 0.0 or len(a) < 2 or len(b) > len(a):
             raise InputError(
-                f"the denominator is {a.tolist()} and the numerator has {len(b)} coefficients",
+                f"the denominator is {a.tolist()} and the numerator has {counted(len(b), 'coefficient')}",
                 where=self.type_name(),
                 allowed="a0 not zero, at least two coefficients in a, and at most as many in b",
                 fix="remove leading zeros; a transfer function with more zeros than poles is not causal",

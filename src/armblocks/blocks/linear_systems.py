@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.blocks.complex_arithmetic import magnitude, product, quotient, square_root
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 from armblocks.rounded_functions import asinh, cos, cosh, power, sin, sinh, tan
 
 Matrix = NDArray[np.float64]
@@ -73,7 +73,7 @@ def check_proper(zeros: Roots, poles: Roots, where: str) -> None:
     """Raise ``InputError`` for a system without poles, or with more zeros than poles."""
     if len(poles) == 0 or len(zeros) > len(poles):
         raise InputError(
-            f"there are {len(zeros)} zeros and {len(poles)} poles",
+            f"the system has {counted(len(zeros), 'zero')} and {counted(len(poles), 'pole')}",
             where=where,
             allowed="at least one pole, and no more zeros than poles",
             fix="use a Gain where there is no pole; a system with more zeros than poles is not causal",

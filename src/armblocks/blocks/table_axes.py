@@ -25,7 +25,7 @@ from armblocks.blocks.splines import spline_corners, with_derivatives
 from armblocks.blocks.switching import THRESHOLD_OFFSET, beyond, cell_of
 from armblocks.diagram import Block, Guard, Parameter, Port, Shapes, Signals, State, shape_of
 from armblocks.equations import Shape, flatten, last_at_or_below, read_entry
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,8 @@ def ascending_positions(where: str, name: str, points: ArrayLike, count: int) ->
         )
     if len(values) != count:
         raise InputError(
-            f"{name} has {len(values)} positions for {count} entries of the table",
+            f"{name} has {counted(len(values), 'position')} for {counted(count, 'entry', 'entries')} of the "
+            "table",
             where=where,
             allowed="one for each entry along that axis",
             fix="correct the table or the positions",

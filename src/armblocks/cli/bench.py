@@ -11,6 +11,7 @@ import typer
 
 from armblocks.cli.completion import complete_robots
 from armblocks.cli.terminal import STRONG, results_console, table
+from armblocks.errors import counted
 
 if TYPE_CHECKING:
     from armblocks import Arm
@@ -45,7 +46,8 @@ def bench(
     arm = ab.load_robot(robot)
     console = results_console()
     console.print(
-        f"{arm.name}, {len(arm.robot.joints)} joints; batches of {samples:,}; {os.cpu_count()} processors; "
+        f"{arm.name}, {counted(len(arm.robot.joints), 'joint')}; batches of {samples:,}; {os.cpu_count()} "
+        "processors; "
         f"the minimum of {_REPEATS} repeats, ns per evaluation",
         style=STRONG,
     )

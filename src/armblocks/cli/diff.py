@@ -14,6 +14,7 @@ from rich.text import Text
 
 from armblocks.cli.completion import ModelName, complete_models
 from armblocks.cli.terminal import ACCENT, ERROR, GOOD, STRONG, results_console
+from armblocks.errors import counted
 
 if TYPE_CHECKING:
     import numpy as np
@@ -58,8 +59,8 @@ def print_difference(difference: DiagramDifference, before: str, after: str, con
     if not difference:
         console.print(f"{before} and {after} are the same except for layout", style=STRONG, soft_wrap=True)
         return
-    noun = "difference" if difference.count == 1 else "differences"
-    console.print(f"{before} -> {after}: {difference.count} {noun}", style=STRONG, soft_wrap=True)
+    differences = counted(difference.count, "difference")
+    console.print(f"{before} -> {after}: {differences}", style=STRONG, soft_wrap=True)
     added = [f"{entry.path}: {_block_text(entry.block)}" for entry in difference.added]
     removed = [f"{entry.path}: {_block_text(entry.block)}" for entry in difference.removed]
     renamed = [f"{entry.before} -> {entry.after} ({entry.block.type_name()})" for entry in difference.renamed]
@@ -145,7 +146,7 @@ def _where_different(before: object, after: object) -> str:
     if isinstance(before, tuple) and isinstance(after, tuple):
         old, new = _as_array(cast("Any", before)), _as_array(cast("Any", after))
         if old.shape == new.shape:
-            return f"{(old != new).sum()} of {old.size} entries"
+            return f"{(old != new).sum()} of {counted(old.size, 'entry', 'entries')}"
         return "its content"
     return ", ".join(_different_fields(cast("Any", before), cast("Any", after))) or "its content"
 
@@ -204,7 +205,7 @@ def _object_text(value: object) -> str:
         return f"{value.kind.value} {value_text(value.default)} {rest}".rstrip()
     blocks = getattr(value, "blocks", None)
     if isinstance(blocks, Mapping):
-        return f"({len(cast('Diagram', value).blocks)} blocks inside)"
+        return f"({counted(len(cast('Diagram', value).blocks), 'block')} inside)"
     kind = type(value).__name__
     name = getattr(value, "name", None) or getattr(value, "source", None)
     return f"{kind} {name}" if name else kind

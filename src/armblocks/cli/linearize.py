@@ -12,7 +12,7 @@ from rich.console import Console
 from armblocks.cli.assignments import chosen_parameters
 from armblocks.cli.completion import ModelName, ParameterSetName
 from armblocks.cli.terminal import STRONG, results_console, table
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 
 if TYPE_CHECKING:
     from armblocks import LinearSystem, OperatingPoint
@@ -97,7 +97,7 @@ def linearize(
         from armblocks.report import write_linear_report
 
         files = write_linear_report(report, shown_system, loop=loop, hertz=hertz)
-        console.print(f"report: {report}, {len(files)} files", soft_wrap=True)
+        console.print(f"report: {report}, {counted(len(files), 'file')}", soft_wrap=True)
 
 
 def print_system(system: LinearSystem, console: Console, *, loop: bool, hertz: bool) -> None:
@@ -146,7 +146,7 @@ def _print_poles(system: LinearSystem, console: Console, *, hertz: bool) -> None
     console.print()
     console.print(rows)
     if len(modes) > MAX_POLES:
-        console.print(f"and {len(modes) - MAX_POLES} more, faster ones")
+        console.print(f"and {counted(len(modes) - MAX_POLES, 'faster mode')}")
     console.print()
 
 

@@ -13,7 +13,7 @@ from rich.text import Text
 from armblocks.cli.completion import complete_robots
 from armblocks.cli.robot_options import PackageFolders, XacroArguments, named_values
 from armblocks.cli.terminal import GOOD, STRONG, WARNING, results_console
-from armblocks.errors import FormatError
+from armblocks.errors import FormatError, counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -127,9 +127,8 @@ def _write(robot: str, target: Path, corrected: CorrectedFile, console: Console)
         console.print(f"{robot}: nothing to correct, no file written", style=STRONG, soft_wrap=True)
         return
     write_atomically(target, corrected.data)
-    number = len(corrected.changes)
-    noun = "correction" if number == 1 else "corrections"
-    console.print(f"{target}: {number} {noun}, written", style=GOOD, soft_wrap=True)
+    corrections = counted(len(corrected.changes), "correction")
+    console.print(f"{target}: {corrections}, written", style=GOOD, soft_wrap=True)
 
 
 def _report(robot: str, findings: Sequence[FileFinding], console: Console, word: str) -> None:
@@ -139,8 +138,8 @@ def _report(robot: str, findings: Sequence[FileFinding], console: Console, word:
     if not findings:
         console.print(f"{robot}: no {word}findings", style=GOOD, soft_wrap=True)
         return
-    noun = "finding" if len(findings) == 1 else "findings"
-    console.print(f"{robot}: {len(findings)} {word}{noun}", style=STRONG, soft_wrap=True)
+    count = counted(len(findings), f"{word}finding")
+    console.print(f"{robot}: {count}", style=STRONG, soft_wrap=True)
     raise typer.Exit(FOUND)
 
 

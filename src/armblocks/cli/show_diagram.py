@@ -11,6 +11,7 @@ from rich.tree import Tree
 
 from armblocks.cli.diff import value_text
 from armblocks.cli.terminal import ACCENT, STRONG, table
+from armblocks.errors import counted
 
 if TYPE_CHECKING:
     from armblocks.diagram import Diagram, DiagramBlock
@@ -77,7 +78,7 @@ def _count(diagram: Diagram) -> str:
     count, total = len(diagram.blocks), block_count(diagram)
     inside = f" ({total} including inner blocks)" if total > count else ""
     wires = len(diagram.connections)
-    return f"{count} block{'' if count == 1 else 's'}{inside}, {wires} wire{'' if wires == 1 else 's'}"
+    return f"{counted(count, 'block')}{inside}, {counted(wires, 'wire')}"
 
 
 def _mask_lines(diagram: Diagram) -> Iterator[Text]:

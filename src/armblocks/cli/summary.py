@@ -14,6 +14,7 @@ from rich.text import Text
 from armblocks.cli.progress import factor_text
 from armblocks.cli.terminal import ERROR, STRONG, WARNING, table
 from armblocks.diagram import ViewKind, diagram_views
+from armblocks.errors import counted
 from armblocks.extras import installed
 from armblocks.pictures.numbers import wall_time
 from armblocks.report.motion import motions
@@ -143,7 +144,7 @@ def print_files(files: ReportFiles, console: Console) -> None:
     """Print the paths of the report and its files."""
     names = [path.name for path in (*files.data, files.diagram)]
     if files.figures:
-        names.append(f"{len(files.figures)} figures in {files.figures[0].parent.name}")
+        names.append(f"{counted(len(files.figures), 'figure')} in {files.figures[0].parent.name}")
     console.print()
     console.print(Text.assemble(("report: ", STRONG), str(files.page)), soft_wrap=True)
     console.print(f"in the same folder: {', '.join(names)}", soft_wrap=True)

@@ -12,7 +12,7 @@ from rich.console import Console
 from armblocks.cli.assignments import chosen_parameters, parse_value
 from armblocks.cli.completion import ModelName, ParameterSetName
 from armblocks.cli.terminal import STRONG, results_console, table
-from armblocks.errors import InputError, SimulationError
+from armblocks.errors import InputError, SimulationError, counted
 
 if TYPE_CHECKING:
     from armblocks import Diagram
@@ -142,7 +142,7 @@ def _bounds(name: str, value: object) -> tuple[float, float]:
     numbers = np.atleast_1d(np.asarray(value, dtype=np.float64))
     if numbers.shape != (2,):
         raise InputError(
-            f"the bounds of '{name}' have {numbers.size} numbers",
+            f"the bounds of '{name}' have {counted(numbers.size, 'number')}",
             where="--bound",
             allowed="NAME=LOW,HIGH",
             fix="give the lower and the upper bound",
@@ -155,8 +155,9 @@ def print_trim(result: TrimResult, console: Console) -> None:
     import numpy as np
 
     console.print(
-        f"{result.point.name} at {result.point.time:g} s: at rest, {len(result.residuals)} equations to "
-        f"{result.largest_residual:.2g} in {result.iterations} iterations",
+        f"{result.point.name} at {result.point.time:g} s: at rest, "
+        f"{counted(len(result.residuals), 'equation')} to "
+        f"{result.largest_residual:.2g} in {counted(result.iterations, 'iteration')}",
         style=STRONG,
     )
     for title, values in (

@@ -114,7 +114,7 @@ def new_outputs(
     arrays = cast("tuple[object, ...]", out) if isinstance(out, tuple) else (out,)
     if len(arrays) != len(signature):
         raise InputError(
-            f"out= holds {len(arrays)} arrays",
+            f"out= holds {counted(len(arrays), 'array')}",
             where=name,
             allowed=f"one per output: {_listing(signature)}",
             fix="omit out=, or give one array for each output",

@@ -29,7 +29,7 @@ from armblocks.diagram import (
 from armblocks.diagram.hierarchy import FlatForm, flatten_hierarchy
 from armblocks.diagram.mask_tuning import mask_parameters
 from armblocks.equations import Shape
-from armblocks.errors import InputError, UnknownNameError
+from armblocks.errors import InputError, UnknownNameError, counted
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,7 +173,7 @@ def _port(form: FlatForm, name: str, kind: str) -> PortRef:
         return PortRef(block_name, port)
     if len(outputs) != 1:
         raise InputError(
-            f"the {kind} '{name}' is a block with {len(outputs)} outputs",
+            f"the {kind} '{name}' is a block with {counted(len(outputs), 'output')}",
             allowed=", ".join(
                 f"{name}/{entry.name}" for entry in (*block.output_ports(), *block.input_ports())
             ),

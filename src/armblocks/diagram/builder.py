@@ -27,7 +27,7 @@ from armblocks.diagram.structure import (
     check_block_count,
 )
 from armblocks.equations import SimulationOptions
-from armblocks.errors import DiagramError, InputError, UnknownNameError
+from armblocks.errors import DiagramError, InputError, UnknownNameError, counted
 
 
 class BlockHandle(metaclass=ArgumentErrors):
@@ -157,7 +157,7 @@ class DiagramBuilder(metaclass=ArgumentErrors):
         ports = block.input_ports()
         if len(inputs) > len(ports):
             raise DiagramError(
-                f"{len(inputs)} inputs are given",
+                f"{counted(len(inputs), 'input is', 'inputs are')} given",
                 where=_where(name, block),
                 allowed=f"{len(ports)}: {', '.join(port.name for port in ports)}" if ports else "no inputs",
                 fix="remove the last inputs",

@@ -16,7 +16,7 @@ from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.levels import joined, level_of
 from armblocks.diagram.port import Port, PortRef
 from armblocks.diagram.structure import DiagramBlock, Inport, Outport
-from armblocks.errors import DiagramError
+from armblocks.errors import DiagramError, counted
 
 Comment = Literal["out", "through"]
 MAX_LISTED = 20
@@ -42,8 +42,7 @@ def check_comment(name: str, block: Block, comment: str) -> Comment:
     into, out = len(data_inputs(block)), len(block.output_ports())
     if not 0 < out <= into:
         raise DiagramError(
-            f"a block with {into} input{'' if into == 1 else 's'} and {out} output{'' if out == 1 else 's'} "
-            "is commented through",
+            f"a block with {counted(into, 'input')} and {counted(out, 'output')} is commented through",
             where=where,
             allowed="blocks with at least one output, and an input for each output",
             fix="comment it out",
@@ -114,7 +113,7 @@ def check_connected(levels: Mapping[str, Diagram]) -> None:
         listed_ports = ", ".join(unconnected[:MAX_LISTED])
         rest = len(unconnected) - MAX_LISTED
         raise DiagramError(
-            f"{len(unconnected)} unconnected input{'s' * (len(unconnected) > 1)}: {listed_ports}"
+            f"{counted(len(unconnected), 'unconnected input')}: {listed_ports}"
             + (f" and {rest} more" if rest > 0 else ""),
             where=f"diagram '{next(iter(levels.values())).name}'",
             allowed="each input has a driver",

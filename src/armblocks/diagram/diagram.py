@@ -18,7 +18,7 @@ from armblocks.diagram.names import check_signal_names
 from armblocks.diagram.parameter import Parameter, Value
 from armblocks.diagram.port import PortRef
 from armblocks.equations import SimulationOptions
-from armblocks.errors import ArmblocksError, DiagramError, UnknownNameError
+from armblocks.errors import ArmblocksError, DiagramError, UnknownNameError, counted
 from armblocks.lazy_exports import display_method
 
 _Result = TypeVar("_Result")
@@ -229,7 +229,7 @@ class Diagram(metaclass=ArgumentErrors):
         return hash((self.name, tuple(self.blocks.items()), self.connections, self.settings))
 
     def __str__(self) -> str:
-        return f"diagram '{self.name}' of {len(self.blocks)} blocks"
+        return f"diagram '{self.name}' of {counted(len(self.blocks), 'block')}"
 
     def clocked(self, name: str) -> bool:
         """Whether a block has a clock: a sampled block that is not in a triggered subsystem."""

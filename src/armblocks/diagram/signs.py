@@ -14,6 +14,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from armblocks.errors import counted
 from armblocks.pictures.numbers import axis_number
 
 
@@ -155,7 +156,7 @@ def _roots(roots: object, letter: str) -> str:
     """``s (s + 1)``; ``1`` without roots; else the number of roots, if some are complex or more than two."""
     values = np.asarray(roots, dtype=np.complex128).reshape(-1).tolist()
     if len(values) > 2 or any(abs(value.imag) > 0 for value in values):
-        return f"{len(values)} roots"
+        return counted(len(values), "root")
     factors = [
         letter if v == 0 else f"({polynomial('a', (1.0, -v.real), letter)})" for v in sorted(values, key=abs)
     ]

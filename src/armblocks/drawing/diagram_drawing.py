@@ -1,4 +1,4 @@
-"""The drawing of a diagram: blocks with their faces, and routed signal lines."""
+"""The drawing of a diagram: blocks with their faces, and routed wires."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ from armblocks.drawing.wire_marks import WireKind, arrow_head, label_marks, roun
 from armblocks.drawing.wire_names import name_marks
 from armblocks.drawing.wire_routing import route
 from armblocks.drawing.wires import Net, Obstacle, RoutedNet, WireEnd
-from armblocks.errors import DiagramError, UnknownNameError
+from armblocks.errors import DiagramError, UnknownNameError, counted
 from armblocks.pictures.picture import Curve, Group, Mark, Picture, Polyline, Text, moved, rotated_clockwise
 from armblocks.pictures.style import Theme, Tone
 from armblocks.pictures.svg import svg_file
@@ -359,7 +359,7 @@ def _signs(box: Box) -> list[Mark]:
 
 @dataclass(frozen=True, eq=False)
 class _SignalContents:
-    """The sheets of a diagram, and the known contents of their signal lines."""
+    """The sheets of a diagram, and the known signals of their wires."""
 
     levels: Mapping[str, Diagram]
     views: Mapping[str, View]
@@ -430,7 +430,7 @@ def _text_alternative(diagram: Diagram) -> str:
 
     connection_list = "; ".join(connection_text(wire) for wire in diagram.connections)
     return (
-        f"{len(diagram.blocks)} blocks. Wires: {connection_list}."
+        f"{counted(len(diagram.blocks), 'block')}. Wires: {connection_list}."
         if connection_list
-        else f"{len(diagram.blocks)} blocks."
+        else f"{counted(len(diagram.blocks), 'block')}."
     )

@@ -22,7 +22,7 @@ from armblocks.dynamics.constrained import (
 from armblocks.dynamics.joint_motion import entries
 from armblocks.dynamics.mechanism import RANK_TOLERANCE, mechanism
 from armblocks.equations import TracedFunction, flatten
-from armblocks.errors import RobotError
+from armblocks.errors import RobotError, counted
 from armblocks.robot.robot import Robot
 from armblocks.robot.tree import KinematicTree
 
@@ -75,7 +75,8 @@ def _check_actuation(robot: Robot, passive: Sequence[int], relations: Sequence[i
     where = f"robot '{robot.name}'"
     if motors != dof:
         raise RobotError(
-            f"the joints with motors have {motors} degrees of freedom, the mechanism has {dof}",
+            f"the joints with motors have {counted(motors, 'degree', 'degrees')} of freedom, the mechanism "
+            f"has {dof}",
             where=where,
             allowed="as many motors as degrees of freedom, so that the torques exist and are unique",
             fix="give a motor (Motor() without inertia is enough) to the actuated joints only",

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from armblocks.equations.signatures import Signature
 from armblocks.equations.symbols import flatten, matrix_shape, unflatten
 from armblocks.equations.table_reading import evaluate_with_reads, reads_tables
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +50,8 @@ class TracedFunction:
         values = (returned,) if isinstance(returned, SX) else tuple(returned)
         if len(values) != len(outputs):
             raise InputError(
-                f"the equations of '{name}' return {len(values)} values",
-                allowed=f"{len(outputs)} values",
+                f"the equations of '{name}' return {counted(len(values), 'value')}",
+                allowed=counted(len(outputs), "value"),
                 where=f"function '{name}'",
                 fix="return one value for each output",
             )

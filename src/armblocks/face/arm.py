@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from armblocks.argument_errors import ArgumentErrors
 from armblocks.compiler import Kernel, OperationCount, cached_kernel
 from armblocks.compiler.arguments import check_count, in_order
-from armblocks.errors import InputError, UnknownNameError
+from armblocks.errors import InputError, UnknownNameError, counted
 from armblocks.face.assembly import Assembly, assemble
 from armblocks.face.notebook_views import robot_view
 from armblocks.face.payload import Payload, payload_numbers
@@ -346,7 +346,7 @@ class Arm(metaclass=ArgumentErrors):
         return kernel.entry_with_fallback(call, maker=(Arm, (self.robot,)))
 
     def __repr__(self) -> str:
-        return f"<Arm {self.name}: {len(self.robot.joints)} joints {self.robot.joint_letters}>"
+        return f"<Arm {self.name}: {counted(len(self.robot.joints), 'joint')} {self.robot.joint_letters}>"
 
     def __str__(self) -> str:
         """The text for ``print``: the D-H table, or a table of links and joints."""

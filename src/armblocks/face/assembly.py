@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.argument_errors import ArgumentErrors
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 from armblocks.robot import Robot
 from armblocks.robot.fields import numbers
 
@@ -41,12 +41,12 @@ class Assembly(metaclass=ArgumentErrors):
 
     def __str__(self) -> str:
         dof = self.degrees_of_freedom
-        lines = [f"{dof} degree{'' if dof == 1 else 's'} of freedom"]
+        lines = [counted(dof, "degree of freedom", "degrees of freedom")]
         if self.singular:
             lines.append(f"singular: {self.instantaneous_mobility} degrees of freedom at this configuration")
         for name, count in self.redundant.items():
-            equations = "equation follows" if count == 1 else "equations follow"
-            lines.append(f"constraint '{name}': {count} {equations} from the others")
+            equations = counted(count, "equation follows", "equations follow")
+            lines.append(f"constraint '{name}': {equations} from the others")
         return "\n".join(lines)
 
 

@@ -7,6 +7,7 @@ from html import escape
 
 import numpy as np
 
+from armblocks.errors import counted
 from armblocks.robot import Link, Robot
 
 STYLE = """
@@ -28,7 +29,7 @@ def robot_html(robot: Robot, picture_svg: str) -> str:
     rows = "".join(_row("td", _cells(link)) for link in robot.links)
     return (
         f'<div class="ab-robot"><style>{STYLE}</style>{picture_svg}<div>'
-        f"<h3>{escape(robot.name)}</h3><p>{len(robot.joints)} joints {robot.joint_letters}"
+        f"<h3>{escape(robot.name)}</h3><p>{counted(len(robot.joints), 'joint')} {robot.joint_letters}"
         f"{' · ' + escape(about) if about else ''}</p>"
         f"<table>{_row('th', HEADINGS)}{rows}</table></div></div>"
     )

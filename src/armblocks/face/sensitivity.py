@@ -16,7 +16,7 @@ from armblocks.diagram.mask_tuning import mask_parameters, with_mask_parameters
 from armblocks.equations import HybridSystem, Signature, Slot
 from armblocks.equations.sensitivity import MIXED, sensitivity_system
 from armblocks.equations.sensitivity_layout import entry_name, sensitivity_name
-from armblocks.errors import InputError, SimulationError, UnknownNameError
+from armblocks.errors import InputError, SimulationError, UnknownNameError, counted
 from armblocks.face.linearizing import resolved_diagram
 from armblocks.face.model import CompiledDiagram, compile_diagram
 from armblocks.face.settings import RunSettings, check_settings, takes_settings, with_settings
@@ -63,7 +63,7 @@ class SensitivityResult(metaclass=ArgumentErrors):
         return stacked.reshape(*stacked.shape[:-1], *slot.shape)
 
     def __repr__(self) -> str:
-        head = f"<SensitivityResult {self.run.name}: {self.time.size} samples>"
+        head = f"<SensitivityResult {self.run.name}: {counted(self.time.size, 'sample')}>"
         lines = [f"  d {output} / d {name}" for output in self.outputs for name in self.parameters]
         return "\n".join([head, *lines])
 
@@ -105,7 +105,7 @@ def sensitivity(
     output_names = (outputs,) if isinstance(outputs, str) else tuple(outputs)
     if not names or not output_names:
         raise InputError(
-            f"{len(names)} parameters and {len(output_names)} outputs are given",
+            f"{counted(len(names), 'parameter')} and {counted(len(output_names), 'output')} are given",
             allowed="one or more of each",
             where=system.name,
             fix="name a parameter and an output",

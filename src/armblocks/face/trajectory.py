@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armblocks.argument_errors import ArgumentErrors
 from armblocks.equations import Slot
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 from armblocks.robot.plausibility import warn_of_degrees
 from armblocks.simulation.notebook_view import STYLE, panels_html
 from armblocks.trajectories import Quintic
@@ -34,7 +34,7 @@ class JointTrajectory(metaclass=ArgumentErrors):
 
     def _repr_html_(self) -> str:
         """The notebook view: q, qd and qdd over time, in their units."""
-        head = f"{self.q.shape[1]} joints, {len(self)} samples to {self.t[-1]:g} s"
+        head = f"{counted(self.q.shape[1], 'joint')}, {counted(len(self), 'sample')} to {self.t[-1]:g} s"
         shape = self.q.shape[1:]
         rows = [(Slot(name, shape), values) for name, values in zip(("q", "qd", "qdd"), self)]
         return (
@@ -63,7 +63,7 @@ def jtraj(
     for name, vector in (("qf", goal), ("qd0", first), ("qd1", last)):
         if vector is not None and vector.shape != start.shape:
             raise InputError(
-                f"{name} has {vector.size} joints",
+                f"{name} has {counted(vector.size, 'joint')}",
                 where="jtraj",
                 allowed=f"{start.size}, as q0",
                 fix=f"give {name} as many numbers as q0",
@@ -94,7 +94,7 @@ def _times(t: ArrayLike | int) -> NDArray[np.float64]:
     if isinstance(t, int):
         if t < 2:
             raise InputError(
-                f"t = {t} samples",
+                f"t = {counted(t, 'sample')}",
                 where="jtraj",
                 allowed="2 or more, or a vector of times",
                 fix="use np.linspace(0, T, N) for times in s",

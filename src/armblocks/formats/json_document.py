@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import cast
 
-from armblocks.errors import FormatError
+from armblocks.errors import FormatError, counted
 
 MAX_DEPTH = 64
 """Default maximum nesting of objects and arrays."""
@@ -93,7 +93,10 @@ class Node:
         """An array of ``count`` numbers."""
         elements = self.elements()
         if len(elements) != count:
-            raise self.error(f"{len(elements)} numbers are given", allowed=f"{count} numbers")
+            raise self.error(
+                f"{counted(len(elements), 'number is', 'numbers are')} given",
+                allowed=counted(count, "number"),
+            )
         return tuple(element.number() for element in elements)
 
     def choice(self, choices: Iterable[str]) -> str:
@@ -176,7 +179,7 @@ def describe(value: object) -> str:
 
 
 def _array_text(length: int) -> str:
-    return f"an array of {length} element{'' if length == 1 else 's'}"
+    return f"an array of {counted(length, 'element')}"
 
 
 def path_text(path: KeyPath) -> str:

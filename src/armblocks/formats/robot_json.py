@@ -18,7 +18,7 @@ from typing import cast
 
 import numpy as np
 
-from armblocks.errors import ArmblocksError, FormatError, RobotError, UnknownNameError
+from armblocks.errors import ArmblocksError, FormatError, RobotError, UnknownNameError, counted
 from armblocks.formats.canonical_json import canonical_bytes
 from armblocks.formats.constraint_json import constraint_from_json, constraint_to_json
 from armblocks.formats.json_document import Node, closed_members, read_document
@@ -247,7 +247,10 @@ def _with_limits(joint: Joint, node: Node | None) -> Joint:
     entries = node.elements()
     angular = [entry.unit == "rad" for entry in joint.speeds]
     if len(entries) != len(angular):
-        raise node.error(f"{len(entries)} limits are given", allowed=f"{len(angular)}, one for each speed")
+        raise node.error(
+            f"{counted(len(entries), 'limit is', 'limits are')} given",
+            allowed=f"{len(angular)}, one for each speed",
+        )
     return replace(
         joint,
         limits=tuple(_limits_from_json(entry, angular=unit) for entry, unit in zip(entries, angular)),
@@ -261,7 +264,7 @@ def _limits_from_json(node: Node, *, angular: bool) -> JointLimits:
         ends = members["position"].elements()
         if len(ends) != 2:
             raise members["position"].error(
-                f"{len(ends)} limits are given", allowed="the lowest and the highest"
+                f"{counted(len(ends), 'limit is', 'limits are')} given", allowed="the lowest and the highest"
             )
         low, high = (_angle_from_json(end) if angular else end.number() for end in ends)
         position = (low, high)
@@ -303,7 +306,9 @@ def _transform_from_json(node: Node) -> Transform:
     if "rotation" in members:
         rows = members["rotation"].elements()
         if len(rows) != 3:
-            raise members["rotation"].error(f"{len(rows)} rows are given", allowed="3 rows of 3 numbers")
+            raise members["rotation"].error(
+                f"{counted(len(rows), 'row is', 'rows are')} given", allowed="3 rows of 3 numbers"
+            )
         rotation = (_vector_from_json(rows[0]), _vector_from_json(rows[1]), _vector_from_json(rows[2]))
     translation = (
         _vector_from_json(members["translation"]) if "translation" in members else identity.translation

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
+from armblocks.errors import counted
 from armblocks.formats.json_document import Node, closed_members
 from armblocks.robot.shapes import Box, Cylinder, Housing, Material, Mesh, Shape, Sphere
 
@@ -18,7 +19,10 @@ def _rows(count: int, rows: int | None = None) -> Callable[[Node], Any]:
     def read(node: Node) -> tuple[tuple[float, ...], ...]:
         elements = node.elements()
         if rows is not None and len(elements) != rows:
-            raise node.error(f"{len(elements)} rows are given", allowed=f"{rows} rows of {count} numbers")
+            raise node.error(
+                f"{counted(len(elements), 'row is', 'rows are')} given",
+                allowed=f"{counted(rows, 'row')} of {counted(count, 'number')}",
+            )
         return tuple(element.numbers(count) for element in elements)
 
     return read

@@ -11,7 +11,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.errors import FormatError, InputError
+from armblocks.errors import FormatError, InputError, counted
 from armblocks.extras import from_extra
 from armblocks.formats.table_columns import (
     MAX_EXACT_INTEGER,
@@ -111,7 +111,7 @@ def _parquet_column(name: str, values: Any) -> Column:
 def _check_size(numbers: int) -> None:
     if numbers > MAX_NUMBERS:
         raise FormatError(
-            f"the file has {numbers} numbers",
+            f"the file has {counted(numbers, 'number')}",
             allowed=f"at most {MAX_NUMBERS}",
             where="a file of arrays",
             fix="split or shorten it",
@@ -160,7 +160,8 @@ def _times_by_rows(name: str, array: Array, notes: list[str]) -> Array:
     )
     if is_time_column and is_time_row:
         raise InputError(
-            f"the matrix '{name}' has {array.shape[0]} rows and {array.shape[1]} columns, and both its first "
+            f"the matrix '{name}' has {counted(array.shape[0], 'row')} and "
+            f"{counted(array.shape[1], 'column')}, and both its first "
             "row and its first column can be times",
             allowed="a time in each row, or a separate variable 'time'",
             where="a file of arrays",

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.diagram import TimeTable
-from armblocks.errors import FormatError, InputError, UnknownNameError
+from armblocks.errors import FormatError, InputError, UnknownNameError, counted
 
 MAX_NUMBERS = 1 << 26
 """Maximum number of entries of a file."""
@@ -213,7 +213,7 @@ def table_of(
         selected = [column for column in candidates if column.is_default and column.rows == len(times)]
     if not selected:
         raise InputError(
-            f"the file has only the times '{key}': no other column has {len(times)} numbers",
+            f"the file has only the times '{key}': no other column has {counted(len(times), 'number')}",
             where=source,
             allowed="one column of times, and one or more columns of values of the same length",
             fix="choose columns of numbers, with as many rows as the times",
@@ -266,7 +266,8 @@ def time_notes(file: ColumnFile, name: str) -> Iterator[str]:
             yield f"The times '{name}' are converted from {column.unit} to s."
         jumps = 0 if column.values is None else int(np.sum(np.diff(column.values) == 0.0))
         if jumps:
-            yield f"{jumps} times occur twice: the values jump there, from the first to the second row."
+            count = counted(jumps, "time occurs", "times occur")
+            yield f"{count} twice: the values jump there, from the first to the second row."
         if column.unit and column.kind != "date" and column.unit.lower() not in _SECONDS:
             yield f"The unit '{column.unit}' is not one of time: the numbers of '{name}' are taken as s."
 
@@ -309,7 +310,8 @@ def _check_lengths(key: str, times: NDArray[Any], selected: Iterable[Column], so
     for column in selected:
         if column.rows != len(times):
             raise InputError(
-                f"the column '{column.name}' has {column.rows} rows, and the times '{key}' have {len(times)}",
+                f"the column '{column.name}' has {counted(column.rows, 'row')}, and the times '{key}' have "
+                f"{len(times)}",
                 where=source,
                 allowed="columns of one length",
                 fix="choose columns of the same length",

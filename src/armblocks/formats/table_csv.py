@@ -17,7 +17,7 @@ from datetime import date
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.errors import FormatError
+from armblocks.errors import FormatError, counted
 from armblocks.formats.table_columns import (
     MAX_NUMBERS,
     Column,
@@ -254,7 +254,7 @@ def _body_lines(text: str) -> Iterator[tuple[int, int]]:
 
 def _size_error(count: int) -> FormatError:
     return FormatError(
-        f"the file has {count} numbers",
+        f"the file has {counted(count, 'number')}",
         allowed=f"at most {MAX_NUMBERS}",
         where="a CSV file",
         fix="split or shorten it",
@@ -270,7 +270,7 @@ def _text_columns(
     for row in rows:
         if (len(row.fields) != width and any(row.fields[width:])) or len(row.fields) < width:
             raise FormatError(
-                f"line {row.line} has {len(row.fields)} fields, and the first line has {width}",
+                f"line {row.line} has {counted(len(row.fields), 'field')}, and the first line has {width}",
                 allowed="the same number of fields in every line",
                 where="a CSV file",
                 fix="correct this line; a decimal comma needs semicolons between the fields",

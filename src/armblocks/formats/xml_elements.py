@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, cast
 from xml.sax.handler import ContentHandler
 
-from armblocks.errors import FormatError
+from armblocks.errors import FormatError, counted
 from armblocks.formats.file_findings import FileContext, FileFinding, Rule
 
 if TYPE_CHECKING:
@@ -113,10 +113,10 @@ class Element:
     ) -> list[float]:
         words = re.split(r"\s*,\s+|\s+", text.strip())  # a comma before a space separates, as a space does
         if len(words) not in counts:
-            allowed = f"{min(counts)} to {max(counts)}" if len(counts) > 1 else str(max(counts))
+            allowed = f"{min(counts)} to " * (len(counts) > 1) + counted(max(counts), "number")
             raise self.error(
-                f"{subject} has {len(words)} values: '{shortened(text)}'",
-                allowed=f"{allowed} number{'s' * (max(counts) > 1)}, separated by spaces",
+                f"{subject} has {counted(len(words), 'value')}: '{shortened(text)}'",
+                allowed=f"{allowed}, separated by spaces",
             )
         values: list[float] = []
         for word in words:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.errors import counted
 from armblocks.matlab.function_kinds import (
     ARRAYS,
     GEOMETRY,
@@ -102,7 +103,7 @@ def _extents(sizes: Sequence[Any]) -> tuple[int, int]:
     """``zeros``, ``zeros(n)``, ``zeros(m, n)``, ``zeros([m n])``"""
     numbers = [float(number) for size in sizes for number in np.ravel(size)] or [1.0]
     if len(numbers) > 2:
-        raise MismatchError(f"{len(numbers)} numbers are given as a size")
+        raise MismatchError(f"{counted(len(numbers), 'number is', 'numbers are')} given as a size")
     rows, columns = number_of_elements(numbers[0]), number_of_elements(numbers[-1])
     number_of_elements(float(rows * columns))
     return rows, columns
@@ -152,7 +153,8 @@ def _translation(ops: Arithmetic, *arguments: Any) -> Any:
     entries = [entry for value in arguments for entry in ops.entries(value)]
     if len(arguments) not in (1, 3) or len(entries) != 3:
         raise MismatchError(
-            f"{len(arguments)} arguments with {len(entries)} elements are not a translation; "
+            f"{counted(len(arguments), 'argument')} with {counted(len(entries), 'element')} in all: no "
+            "translation; "
             "allowed are x, y, z, or [x y z], or a 4x4 pose"
         )
     x, y, z = entries

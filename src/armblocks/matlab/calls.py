@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.errors import counted
 from armblocks.matlab.function_kinds import Arithmetic, Function, MismatchError
 from armblocks.matlab.functions import TABLE
 from armblocks.matlab.source import Location
@@ -59,6 +60,6 @@ def _check_count(location: Location, name: str, function: Function, count: int) 
     minimum, maximum = function.min_arguments, function.max_arguments
     allowed = f"{minimum}" if minimum == maximum else f"{minimum} to {maximum}"
     raise location.error(
-        f"{name} is called with {count} argument{'s' * (count != 1)}",
+        f"{name} is called with {counted(count, 'argument')}",
         allowed=f"{allowed}: {name}({function.arguments})" if maximum else "no arguments",
     )

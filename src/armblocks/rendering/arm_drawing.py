@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.errors import counted
 from armblocks.pictures.numbers import axis_number, nice_step
 from armblocks.pictures.picture import Disc, Picture, Polyline, Raster, Rectangle, Text
 from armblocks.pictures.style import FIGURE_WIDTH, SMALL_SIZE, TEXT_SIZE, Theme, Tone
@@ -107,7 +108,7 @@ def pose_sequence_picture(
     picture = Picture(
         width=FIGURE_WIDTH,
         height=rows * (height + caption) + (rows - 1) * gap + 22,
-        title=f"{robot.name} at {count} times",
+        title=f"{robot.name} at {counted(count, 'time')}",
         description=(
             f"The arm {robot.name} at "
             + ", ".join(f"{axis_number(float(time[k]))} s" for k in samples)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armblocks.diagram import Diagram, ViewKind, diagram_views
+from armblocks.errors import counted
 from armblocks.pictures.numbers import axis_number, wall_time
 from armblocks.pictures.picture import Picture
 from armblocks.pictures.svg import escape, svg_inline
@@ -100,7 +101,7 @@ def _lead(contents: ReportContents) -> str:
     arm = f", robot {escape(', '.join(robots))}" if robots else ""
     about = contents.diagram.description
     description = f"{escape(about[:1].upper() + about[1:])}. " if about else ""
-    return f"{description}Simulation of {end} s, {count} blocks{arm}."
+    return f"{description}Simulation of {end} s, {counted(count, 'block')}{arm}."
 
 
 def _facts(contents: ReportContents) -> str:
@@ -272,5 +273,5 @@ def _run(contents: ReportContents) -> str:
     names = [name for name in contents.files if name not in figures]
     name_list = ", ".join(f"<code>{escape(name)}</code>" for name in names)
     if figures:
-        name_list += f", and {len(figures)} figures in <code>figures/</code>"
+        name_list += f", and {counted(len(figures), 'figure')} in <code>figures/</code>"
     return text + f'<h3>Files in the same folder</h3><p class="files">{name_list}</p>'

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.argument_errors import ArgumentErrors
-from armblocks.errors import InputError, RobotError
+from armblocks.errors import InputError, RobotError, counted
 from armblocks.robot.dh_row import DhRow
 from armblocks.robot.fields import check_kind, number, numbers, pose
 from armblocks.robot.joints import Joint, Revolute
@@ -38,7 +38,7 @@ class Motor(metaclass=ArgumentErrors):
         Tc = np.atleast_1d(numbers(self.coulomb_friction, where="coulomb_friction of a motor")).ravel()
         if Tc.size not in (1, 2):
             raise RobotError(
-                f"the Coulomb friction of a motor has {Tc.size} numbers",
+                f"the Coulomb friction of a motor has {counted(Tc.size, 'number')}",
                 allowed="Tc, or the pair Tc+ Tc-",
                 where="motor",
                 fix="give (Tc+, Tc-), Tc- negative",
@@ -119,7 +119,7 @@ class Link(metaclass=ArgumentErrors):
         values = numbers(q, where=f"q of link '{self.name}'").ravel().tolist()
         if len(values) != self.joint.nq:
             raise InputError(
-                f"{len(values)} coordinates are given",
+                f"{counted(len(values), 'coordinate is', 'coordinates are')} given",
                 where=f"link '{self.name}'",
                 allowed=f"{self.joint.nq} for a {type(self.joint).__name__} joint",
                 fix="give one number for each coordinate of the joint",

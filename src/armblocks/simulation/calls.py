@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.equations import Shape
-from armblocks.errors import ArmblocksError, SimulationError
+from armblocks.errors import ArmblocksError, SimulationError, counted
 from armblocks.integration.native_integrator import Integration
 from armblocks.integration.system import CompiledSystem
 from armblocks.integration.workspace import Status
@@ -77,7 +77,7 @@ class Calls:
         names = ", ".join(f"'{function.block}'" for function in self._functions)
         share = 100.0 * self.seconds / wall_time if wall_time > 0.0 else 0.0
         cost = f"{self.seconds:.3g} s, {share:.0f} % of the run"
-        return f"Python was called {self.count} times for {names}: {cost}"
+        return f"Python was called {counted(self.count, 'time')} for {names}: {cost}"
 
     def _next_tick(self, integration: Integration) -> float:
         """The next tick, s, whose functions have not been called."""

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.equations import Signature
+from armblocks.errors import counted
 from armblocks.integration.records import row_width
 from armblocks.integration.run_point import RunPoint
 from armblocks.integration.system import CompiledSystem
@@ -116,7 +117,7 @@ class Jumps:
         return table.time[instants], before, after
 
     def __repr__(self) -> str:
-        return f"<Jumps of {len(self.layout)} signals at {len(self)} instants>"
+        return f"<Jumps of {counted(len(self.layout), 'signal')} at {counted(len(self), 'instant')}>"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.errors import counted
 from armblocks.integration.system import CompiledSystem
 from armblocks.simulation.run_part import Rows
 
@@ -72,4 +73,8 @@ def loop_conditions(matrices: Array) -> Array:
 
 def _listed(names: Sequence[str]) -> str:
     name_list = ", ".join(f"'{name}'" for name in names[:MAX_NAMES])
-    return name_list if len(names) <= MAX_NAMES else f"{name_list} and {len(names) - MAX_NAMES} more signals"
+    return (
+        name_list
+        if len(names) <= MAX_NAMES
+        else f"{name_list} and {counted(len(names) - MAX_NAMES, 'more signal')}"
+    )

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.errors import counted
+
 if TYPE_CHECKING:
     from armblocks.equations import Slot
     from armblocks.simulation.run_data import RunData
@@ -51,9 +53,11 @@ def result_html(result: RunData) -> str:
     """Title, statistics of the run, and a panel for each signal, as self-contained HTML."""
     report = result.run
     end = float(result.time[-1]) if result.time.size else 0.0
-    solver = "no solver needed" if report.solver == "none" else f"{report.solver}, {report.steps} steps"
+    solver = (
+        "no solver needed" if report.solver == "none" else f"{report.solver}, {counted(report.steps, 'step')}"
+    )
     facts = (
-        f"{result.time.size} samples to {end:g} s · {solver} · "
+        f"{counted(result.time.size, 'sample')} to {end:g} s · {solver} · "
         f"{_seconds(report.wall_time)} · {report.real_time_factor:,.0f} × real time"
     )
     parts = [f'<div class="ab-result"><style>{STYLE}</style><h3>{escape(result.name)}</h3><p>{facts}</p>']

@@ -5,6 +5,7 @@ from __future__ import annotations
 from os import PathLike
 from typing import TYPE_CHECKING, final
 
+from armblocks.errors import counted
 from armblocks.simulation.export import save, to_dataframe
 from armblocks.simulation.notebook_view import result_html
 from armblocks.simulation.run_data import RunData
@@ -44,9 +45,14 @@ class SimulationResult(RunData):
     def __repr__(self) -> str:
         report = self.run
         end = f"{self.time[-1]:g} s" if self.time.size else "nothing"
-        solver = "no solver needed" if report.solver == "none" else f"{report.solver}, {report.steps} steps"
+        solver = (
+            "no solver needed"
+            if report.solver == "none"
+            else f"{report.solver}, {counted(report.steps, 'step')}"
+        )
         head = (
-            f"{self.name}: {self.time.size} samples to {end}, {len(self.names)} signals, {solver}, "
+            f"{self.name}: {counted(self.time.size, 'sample')} to {end}, "
+            f"{counted(len(self.names), 'signal')}, {solver}, "
             f"{report.wall_time:.3g} s ({report.real_time_factor:.3g} x real time)"
         )
         if self.log is not None:

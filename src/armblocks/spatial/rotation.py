@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 from armblocks.rounded_functions import cos, sin
 
 Vector3: TypeAlias = tuple[float, float, float]
@@ -34,7 +34,10 @@ def vector3(value: ArrayLike, *, where: str = "") -> Vector3:
     array = _numbers(value, where)
     if array.size != 3:
         raise InputError(
-            f"{array.size} numbers are given", where=where, allowed="3 numbers x y z", fix="give x, y and z"
+            f"{counted(array.size, 'number is', 'numbers are')} given",
+            where=where,
+            allowed="3 numbers x y z",
+            fix="give x, y and z",
         )
     x, y, z = (float(number) + 0.0 for number in array.ravel())
     return x, y, z

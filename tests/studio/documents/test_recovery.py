@@ -283,7 +283,7 @@ def test_a_missing_robot_file_is_reported_and_the_journal_remains(disk: Disk, tm
         second = disk.as_after_a_crash(tmp_path / "second")
         after = OpenDocuments(second.project, second.state_folder, lambda name: load_robot("no " + name))
         (recovery,) = after.recoverable.descriptions()
-        assert recovery.missing.startswith("the last 1 edits could not be repeated")
+        assert recovery.missing.startswith("the last 1 edit could not be repeated")
         recovered = await after.recover(document_messages.Recover(document=open_file.key, action="open"))
         assert recovered is not None
         assert list(recovered.document.diagram.blocks) == ["gain"]

@@ -255,7 +255,7 @@ def test_read_outs_equal_the_values_of_the_arm(tmp_path: Path) -> None:
         assert "5 numbers were given for q" in await client.refused(
             "readings", document=key, q=q[:5], qd=qd, qdd=qdd
         )
-        assert "joint coordinates" in await client.refused("pose", document=key, q=[0.0])
+        assert "joint coordinate was given" in await client.refused("pose", document=key, q=[0.0])
         picture = await client.ask("picture", document=key, q=q, theme="light")
         assert "<svg" in picture
 

@@ -22,7 +22,7 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 
 Matrix = NDArray[np.float64]
 RELATIVE_TOLERANCE = 1e-12
@@ -142,7 +142,8 @@ def _explicit(*matrices: Any) -> _Explicit:
     scale = float(np.linalg.norm(A)) or 1.0
     if float(np.linalg.svd(algebraic, compute_uv=False)[-1]) <= RELATIVE_TOLERANCE * scale:
         raise InputError(
-            f"E has rank {rank} of {len(E)}, and its {len(E) - rank} algebraic equations do not determine "
+            f"E has rank {rank} of {len(E)}; "
+            f"{counted(len(E) - rank, 'algebraic equation does', 'algebraic equations do')} not determine "
             "the part of x in the null space of E",
             where="DescriptorStateSpace",
             allowed="equations of index 1: A restricted to the left and right null spaces of E is regular",

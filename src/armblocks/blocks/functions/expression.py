@@ -22,7 +22,7 @@ from armblocks.diagram import (
     shape_of,
 )
 from armblocks.diagram.signs import FaceSign, Words
-from armblocks.errors import InputError, UnknownNameError
+from armblocks.errors import InputError, UnknownNameError, counted
 from armblocks.matlab.formula import Formula
 from armblocks.matlab.functions import RESERVED, TABLE
 
@@ -75,7 +75,8 @@ class Expression(Block):
             )
         if names and math.prod(shape_of(self.values)) != len(names):
             raise InputError(
-                f"there are {len(names)} names and {math.prod(shape_of(self.values))} values",
+                f"{counted(len(names), 'name')} and {counted(math.prod(shape_of(self.values)), 'value')} "
+                "are given",
                 where="Expression",
                 allowed="one value for each name",
                 fix="correct the names or the values",

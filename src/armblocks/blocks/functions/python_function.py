@@ -28,7 +28,7 @@ from armblocks.diagram import (
 )
 from armblocks.diagram.signs import FaceSign, Lines
 from armblocks.equations import Shape, flatten, unflatten
-from armblocks.errors import ArmblocksError, InputError
+from armblocks.errors import ArmblocksError, InputError, counted
 
 
 def unchanged(u: object) -> object:
@@ -113,7 +113,7 @@ class PythonFunction(Block):
             ) from error
         if len(results) != len(names):
             raise InputError(
-                f"{where} returns {len(results)} values for the results {', '.join(names)}",
+                f"{where} returns {counted(len(results), 'value')} for the results {', '.join(names)}",
                 allowed="one value for each result",
                 fix="correct the function or the names",
             )
@@ -217,7 +217,8 @@ class CalledPythonFunction(Block):
             ) from error
         if len(values) != len(names):
             raise InputError(
-                f"the function {user.name} returns {len(values)} values for the results {', '.join(names)}",
+                f"the function {user.name} returns {counted(len(values), 'value')} for the results "
+                f"{', '.join(names)}",
                 allowed="one value for each result",
                 fix="correct the function or the names",
             )

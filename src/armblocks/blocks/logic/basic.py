@@ -34,7 +34,7 @@ from armblocks.diagram import (
 )
 from armblocks.diagram.signs import FaceSign, Words, graph, value_text
 from armblocks.equations import Shape
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 
 _MAX_CONDITIONS = 12
 _RELATIONS = {"==": "=", "~=": "≠", "<": "<", "<=": "≤", ">": ">", ">=": "≥"}
@@ -303,7 +303,7 @@ class CombinatorialLogic(Block):
         rows = shape_of(self.table)[0]
         if rows & (rows - 1) or rows < 2:
             raise InputError(
-                f"the table has {rows} rows",
+                f"the table has {counted(rows, 'row')}",
                 where="CombinatorialLogic",
                 allowed="2, 4, 8, … rows: one for each combination of conditions",
                 fix="add the missing rows",

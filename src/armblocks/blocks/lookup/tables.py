@@ -31,7 +31,7 @@ from armblocks.diagram import (
     shape_of,
 )
 from armblocks.diagram.signs import TABLE, FaceSign, Words
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,7 +168,7 @@ class LookupTableND(BlockWithAxes):
         shape, count = shape_of(self.table), shape_of(self.positions)[0]
         if count != sum(shape):
             raise InputError(
-                f"there are {count} positions for a table of shape {shape}",
+                f"{counted(count, 'position is', 'positions are')} given for a table of shape {shape}",
                 where="LookupTableND",
                 allowed=f"{sum(shape)}: {' + '.join(map(str, shape))}",
                 fix="list the positions of all axes, axis after axis",

@@ -15,7 +15,7 @@ from armblocks.blocks.elimination import determinant, solve
 from armblocks.diagram import Block, Port, Shapes, Signals, WorkedExample, driver, parameter
 from armblocks.diagram.signs import FaceSign, Words
 from armblocks.equations import Shape
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 
 
 def _square(shape: Shape) -> Shape:
@@ -265,7 +265,7 @@ class Reshape(Block):
         n = math.prod(inputs["u"])
         if self.output == "matrix" and n % self.rows:
             raise InputError(
-                f"{n} elements cannot form a matrix with {self.rows} rows",
+                f"{counted(n, 'element')} cannot form a matrix with {counted(self.rows, 'row')}",
                 allowed=f"a number of rows that divides {n}",
                 fix="change rows",
             )

@@ -44,7 +44,7 @@ from armblocks.diagram import (
     shape_of,
 )
 from armblocks.diagram.signs import FaceSign, Words, graph
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 from armblocks.robot import Robot
 from armblocks.trajectories import Quintic
 
@@ -82,7 +82,7 @@ class JTraj(Block):
         n, m = shape_of(self.q0)[0], shape_of(self.qf)[0]
         if n != m:
             raise InputError(
-                f"q0 has {n} joints and qf has {m}",
+                f"q0 has {counted(n, 'joint')} and qf has {m}",
                 where="JTraj",
                 allowed="equal numbers of joints",
                 fix="correct q0 or qf",

@@ -29,7 +29,7 @@ from armblocks.diagram import (
     shape_of,
 )
 from armblocks.diagram.signs import FaceSign, graph
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 from armblocks.spatial.orientation import fraction_of_rotation, from_quaternion, to_quaternion
 from armblocks.trajectories import Quintic
 
@@ -128,7 +128,7 @@ class MultiSegment(Block):
         segments, durations = shape_of(self.points)[0] - 1, shape_of(self.durations)[0]
         if segments != durations:
             raise InputError(
-                f"{segments + 1} points make {segments} segments but {durations} durations are given",
+                f"there are {segments + 1} points and {counted(durations, 'duration')}",
                 where="MultiSegment",
                 allowed="one duration fewer than points",
                 fix="correct the points or the durations",
@@ -242,7 +242,7 @@ class CirclePath(Block):
     def check(self) -> None:
         if shape_of(self.centre) != (3,):
             raise InputError(
-                f"the centre has {shape_of(self.centre)[0]} numbers",
+                f"the centre has {counted(shape_of(self.centre)[0], 'number')}",
                 where="CirclePath.centre",
                 allowed="3: x, y, z",
                 fix="give the centre of the circle in m",

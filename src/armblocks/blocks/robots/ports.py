@@ -10,7 +10,7 @@ from armblocks import dynamics
 from armblocks.diagram import Block, Port, rate_unit, shape_of
 from armblocks.dynamics.mechanism import mechanism
 from armblocks.equations import TracedFunction, flatten, unflatten
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 from armblocks.robot import Robot
 
 MAX_START_RESIDUAL = 1e-6
@@ -74,7 +74,7 @@ def check_joint_values(block: Block, robot: Robot, name: str) -> None:
     shape = shape_of(block.parameter_value(name))
     if shape not in ((), (robot.n,)):
         raise InputError(
-            f"{name} has {shape[0]} joints",
+            f"{name} has {counted(shape[0], 'joint')}",
             where=f"{block.type_name()}.{name}",
             allowed=f"{robot.n}, one for each joint of '{robot.name}', or one number for all",
             fix="give one number for each joint of the robot",
@@ -94,7 +94,9 @@ def check_start(block: Block, robot: Robot, name: str) -> None:
     where, allowed = f"{block.type_name()}.{name}", f"{robot.nq}, one for each coordinate, or 0 for all"
     if value.shape not in ((), (robot.nq,)) or (value.shape == () and value != 0.0):
         raise InputError(
-            f"{name} is {value:g} for all" if value.shape == () else f"{name} has {value.size} coordinates",
+            f"{name} is {value:g} for all"
+            if value.shape == ()
+            else f"{name} has {counted(value.size, 'coordinate')}",
             where=where,
             allowed=allowed,
             fix=f"begin with the neutral coordinates {robot.neutral.tolist()}",

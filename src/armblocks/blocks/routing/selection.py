@@ -23,7 +23,7 @@ from armblocks.diagram import (
     driver,
     parameter,
 )
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 
 COUNTING = ("one-based", "zero-based")
 """Index bases: whether the first index is 1 or 0."""
@@ -189,7 +189,7 @@ class Assignment(Block):
         _check_inside(positions, math.prod(inputs["y0"]), self.counting)
         if math.prod(inputs["u"]) not in (1, len(positions)):
             raise InputError(
-                f"{math.prod(inputs['u'])} new elements for {len(positions)} indices",
+                f"{math.prod(inputs['u'])} new elements for {counted(len(positions), 'index', 'indices')}",
                 allowed="one element for each index, or one element for all indices",
                 fix="correct the indices or the width of 'u'",
             )

@@ -10,7 +10,7 @@ from casadi import SX, fabs, floor, if_else, logic_or, vertcat
 
 from armblocks.blocks.elementwise import numbered_ports
 from armblocks.diagram import Block, Guard, Port, Shapes, Signals, State, WorkedExample, driver, parameter
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 from armblocks.matlab.formula import Formula
 
 THRESHOLD_OFFSET = 1e-300
@@ -59,7 +59,7 @@ class If(Block):
             size = Formula(text, "If.expressions").trace({**u, "t": SX.sym("t")}).numel()
             if size != 1:
                 raise InputError(
-                    f"the condition '{text}' has {size} values",
+                    f"the condition '{text}' has {counted(size, 'value')}",
                     allowed="one value: true or false",
                     fix="compare an element, such as u[1]",
                 )

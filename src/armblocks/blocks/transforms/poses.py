@@ -22,7 +22,7 @@ from armblocks.blocks.example_signals import (
 from armblocks.blocks.transforms.orientations import pose
 from armblocks.diagram import Block, Port, Shapes, Signals, State, WorkedExample, driver, parameter, shape_of
 from armblocks.diagram.signs import FaceSign, Words
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 from armblocks.spatial.orientation import from_quaternion, quaternion_product
 
 _FRAMES = ("body", "world")
@@ -303,7 +303,7 @@ class PoseIntegration(Block):
             shape = shape_of(self.parameter_value(name))
             if shape != (count,):
                 raise InputError(
-                    f"the {name} has {shape[0]} numbers",
+                    f"the {name} has {counted(shape[0], 'number')}",
                     where="PoseIntegration",
                     allowed=f"{count}",
                     fix="give a position as (x, y, z), a quaternion with the scalar first",

@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from armblocks.errors import counted
 from armblocks.formats.matlab.link_fields import inertia_from, set_link_field
 from armblocks.formats.matlab.records import LinkRecord, Release
 from armblocks.formats.matlab.values import Value
@@ -37,7 +38,7 @@ def link_from_row(
     if not (4 <= count <= 6 or _MIN_DYN_LENGTH <= count <= _MAX_DYN_LENGTH) or count == _MAX_DYN_LENGTH - 1:
         order = " ".join(columns)
         raise location.error(
-            f"a row of {count} numbers is not a link",
+            f"a row of {counted(count, 'number')} is not a link",
             allowed=f"4 to 6 numbers {order}, or a legacy row with m r I Jm G B Tc behind the first 5: "
             f"{_MIN_DYN_LENGTH} to 18 or {_MAX_DYN_LENGTH} numbers",
         )
@@ -75,7 +76,8 @@ def make_link(location: Location, arguments: list[Value]) -> LinkRecord:
         return arguments[0].copy_on_assignment()
     if not 1 <= len(arguments) <= 2:
         raise location.error(
-            f"link is called with {len(arguments)} arguments", allowed="link(row), link(row, convention)"
+            f"link is called with {counted(len(arguments), 'argument')}",
+            allowed="link(row), link(row, convention)",
         )
     row = arguments[0]
     if not isinstance(row, np.ndarray) or row.shape[0] != 1:
@@ -103,7 +105,8 @@ def _new_link(
     if sigma is None and arguments and isinstance(arguments[0], np.ndarray):
         if arguments[0].shape[0] != 1 or len(arguments) > 2:
             raise location.error(
-                f"{name} is called with {kind_of(arguments[0])} and {len(arguments) - 1} more arguments",
+                f"{name} is called with {kind_of(arguments[0])} and "
+                f"{counted(len(arguments) - 1, 'more argument')}",
                 allowed="Link([theta d a alpha sigma offset], convention)",
             )
         if len(arguments) == 2:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from armblocks.errors import ArmblocksError
+from armblocks.errors import ArmblocksError, counted
 from armblocks.formats.matlab.records import LinkRecord
 from armblocks.formats.matlab.values import Value
 from armblocks.matlab.arrays import Array, array_of, empty, kind_of, number_of, scalar
@@ -49,7 +49,7 @@ def numbers(location: Location, value: Value, what: str, count: int) -> list[flo
     """A value that must be a row or column of ``count`` finite numbers."""
     array = array_of(location, value, what)
     if array.size != count or 1 not in array.shape:
-        raise location.error(f"{what} is {kind_of(array)}", allowed=f"{count} numbers")
+        raise location.error(f"{what} is {kind_of(array)}", allowed=counted(count, "number"))
     if not np.isfinite(array).all():
         raise location.error(f"{what} holds numbers that are not finite", allowed="finite numbers")
     return [float(number) for number in array.ravel()]

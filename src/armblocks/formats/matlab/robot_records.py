@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from armblocks.errors import ArmblocksError
+from armblocks.errors import ArmblocksError, counted
 from armblocks.formats.matlab.link_constructors import is_modified, link_from_row, rows_of
 from armblocks.formats.matlab.link_fields import finite_number, numbers, set_link_field
 from armblocks.formats.matlab.records import LinkRecord, Release, RobotRecord
@@ -38,7 +38,8 @@ def make_robot(location: Location, arguments: list[Value], variable: str) -> Rob
     """
     if not 1 <= len(arguments) <= 4:
         raise location.error(
-            f"robot is called with {len(arguments)} arguments", allowed="robot(L, name, manuf, comment)"
+            f"robot is called with {counted(len(arguments), 'argument')}",
+            allowed="robot(L, name, manuf, comment)",
         )
     first, *words = arguments
     match first:

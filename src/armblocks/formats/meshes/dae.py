@@ -13,7 +13,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.errors import FormatError
+from armblocks.errors import FormatError, counted
 from armblocks.formats.meshes.node_tree import Placed, flattened
 from armblocks.formats.meshes.polygons import Integers, check_number, corners_at, fans, strip
 from armblocks.formats.xml_elements import Element, read_elements, shortened
@@ -133,7 +133,10 @@ class _Dae:
         stride = max(offsets) + 1
         for p, indices in zip(element.all("p"), lists):
             if len(indices) % stride:
-                raise p.error(f"{len(indices)} indices are given", allowed=f"a multiple of {stride}")
+                raise p.error(
+                    f"{counted(len(indices), 'index is', 'indices are')} given",
+                    allowed=f"a multiple of {stride}",
+                )
         corners = [indices[offsets[vertex] :: stride] for indices in lists]
         all_corners = np.concatenate([np.zeros(0, np.int64), *corners])
         return corners_at(points_of_sources[source], all_corners[_triangles(element, corners)], element.file)
@@ -159,7 +162,8 @@ class _Dae:
         columns = [names.index(axis) if axis in names else k for k, axis in enumerate("XYZ")]
         if not max(columns) < stride <= _MAX_STRIDE or offset + count * stride > len(values):
             raise accessor.error(
-                f"{count} points with {stride} numbers each do not fit into {len(values)} numbers",
+                f"{counted(count, 'point')} with {counted(stride, 'number')} each cannot be read "
+                f"from {counted(len(values), 'number')}",
                 allowed="three coordinates for each point",
             )
         return values[offset : offset + count * stride].reshape(count, stride)[:, columns]
@@ -210,7 +214,9 @@ def _floats(element: Element, count: int | None = None) -> Floats:
     """The numbers in the text of an element."""
     words = element.text.split()
     if count is not None and len(words) != count:
-        raise element.error(f"<{element.tag}> has {len(words)} numbers", allowed=f"{count} numbers")
+        raise element.error(
+            f"<{element.tag}> has {counted(len(words), 'number')}", allowed=counted(count, "number")
+        )
     try:
         return np.fromiter(map(float, words), np.float64, len(words))
     except ValueError:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.errors import FormatError
+from armblocks.errors import FormatError, counted
 
 MAX_READ = 2_000_000
 """Maximum number of triangles of a mesh file before reduction."""
@@ -42,7 +42,9 @@ def corners_at(points: NDArray[np.float64], indices: Integers, name: str) -> NDA
     """The corners (F, 3, 3) of triangles, from points (N, 3) and indices (F, 3)."""
     if indices.size and (indices.min() < 0 or indices.max() >= len(points)):
         worst = int(indices.max() if indices.max() >= len(points) else indices.min())
-        raise invalid_mesh(name, f"a triangle refers to point {worst}, and there are {len(points)} points")
+        raise invalid_mesh(
+            name, f"a triangle refers to point {worst}; the mesh has {counted(len(points), 'point')}"
+        )
     return points[indices].reshape(-1, 3, 3)
 
 

@@ -19,7 +19,7 @@ from collections.abc import Mapping
 from pathlib import PurePath
 from typing import NamedTuple
 
-from armblocks.errors import FormatError
+from armblocks.errors import FormatError, counted
 from armblocks.formats.file_findings import FileContext, FileFinding
 from armblocks.formats.simscape.assembly import GROUND, Assembly, Connection, Kind, Part
 from armblocks.formats.simscape.rules import JOINT_CODE, MASS
@@ -221,7 +221,9 @@ class _Tables:
         words = value.text.strip("[]").replace(",", " ").split()
         if len(words) != count or not all(_NUMBER.fullmatch(word) for word in words):
             raise self._error(
-                value.line, f"'{value.text[:60]}' is not {count} numbers", f"{count} finite numbers"
+                value.line,
+                f"'{value.text[:60]}' is not {counted(count, 'number')}",
+                counted(count, "finite number"),
             )
         numbers = [float(word) for word in words]
         if not all(abs(number) < 1e300 for number in numbers):

@@ -20,6 +20,7 @@ from pathlib import PurePath
 
 import numpy as np
 
+from armblocks.errors import counted
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.simscape.assembly import GROUND, Assembly, Connection, Kind, Part
 from armblocks.formats.simscape.mates import GEOMETRIES, Geometry, Motion, motion_of, rows_of
@@ -356,7 +357,12 @@ class _Reader:
     def _note_left_out(self) -> None:
         files = [file for part in self._parts.values() for file in part.all("GeometryFile")]
         if files:
-            note(self._context, GEOMETRY, files[0], f"{len(files)} geometry files are not shown")
+            note(
+                self._context,
+                GEOMETRY,
+                files[0],
+                f"{counted(len(files), 'geometry file is', 'geometry files are')} not shown",
+            )
 
 
 class _Groups:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from armblocks.errors import FormatError
+from armblocks.errors import FormatError, counted
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.urdf.origins import origin_of
 from armblocks.formats.urdf.rules import AXIS, DAMPING, LIMIT, MIMIC, NO_LIMIT, TRANSMISSION
@@ -229,9 +229,8 @@ def transmissions_of(root: Element, context: FileContext) -> dict[str, Transmiss
             continue
         G, rotor = reduction if reduction is not None else 1.0, inertia or 0.0
         if len(joints) != 1 or len(actuators) > 1 or G == 0 or rotor < 0:
-            what = (
-                f"{len(joints)} joints, {len(actuators)} actuators, reduction {G:g}, rotor inertia {rotor:g}"
-            )
+            counts = f"{counted(len(joints), 'joint')}, {counted(len(actuators), 'actuator')}"
+            what = f"{counts}, reduction {G:g}, rotor inertia {rotor:g}"
             note(context, TRANSMISSION, transmission, f"it is not read: {what}")
             continue
         if (G, rotor) != (1.0, 0.0):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from armblocks.analysis.linear_system import LinearSystem
 from armblocks.analysis.root_locus import extent, root_locus
 from armblocks.analysis.shown_values import shown_poles, shown_zeros
+from armblocks.errors import counted
 from armblocks.pictures.numbers import axis_number
 from armblocks.pictures.picture import Disc, Mark, Picture, Polyline, Text
 from armblocks.pictures.style import SMALL_SIZE, Tone, trace_tone
@@ -36,7 +37,9 @@ def pole_zero_picture(system: LinearSystem, *, width: float = 560.0) -> Picture:
     poles, zeros = shown_poles(system), shown_zeros(system)
     area, box = _plane(np.concatenate([poles, zeros]), system, width)
     picture = _plane_picture(system, area, box, width, "Poles and zeros")
-    picture.description = f"{len(poles)} poles (crosses) and {len(zeros)} zeros (rings)."
+    picture.description = (
+        f"{counted(len(poles), 'pole')} (crosses) and {counted(len(zeros), 'zero')} (rings)."
+    )
     picture.extend(_roots(area, poles, zeros))
     return picture
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armblocks.argument_errors import ArgumentErrors
-from armblocks.errors import RobotError
+from armblocks.errors import RobotError, counted
 from armblocks.robot.fields import number, numbers
 
 
@@ -29,7 +29,7 @@ class JointLimits(metaclass=ArgumentErrors):
             position = tuple(ends.ravel().tolist())
             if len(position) != 2:
                 raise RobotError(
-                    f"the position limits are {len(position)} numbers",
+                    f"the position limits are {counted(len(position), 'number')}",
                     allowed="a pair, or None where unknown",
                     where="joint limits",
                     fix="give (lowest, highest)",

@@ -32,7 +32,7 @@ from typing import Annotated, Any, Generic
 
 from pydantic import TypeAdapter, ValidationError
 
-from armblocks.errors import ArmblocksError, FormatError
+from armblocks.errors import ArmblocksError, FormatError, counted
 from armblocks.studio.documents.file_kind import EditedT, FileKind
 from armblocks.studio.documents.journal import Journal, Record, read_journal
 from armblocks.studio.documents.older_journals import converted
@@ -255,7 +255,7 @@ class _Replay(Generic[EditedT]):
                 except Exception as error:  # also a defect: the edits before it are recovered
                     lost = sum(1 for later in records[index:] if "perform" in later)
                     what = error.what if isinstance(error, ArmblocksError) else _defect_text(error)
-                    recovered.missing = f"the last {lost} edits could not be repeated: {what}"
+                    recovered.missing = f"the last {counted(lost, 'edit')} could not be repeated: {what}"
                     break
                 self._values[recovered.document.version] = recovered.document.value
             recovered.edits += "perform" in record

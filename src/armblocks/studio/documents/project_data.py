@@ -23,7 +23,7 @@ from armblocks.diagram.function_files import (
     split_reference,
 )
 from armblocks.diagram.levels import joined, levels_of
-from armblocks.errors import ArmblocksError, FormatError, UnknownNameError
+from armblocks.errors import ArmblocksError, FormatError, UnknownNameError, counted
 from armblocks.files import read_bounded
 from armblocks.formats.data_files import DataFiles, TableReference
 from armblocks.formats.table_columns import ColumnFile, table_of
@@ -140,7 +140,8 @@ class ProjectData(DataFiles):
         current = self.table(TableReference(file=table.shown, time=table.time, columns=table.columns), None)
         if current.fault is None and current.shape[1] != table.shape[1]:
             return FormatError(
-                f"{table.shown} has changed: it has {current.shape[1] - 1} columns of values instead of "
+                f"{table.shown} has changed: it has {counted(current.shape[1] - 1, 'column')} of values "
+                "instead of "
                 f"{table.shape[1] - 1}",
                 where=table.shown,
                 fix="open the block and choose its columns again",

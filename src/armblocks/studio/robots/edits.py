@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
-from armblocks.errors import InputError, RobotError
+from armblocks.errors import InputError, RobotError, counted
 from armblocks.robot import DhConvention, DhRow, Link, Robot, link_from_dh, serial_chain
 from armblocks.robot.dh_conversion import converted, reread
 from armblocks.studio.documents.edit_table import EditTable
@@ -118,7 +118,10 @@ def _one_number(text: str, where: str) -> float:
     value = number_value(text, where)
     if isinstance(value, list):
         raise InputError(
-            f"{len(value)} numbers were typed", where=where, allowed="one number", fix="type one number"
+            f"{counted(len(value), 'number was', 'numbers were')} typed",
+            where=where,
+            allowed="one number",
+            fix="type one number",
         )
     return value
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 from armblocks.face.arm import Arm
 from armblocks.robot import Robot
 from armblocks.robot.geometry import reach
@@ -45,7 +45,7 @@ def readings(arm: Arm, q: Sequence[float], qd: Sequence[float], qdd: Sequence[fl
 def _check_count(robot: Robot, name: str, values: Sequence[float], count: int) -> None:
     if len(values) != count:
         raise InputError(
-            f"{len(values)} numbers were given for {name}",
+            f"{counted(len(values), 'number was', 'numbers were')} given for {name}",
             where=f"robot '{robot.name}'",
             allowed=f"{count}, one for each joint",
             fix="give one number for each joint",

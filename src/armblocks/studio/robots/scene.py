@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 from armblocks.robot import Link, Robot
 from armblocks.robot.geometry import drum_radii, link_frames, reach, robot_bodies
 from armblocks.spatial import Transform, rotation_about, trotx
@@ -75,7 +75,7 @@ def link_frames_of(robot: Robot, q: Sequence[float]) -> list[list[list[float]]]:
     """Poses of base, links and tool at ``q``, (L+2, 4, 4); raises ``InputError`` for a wrong length."""
     if len(q) != robot.nq:
         raise InputError(
-            f"{len(q)} joint coordinates were given",
+            f"{counted(len(q), 'joint coordinate was', 'joint coordinates were')} given",
             where=f"robot '{robot.name}'",
             allowed=f"{robot.nq}, one for each coordinate",
             fix="give one number for each coordinate",

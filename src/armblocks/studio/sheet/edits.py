@@ -32,7 +32,7 @@ from armblocks.diagram.diagram import block_in_scope
 from armblocks.diagram.mask import Scope
 from armblocks.diagram.names import folded
 from armblocks.drawing.wires import moved_bends
-from armblocks.errors import DiagramError, UnknownNameError
+from armblocks.errors import DiagramError, UnknownNameError, counted
 from armblocks.formats.data_files import DataFiles
 from armblocks.studio.documents.edit_table import EditTable
 from armblocks.studio.protocol.messages.sheet_edits import (
@@ -487,4 +487,4 @@ def _name_list(names: Sequence[str]) -> str:
 
 
 def _count_text(items: Sized, noun: str) -> str:
-    return f"{len(items)} {noun}{'' if len(items) == 1 else 's'}"
+    return counted(len(items), noun)

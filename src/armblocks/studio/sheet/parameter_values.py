@@ -13,7 +13,7 @@ from typing import Any, cast
 from armblocks.diagram import Parameter, ParameterFormula, ParameterKind, TimeTable, UserFunction
 from armblocks.diagram.mask import Scope, formula_number, formula_value, parameters_read
 from armblocks.diagram.user_function import UnloadedFunction
-from armblocks.errors import InputError, UnknownNameError
+from armblocks.errors import InputError, UnknownNameError, counted
 from armblocks.formats.data_files import DataFiles, TableReference
 from armblocks.robot import Robot
 
@@ -116,9 +116,9 @@ def parameter_json(value: Any) -> Any:
 def _table_json(table: TimeTable) -> dict[str, Any]:
     """The data of a table for pages: size, and the file and columns that :func:`parameter_value` takes."""
     count, width = table.shape
-    values = f"{width - 1} column{'' if width == 2 else 's'} of values"
+    values = counted(width - 1, "column of values", "columns of values")
     return {
-        "table": f"{count} rows, {values}",
+        "table": f"{counted(count, 'row')}, {values}",
         "source": table.shown or table.source,
         "time": table.time,
         "columns": list(table.columns),
