@@ -31,6 +31,7 @@ def event_ranks(network: Network) -> Mapping[str, int]:
     }
     if len(eventful) < 2:
         return {}
+    excluded = _outputs_before_events(network)
     controls = _control_of_each_subsystem(network)
     vertices: dict[_Vertex, int] = {}
     needs: list[list[int]] = []
@@ -48,14 +49,14 @@ def event_ranks(network: Network) -> Mapping[str, int]:
     while pending:
         vertex = pending.pop()
         if isinstance(vertex, str):
-            found: list[_Vertex] = [*_read_by_groups(network, vertex, _EVENT_KINDS)]
+            found: list[_Vertex] = [*_read_by_groups(network, vertex, _EVENT_KINDS, excluded)]
         else:
-            found = [*_needed(network, vertex), vertex.block]
+            found = [*_needed(network, vertex, excluded), vertex.block]
         needs[vertices[vertex]] += [number(needed) for needed in found]
     for name in network.equations:
         for subsystem, control in controls.items():
             if name.startswith(subsystem):
-                read = _read_by_groups(network, name, {SlotKind.OUTPUT, *_EVENT_KINDS})
+                read = _read_by_groups(network, name, {SlotKind.OUTPUT, *_EVENT_KINDS}, excluded)
                 outside = [node for node in read if not node.block.startswith(subsystem)]
                 needs[vertices[control]] += [vertices[node] for node in outside if node in vertices]
     ranks = _longest_paths(needs, {vertices[name] for name in eventful})
@@ -76,20 +77,26 @@ def _control_of_each_subsystem(network: Network) -> dict[str, str]:
     }
 
 
-def _needed(network: Network, node: Node) -> Iterator[Node]:
-    """The nodes that a node reads, without outputs that have their values before the events of an instant."""
-    for needed, path in network.needs(node):
-        block, _, port = path[-1].rpartition("/")
-        ports = network.diagram.blocks[block].output_ports()
-        if not any(entry.name == port and entry.before_events for entry in ports):
-            yield needed
+def _outputs_before_events(network: Network) -> set[str]:
+    """The outputs that have their values before the events of an instant."""
+    return {
+        f"{name}/{port.name}"
+        for name, block in network.diagram.blocks.items()
+        for port in block.output_ports()
+        if port.before_events
+    }
 
 
-def _read_by_groups(network: Network, name: str, kinds: set[SlotKind]) -> Iterator[Node]:
-    """The nodes that the equations of these roles of a block read."""
+def _needed(network: Network, node: Node, excluded: set[str]) -> Iterator[Node]:
+    """The nodes that a node reads, without these outputs."""
+    return (needed for needed, path in network.needs(node) if path[-1] not in excluded)
+
+
+def _read_by_groups(network: Network, name: str, kinds: set[SlotKind], excluded: set[str]) -> Iterator[Node]:
+    """The nodes that the equations of these roles of a block read, without these outputs."""
     for index, group in enumerate(network.equations[name].groups):
         if any(slot.kind in kinds for slot in group.slots):
-            yield from _needed(network, Node(name, index, 0))
+            yield from _needed(network, Node(name, index, 0), excluded)
 
 
 def _longest_paths(needs: list[list[int]], counted: set[int]) -> list[int]:
