@@ -7,6 +7,8 @@ state machines that read the recorded values of this sum before and after each j
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,8 @@ import armblocks as ab
 from armblocks.blocks import (
     ActionSubsystem,
     Bias,
+    Clock,
+    CompareToConstant,
     Constant,
     EnabledSubsystem,
     Gain,
@@ -61,16 +65,35 @@ def resting() -> Diagram:
     return inner.build()
 
 
-def random_diagram(random: np.random.Generator) -> tuple[Diagram, list[str]]:
-    """A random diagram and the names of the observed sums."""
-    builder = ab.DiagramBuilder("order")
+def fixed_sources(builder: ab.DiagramBuilder, random: np.random.Generator) -> list[ab.BlockHandle]:
+    """Sources that jump at the times ``JUMPS``."""
     signals = [builder.add("pulse", PulseGenerator(period=0.8, width=50.0, amplitude=2.0, delay=0.3))]
     for k in range(3):
         levels = random.uniform(-1.0, 1.0, 2)
-        time = float(random.choice(JUMPS))
-        signals.append(
-            builder.add(f"step{k}", Step(time=time, initial=float(levels[0]), final=float(levels[1])))
-        )
+        step = Step(time=float(random.choice(JUMPS)), initial=float(levels[0]), final=float(levels[1]))
+        signals.append(builder.add(f"step{k}", step))
+    return signals
+
+
+def moving_sources(builder: ab.DiagramBuilder, random: np.random.Generator) -> list[ab.BlockHandle]:
+    """Signals that jump at the times ``JUMPS`` divided by the parameter ``speed.gain``, which is 1."""
+    speed = builder.add("speed", Gain(gain=1.0), builder.add("clock", Clock()))
+    signals: list[ab.BlockHandle] = []
+    for k in range(4):
+        after = CompareToConstant(relation=">", constant=float(random.choice(JUMPS)))
+        jump = Gain(gain=float(random.uniform(-2.0, 2.0)))
+        jumping = builder.add(f"jump{k}", jump, builder.add(f"after{k}", after, speed))
+        signals.append(builder.add(f"level{k}", Bias(bias=float(random.uniform(-1.0, 1.0))), jumping))
+    return signals
+
+
+def random_diagram(
+    random: np.random.Generator,
+    sources: Callable[[ab.DiagramBuilder, np.random.Generator], list[ab.BlockHandle]] = fixed_sources,
+) -> tuple[Diagram, list[str]]:
+    """A random diagram and the names of the observed sums."""
+    builder = ab.DiagramBuilder("order")
+    signals = sources(builder, random)
     zero = builder.add("zero", Constant(value=0.0))
 
     def combination(name: str) -> ab.BlockHandle:
@@ -109,6 +132,7 @@ def random_diagram(random: np.random.Generator) -> tuple[Diagram, list[str]]:
         builder.add(f"since{k}", ResettableIntegrator(external_reset="rising"), one, v)
         builder.add(f"relay{k}", Relay(on_point=0.5, off_point=-0.5), v)
         builder.add(f"hit{k}", HitCrossing(), v)
+        builder.add(f"integral{k}", Integrator(), v)
     return builder.build(), [f"v{k}" for k in range(4)]
 
 
@@ -128,6 +152,21 @@ def test_blocks_react_to_the_recorded_values_only(seed: int) -> None:
         assert result[f"hit{k}/count"][-1] == crossings
         assert result[f"relay{k}"][-1] == on
         assert np.isclose(result[f"since{k}"][-1], STOP - last)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_the_sensitivity_of_integrals_follows_from_the_recorded_jumps(seed: int) -> None:
+    """A jump by h at T / g adds ``h (stop - T / g)`` to an integral; its derivative with respect to g = 1 is
+    ``h T``."""
+    diagram, names = random_diagram(np.random.default_rng(100 + seed), moving_sources)
+    options = {"stop_time": STOP, "sample_time": 0.05}
+    jumps = ab.simulate(diagram, **options).jumps
+    integrals = [f"integral{k}" for k in range(len(names))]
+    result = ab.sensitivity(diagram, ["speed.gain"], integrals, **options)
+    for name, integral in zip(names, integrals):
+        times, before, after = jumps[name]
+        expected = np.sum((after - before) * times)
+        assert np.isclose(result[integral, "speed.gain"][-1], expected, rtol=1e-6, atol=1e-8)
 
 
 def test_a_state_port_gives_the_value_before_a_reset_at_the_same_instant() -> None:

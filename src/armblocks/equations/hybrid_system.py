@@ -66,7 +66,8 @@ class LinearLoops:
 
 @dataclass(frozen=True, kw_only=True)
 class EventRanks:
-    """The ranks of events at one instant: events of a lower rank are processed first.
+    """The ranks of events at one instant: events of a lower rank are processed first. Events of a negative
+    rank change only derivatives.
 
     ``guards``, ``hysteresis_modes``, ``recaptured_states``: the ranks of the entries of the fields of
     :class:`HybridSystem` with these names. ``controls``: for each control of a conditional subsystem, the

@@ -132,9 +132,11 @@ class Instants:
         return 0, 0, *[1] * (len(self.moving_breakpoints) + 2 * self.delays.n)
 
     def ranks(self, own: EventRanks) -> EventRanks:
-        """The ranks of all guards. Added guards come first; those of delay inputs that jumped come last."""
-        last, n = max(own.guards) + 1, self.delays.n
-        added = (0, 0, *[0] * len(self.moving_breakpoints), *[0] * n, *[last] * n)
+        """The ranks of all guards. Added guards come first, with a negative rank, because they change only
+        derivatives; those of delay inputs that jumped come last."""
+        n = self.delays.n
+        first = 2 + len(self.moving_breakpoints) + n
+        added = (*[-1] * first, *[max(own.guards) + 1] * n)
         return dataclasses.replace(
             own,
             guards=(*own.guards, *added),
@@ -278,7 +280,7 @@ class Instants:
         system = self.columns.system
         if system.ranks is None:
             return SX.zeros(self.guards)
-        rank = if_else(_any_marked(others), 0.0, float(max(system.ranks.guards)))
+        rank = if_else(_any_marked(others), -1.0, float(max(system.ranks.guards)))
         for number, own_rank in enumerate(system.ranks.guards):
             rank = if_else(own[number] != 0.0, fmin(rank, float(own_rank)), rank)
         later = SX(system.ranks.guards) > rank

@@ -33,7 +33,8 @@ class RankedEvents:
 
     def _hold_controls(self, r: Routine, reals: Reals, rank: Integer) -> None:
         """Set the modes of controls of higher ranks to their old values, so that a reset does not act on the
-        blocks that they control. Before the start of the run there are no old values."""
+        blocks that they control. Before the start of the run there are no old values. Events of negative rank
+        do not act on blocks."""
         z = reals.after(self.workspace.z)
         modes, old_values, ranks = (
             r.integers(f"control.{role}", entries)
@@ -41,7 +42,8 @@ class RankedEvents:
         )
         for i in r.each(len(self.controls)):
             mode, old = z[modes[i]], z[old_values[i]]
-            z[modes[i]] = select((ranks[i] > rank) & (old >= 0.0), old, mode)
+            waits = (rank >= 0) & (ranks[i] > rank)
+            z[modes[i]] = select(waits & (old >= 0.0), old, mode)
 
     def _store_signs(self, r: Routine, reals: Reals, rank: Integer) -> None:
         """Store the signs of all guards up to this rank; a guard that is zero keeps its stored sign."""
