@@ -131,6 +131,12 @@ class RunPart:
         last = max(0, self.recorded - 1)
         return float(self._sample_times.part(last, last + 1)[0])
 
+    def reached(self, pause: float) -> bool:
+        """Whether no further step begins before ``pause`` (s)."""
+        if self.integration is not None:
+            return not self.integration.time < pause
+        return self.recorded >= self._sample_times.up_to(pause)
+
     @property
     def status(self) -> Status:
         """Whether the run is paused or has ended, and why."""

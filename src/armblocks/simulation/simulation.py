@@ -176,13 +176,13 @@ class Simulation:
             else:
                 self._calls.advance(part, chunk, pause, self._recording.consumer)
             now = perf_counter()
-            steps_taken = part.steps_taken - steps_taken
-            left -= steps_taken
-            if steps_taken < chunk and not part.other_method_faster:
-                break  # the pause or the end is reached
-            # At most twice as many steps as before, so that the time of a chunk grows gradually.
+            left -= part.steps_taken - steps_taken
+            if part.reached(pause) and not part.other_method_faster:
+                break
+            # At most twice as many steps as before, so that the time of a chunk grows gradually. Events
+            # count as steps of a chunk, not as steps taken.
             growth = min(2.0, min(CHUNK_SECONDS, budget) / max(now - started, 1e-6))
-            self._chunk = max(100, int(steps_taken * growth))
+            self._chunk = max(100, int(chunk * growth))
             if now >= deadline:
                 break
 
