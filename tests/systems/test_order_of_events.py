@@ -154,7 +154,7 @@ def test_blocks_react_to_the_recorded_values_only(seed: int) -> None:
         assert np.isclose(result[f"since{k}"][-1], STOP - last)
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [2, 17])
 def test_the_sensitivity_of_integrals_follows_from_the_recorded_jumps(seed: int) -> None:
     """A jump by h at T / g adds ``h (stop - T / g)`` to an integral; its derivative with respect to g = 1 is
     ``h T``."""

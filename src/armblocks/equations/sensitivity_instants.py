@@ -132,11 +132,11 @@ class Instants:
         return 0, 0, *[1] * (len(self.moving_breakpoints) + 2 * self.delays.n)
 
     def ranks(self, own: EventRanks) -> EventRanks:
-        """The ranks of all guards. Added guards come first, with a negative rank, because they change only
-        derivatives; those of delay inputs that jumped come last."""
-        n = self.delays.n
-        first = 2 + len(self.moving_breakpoints) + n
-        added = (*[-1] * first, *[max(own.guards) + 1] * n)
+        """The ranks of all guards. Those of sources and of delayed jumps that arrive come first, with a
+        negative rank, because they change only derivatives. Those of delay inputs that jumped come after the
+        guards of the system, and the guards that end an instant come last."""
+        n, last = self.delays.n, max(own.guards)
+        added = (last + 2, last + 2, *[-1] * (len(self.moving_breakpoints) + n), *[last + 1] * n)
         return dataclasses.replace(
             own,
             guards=(*own.guards, *added),
@@ -221,7 +221,9 @@ class Instants:
         opened = logic_and(logic_or(self.open, enters), logic_not(leaves))
         repeats = logic_and(opened, others)
         second = logic_and(repeats, arms[0] != 0.0)
-        flips = vertcat(logic_and(repeats, logic_not(second)), second)
+        # A guard that waits for events of other ranks has already changed its sign.
+        sets = logic_and(repeats, logic_or(enters, arms[1] != 0.0))
+        flips = vertcat(logic_and(sets, logic_not(second)), second)
         caused = logic_or(logic_not(first), _any_marked(vertcat(sources, arrived)))
         changes = {
             "known": SX(1.0),
