@@ -19,7 +19,14 @@ def balanced(A: Array, B: Array, C: Array) -> tuple[Array, Array, Array]:
     For each state the norms of its column in ``[A; C]`` and of its row in ``[A, B]`` are made as equal as
     possible (Osborne, J. ACM 7, 1960, 338-345, with inputs and outputs as in TB01ID of SLICOT).
     """
+    factors = balancing_factors(A, B, C)
+    return A * factors / factors[:, None], B / factors[:, None], C * factors
+
+
+def balancing_factors(A: Array, B: Array, C: Array) -> Array:
+    """The powers of two ``f`` (nx,) of :func:`balanced`: ``x = f x_balanced``."""
     a, b, c = A.copy(), B.copy(), C.copy()
+    factors = np.ones(a.shape[0])
     for _ in range(MAX_SWEEPS):
         changed = False
         for k in range(a.shape[0]):
@@ -33,10 +40,11 @@ def balanced(A: Array, B: Array, C: Array) -> tuple[Array, Array, Array]:
                 c[:, k] *= factor
                 a[k] /= factor
                 b[k] /= factor
+                factors[k] *= factor
                 changed = True
         if not changed:
             break
-    return a, b, c
+    return factors
 
 
 def _length(vector: Array) -> float:
