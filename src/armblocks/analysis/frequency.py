@@ -7,8 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.analysis.equilibration import equilibrating_factors
 from armblocks.analysis.modes import poles
-from armblocks.analysis.reduction import minimal
+from armblocks.analysis.reduction import minimal, on_path
 from armblocks.analysis.scaling import balanced
 from armblocks.analysis.state_space import StateSpaceModel
 from armblocks.analysis.zeros import zeros
@@ -18,6 +19,10 @@ Complex = NDArray[np.complex128]
 
 _MAX_BATCH_ENTRIES = 4_000_000
 """Maximum number of entries of one batch of linear equations."""
+SINGULAR_CONDITION = 1e14
+"""Condition number of the steady state above which a pole is 0 (sampled: 1)."""
+ACCURATE_CONDITION = 1e6
+"""Condition number of the steady state above which states that do not affect the path are removed."""
 
 
 def evaluate(system: StateSpaceModel, points: Complex) -> Complex:
@@ -95,17 +100,56 @@ def as_continuous(system: StateSpaceModel, roots: Complex) -> Complex:
 
 def dcgain(system: StateSpaceModel) -> Array:
     """The steady-state gain (ny, nu) from each input to each output; infinite with an integrator."""
-    steady_state = np.array([1.0 if system.is_discrete else 0.0], dtype=np.complex128)
     result = np.empty(system.D.shape)
     for row in range(system.D.shape[0]):
         for column in range(system.D.shape[1]):
-            # An integrator on another path must not affect this path.
-            path = minimal(system.select([system.outputs[row]], [system.inputs[column]]))
-            value = float(evaluate(path, steady_state)[0, 0, 0].real)
-            if path.order and np.linalg.cond(steady_state[0].real * np.eye(path.order) - path.A) > 1e14:
-                value = math.inf
-            result[row, column] = value
+            path = on_path(system.select([system.outputs[row]], [system.inputs[column]]))
+            result[row, column] = _steady_state_gain(path) + 0.0  # without -0
     return result
+
+
+def _steady_state_gain(path: StateSpaceModel) -> float:
+    """The steady-state gain of a system with one input and one output.
+
+    The path has an integrator if ``A`` (sampled: ``I - A``) is singular, which relative changes of its
+    entries by about the roundoff can make it. This decision does not depend on the units of the states.
+    """
+    matrix, condition = _steady_state_matrix(path)
+    roundoff = 10.0 * float(np.finfo(np.float64).eps) * max(path.order, 1)
+    if condition > ACCURATE_CONDITION:
+        # An integrator on another path must not affect this path.
+        reduced = minimal(path)
+        if reduced.order < path.order:
+            # The rounding errors of the reduction are relative to the size of the whole matrix.
+            size = float(np.linalg.norm(balanced(path.A, path.B, path.C)[0])) + path.is_discrete
+            path = reduced
+            matrix, condition = _steady_state_matrix(path)
+            if path.order and np.linalg.norm(matrix, -2) <= roundoff * size:
+                return math.inf
+    if condition > min(SINGULAR_CONDITION, 1.0 / roundoff):
+        return math.inf
+    rows, columns = equilibrating_factors(matrix)
+    states = columns * np.linalg.solve(matrix * columns * rows[:, None], rows * path.B[:, 0])
+    return float(path.D[0, 0] + path.C[0] @ states)
+
+
+def _steady_state_matrix(path: StateSpaceModel) -> tuple[Array, float]:
+    """``-A`` (sampled: ``I - A``) and the condition number of the steady state for changes of entries of A.
+
+    This number is the spectral radius of ``|M^-1| |A|``, the smallest condition number among all scalings of
+    rows and columns (Bauer, Numerische Mathematik 5, 1963, 73-87).
+    """
+    identity = np.eye(path.order) if path.is_discrete else np.zeros_like(path.A)
+    matrix = identity - path.A
+    rows, columns = equilibrating_factors(matrix)
+    scaled = matrix * columns * rows[:, None]
+    try:
+        inverse = np.linalg.inv(scaled)
+    except np.linalg.LinAlgError:
+        return matrix, math.inf
+    sizes = (np.abs(path.A) + identity) * columns * rows[:, None]
+    condition = float(np.abs(np.linalg.eigvals(np.abs(inverse) @ sizes)).max(initial=0.0))
+    return matrix, condition
 
 
 def frequency_range(system: StateSpaceModel) -> tuple[float, float]:
