@@ -76,7 +76,7 @@ REFUSED = [
     ('<link name="$(eval open)"/>', "name 'open' is not defined"),
     (
         "<xacro:macro name='m' params=''><xacro:m/></xacro:macro><xacro:m/>",
-        "macros call each other without an end",
+        "macros call each other without end",
     ),
 ]
 

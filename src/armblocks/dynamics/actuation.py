@@ -50,7 +50,7 @@ Trace = Callable[[Robot], TracedFunction]
 
 
 def of_motors(trace: Trace) -> Trace:
-    """The trace of joint torques; of a robot with closed loops, of those of its motors."""
+    """Make a trace of joint torques return the torques of the motors for robots with closed loops."""
 
     @wraps(trace)
     def trace_of_motors(robot: Robot) -> TracedFunction:

@@ -38,12 +38,12 @@ from armblocks.spatial.vectors import Scalar
 POSITION_STEPS = 3
 """Number of Newton steps of a projection of coordinates, with one Jacobian.
 
-Each step multiplies the residual by the relative distance from the constraints. At a distance of 1e-4, which
-the tolerance of the solver keeps, three steps leave 1e-16."""
+Each step multiplies the residual by the relative distance from the constraints. The tolerance of the solver
+keeps this distance below about 1e-4, so that three steps leave 1e-16."""
 RESTORING_TIME = 0.1
 """Time constant of the decay of the distance from the constraints during a run, s."""
 MAX_RESIDUAL = 1e-9
-"""Largest residual after the projection: m, or cosine of an angle. A larger one would give wrong motions."""
+"""Largest residual after the projection: m, or cosine of an angle. Above it accelerations are inaccurate."""
 
 Solve = Callable[[Sequence[Scalar]], list[SX]]
 """The solution of linear equations for one right-hand side."""
@@ -102,7 +102,7 @@ class ConstrainedEquations:
         return free + _combined(responses, multipliers, self.robot.nv), vertcat(*multipliers)
 
     def shortest_step(self) -> Callable[[Sequence[Scalar]], SX]:
-        """The shortest speeds, over unit time, that reduce given residuals to zero."""
+        """The function from residuals to the step of least norm that makes them zero to first order."""
         solve = symmetric_solver(mtimes(self.J, self.J.T))
         return lambda residuals: mtimes(self.J.T, -vertcat(*solve(residuals)))
 
@@ -142,8 +142,8 @@ class ConstrainedEquations:
 def independent_relations(robot: Robot, near: Array | None = None) -> tuple[int, ...]:
     """The indices of the relations that the equations of motion contain, see :meth:`Mechanism.mobility`.
 
-    ``near`` (nq,): coordinates near which the constraints are assembled for this; by default the neutral
-    ones.
+    ``near`` (nq,): coordinates near which the mechanism is assembled to find them; by default the neutral
+    configuration.
     """
     if not robot.closures:
         return ()
@@ -152,7 +152,7 @@ def independent_relations(robot: Robot, near: Array | None = None) -> tuple[int,
 
 
 def projected(robot: Robot, tree: KinematicTree, q: SX, relations: Sequence[int]) -> SX:
-    """Coordinates (nq, 1) near ``q`` that satisfy the constraints: shortest steps in the speeds.
+    """Coordinates (nq, 1) near ``q`` that satisfy the constraints, by Newton steps of least norm.
 
     They are NaN if a residual larger than ``MAX_RESIDUAL`` remains, because ``q`` is too far from them.
     """

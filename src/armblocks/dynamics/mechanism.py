@@ -38,7 +38,7 @@ move as locked. With 1e-9 Bricard's mechanism has no degree of freedom at inaccu
 MAX_STEPS = 200
 """Maximum number of steps from one start."""
 RESTARTS = 12
-"""Number of further starts, beside the guess."""
+"""Number of further starts after the guess."""
 MOTIONS = 6
 """Number of configurations at which the rank of the Jacobian is determined."""
 
@@ -47,7 +47,7 @@ MOTIONS = 6
 class Mobility:
     """The degrees of freedom of a robot with constraints.
 
-    ``degrees_of_freedom``: n minus the number of independent relations, at configurations in general.
+    ``degrees_of_freedom``: n minus the number of independent relations, at a generic configuration.
     ``instantaneous``: the same at the given configuration; it is larger at a singular configuration.
     ``independent``: the indices of a largest set of independent relations, in the order of the constraints.
     ``redundant``: the constraints of the other relations, by name, once for each relation.
@@ -60,12 +60,12 @@ class Mobility:
 
     @property
     def singular(self) -> bool:
-        """Whether the mechanism can move in more directions here than at other configurations."""
+        """Whether the mechanism has more degrees of freedom here than at a generic configuration."""
         return self.instantaneous > self.degrees_of_freedom
 
 
 class Mechanism:
-    """The constraints of a robot as functions of numbers."""
+    """Numerical functions of the constraints of a robot: residuals, Jacobian, assembly, mobility."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
@@ -100,14 +100,14 @@ class Mechanism:
         return np.asarray(self._evaluate(q)[1].full())
 
     def moved(self, q: Array, step: Array) -> Array:
-        """The coordinates after ``step`` (n,), a speed over unit time."""
+        """The coordinates after a motion with the speeds ``step`` (n,) for unit time."""
         return np.asarray(self._move(q, step).full())[:, 0]
 
     def assembled(self, guess: Array, locked: Sequence[str] = ()) -> Array:
         """Coordinates near ``guess`` that satisfy the constraints; the ``locked`` joints keep theirs.
 
-        Levenberg-Marquardt steps with the exact Jacobian; further starts near the guess if they end elsewhere
-        than at a solution. Raises AssemblyError with the constraint that has the largest gap, and
+        Levenberg-Marquardt method with the exact Jacobian. If it does not converge to a solution, it starts
+        again near the guess. Raises AssemblyError with the constraint that has the largest gap, and
         UnknownNameError for an unknown joint.
         """
         free = self._free_speeds(locked)
@@ -214,7 +214,7 @@ class Mechanism:
         return [k for k, name in enumerate(owners) if name not in locked]
 
     def _descend(self, q: Array, free: list[int]) -> Array:
-        """The end of Levenberg-Marquardt steps from ``q``."""
+        """The coordinates at which the Levenberg-Marquardt method ends if it starts at ``q``."""
         residuals = self.residuals(q)
         size, damping = float(residuals @ residuals), 1e-3
         for _ in range(MAX_STEPS):
@@ -224,7 +224,7 @@ class Mechanism:
             largest = float(s.max(initial=0.0))
             if largest == 0.0:
                 break
-            # Directions that rounding alone constrains are left out of the nearly undamped last steps.
+            # Directions whose singular values are rounding errors are left out: the last steps are undamped.
             gains = np.where(
                 s > 1e-11 * largest, s / (s * s + damping * largest * largest * min(1.0, size)), 0.0
             )
@@ -274,7 +274,7 @@ class Mechanism:
 
 @lru_cache(maxsize=32)
 def mechanism(robot: Robot) -> Mechanism:
-    """The numerical functions of a robot's constraints; the last robots are cached."""
+    """The numerical functions of a robot's constraints; those of the last 32 robots are cached."""
     return Mechanism(robot)
 
 
@@ -293,8 +293,8 @@ def _rank(J: Array) -> int:
 def _independent_rows(jacobians: Sequence[Array], rank: int) -> list[int]:
     """``rank`` rows that are independent in all Jacobians.
 
-    Gram-Schmidt orthogonalisation with row exchange: the next row is the one with the largest smallest
-    remainder over all Jacobians.
+    Gram-Schmidt orthogonalisation with row exchange. Each row has a remainder in every Jacobian; the next row
+    is the one whose smallest remainder is largest.
     """
     remainders = [J.copy() for J in jacobians]
     scale = [max(float(np.linalg.norm(row)) for row in J) if len(J) else 1.0 for J in jacobians]
@@ -302,7 +302,7 @@ def _independent_rows(jacobians: Sequence[Array], rank: int) -> list[int]:
     for _ in range(rank):
         lengths = np.min([np.linalg.norm(R, axis=1) / s for R, s in zip(remainders, scale)], axis=0)
         lengths[chosen] = -1.0
-        # Of nearly equal rows the first one is taken, so that rounding does not decide.
+        # Of nearly equal rows the first one is taken, so that rounding errors do not change the choice.
         best = int(np.argmax(lengths > 0.9 * lengths.max()))
         chosen.append(best)
         for remainder in remainders:

@@ -51,7 +51,7 @@ def coordinate_map(links: Sequence[Link], couplings: Sequence[Coupling], where: 
             f"two couplings determine joint '{twice}'",
             where=where,
             allowed="each joint is the first term of one coupling at most",
-            fix="put the joint that shall depend on the others first",
+            fix="put the joint first that depends on the others",
         )
     combinations = {link.name: _combination(link.name, dependent, (), where) for link in links}
     independent = [link for link in links if link.name not in dependent]

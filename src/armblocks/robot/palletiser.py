@@ -1,4 +1,4 @@
-"""Palletising arms with four axes, whose flange parallel rods keep level."""
+"""Palletising arms with four axes. Parallel rods keep their flange level."""
 
 from __future__ import annotations
 

@@ -31,8 +31,8 @@ class Robot(metaclass=ArgumentErrors):
     ``base`` pose of the base frame in the world; ``tool`` pose of the tool in the frame of the tip, which is
     the last link; both accept a (4, 4) matrix. ``gravity`` m/s2 in the world frame, the acceleration
     of a falling body (toolbox files have the opposite sign); ``friction_model`` see :class:`FrictionModel`.
-    ``constraints``: relations between the links beside the tree of joints, such as the closures of loops and
-    the couplings of joints. The joint coordinates q (nq,) and speeds qd (nv,) are in the order of the moving
+    ``constraints``: equations in addition to the joints of the tree, such as the closures of loops and the
+    couplings of joints. The joint coordinates q (nq,) and speeds qd (nv,) are in the order of the moving
     links. A joint has the name of its link.
 
     Robots are values: two robots are equal and have the same hash if all their numbers and names are equal.

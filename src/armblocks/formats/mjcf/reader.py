@@ -88,7 +88,7 @@ class _Place:
 
 @dataclass(kw_only=True)
 class _Contents:
-    """The elements of one body, those in its frames included, each with the pose of its frame in the body."""
+    """The elements of one body, including those in its frames, with the pose of their frame in the body."""
 
     joints: list[tuple[Element, Transform]] = field(default_factory=list[tuple[Element, Transform]])
     geoms: list[Geom] = field(default_factory=list[Geom])

@@ -12,7 +12,7 @@ STIFFNESS = Rule(
 EQUALITY = Rule(
     code="mjcf-equality",
     allowed="joints that move independently, in a tree",
-    remedy="satisfy the constraint by the joint coordinates and torques that are given",
+    remedy="choose joint coordinates and torques that satisfy the constraint",
 )
 TENDON = Rule(
     code="mjcf-tendon",
@@ -47,7 +47,7 @@ SHAPE = Rule(
 UNREAD = Rule(
     code="mjcf-not-read",
     allowed="a tree of bodies",
-    remedy="write the part out as bodies",
+    remedy="describe the part by bodies",
 )
 NAME = Rule(
     code="mjcf-name",

@@ -65,8 +65,8 @@ def write_mjcf(robot: Robot) -> bytes:
     """The MJCF of a robot. Reading it gives the same kinematics and dynamics up to rounding.
 
     Raises ``FormatError`` for robots with constraints and for joint types that MJCF does not have, and for
-    chains of more bodies than XML files may be deep. Warns of data that MJCF does not have: gear ratios
-    (rotor inertia and friction are written at the joint), speed limits, the tip and the order of the
+    chains of bodies that exceed the maximum depth of XML files. Warns of data that MJCF does not have: gear
+    ratios (rotor inertia and friction are written at the joint), speed limits, the tip and the order of the
     coordinates of some trees, Coulomb friction that depends on the direction, friction that accelerates,
     housings. MuJoCo does not accept moving bodies without mass or with physically impossible inertias; they
     are written as they are.
@@ -96,7 +96,7 @@ def write_mjcf(robot: Robot) -> bytes:
 
 
 def _is_changed(name: str) -> bool:
-    """Whether the reader would not give a body this name."""
+    """Whether the reader would give a body with this name another one."""
     return name == "world" or name != name.strip() or len(name) > MAX_NAME
 
 

@@ -36,7 +36,7 @@ def _unit_axis(element: Element) -> Iterator[Edit]:
 
 
 def _ordered_limits(limit: Element) -> Iterator[Edit]:
-    """Reversed limits are exchanged; limits of zero, with which nothing moves, are removed."""
+    """Reversed limits are exchanged. Limits of zero, which would lock the joint, are removed."""
     lower, upper = limit.first("lower"), limit.first("upper")
     if lower is not None and upper is not None and float(lower.text) > float(upper.text):
         low, high = lower.text, upper.text

@@ -64,8 +64,8 @@ class Scope:
     """The names inside a model or a world.
 
     ``frame``: that of the model or world. ``fixed``: the model is static, or a part of a static model.
-    ``prefix``: that of the full names. ``canonical``: the name of the link to which the frame of the model is
-    attached.
+    ``prefix``: the beginning of the full names. ``canonical``: the name of the link to which the frame of the
+    model is attached.
     """
 
     prefix: str = ""
@@ -200,7 +200,7 @@ class Frames:
     def _chains(self, a: Frame, b: Frame) -> tuple[list[Frame], list[Frame]]:
         """The frames from a and from b to the first frame that both are relative to, without that one.
 
-        Both chains grow in turns, so that the effort depends on the distance of the frames only.
+        Both chains are extended in turns, so that the effort depends only on the distance of the frames.
         """
         chains: tuple[dict[Frame, None], dict[Frame, None]] = ({a: None}, {b: None})
         ends = [a, b]

@@ -27,7 +27,7 @@ GEARBOX = "gearbox"
 UNIT_LENGTH = 1e-3
 """Maximum deviation of an axis's length from 1 without a finding."""
 UNLIMITED = 1e9
-"""Limits of this size are no limits: older versions have the default 1e16."""
+"""A limit of this size means no limit: older versions have the default 1e16."""
 
 
 def joint_type_of(joint: Frame) -> str:
@@ -47,7 +47,7 @@ def joints_of(joint: Frame, frames: Frames, reverse: bool) -> list[tuple[Joint, 
 
     Each axis has its own limits and friction. The axes are in the frame of the joint. ``reverse``: the result
     describes the motion of the parent relative to the child: the order is reversed, and the axes are negated,
-    so that the coordinates remain. The quaternion of a ball joint is then the inverse one.
+    so that the coordinates keep their values. The quaternion of a ball joint is then the inverse one.
     """
     kind = joint_type_of(joint)
     if kind == "ball":

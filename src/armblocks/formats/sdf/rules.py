@@ -27,7 +27,7 @@ SPRING = Rule(
 COUPLING = Rule(
     code="sdf-coupling",
     allowed="joints that move independently: neither <mimic> nor gearboxes",
-    remedy="give the coordinates the values of the coupling",
+    remedy="compute the coupled coordinates from the others",
 )
 NO_INERTIA = Rule(
     code="sdf-inertia-default",
@@ -36,13 +36,13 @@ NO_INERTIA = Rule(
 )
 AUTO_INERTIA = Rule(
     code="sdf-inertia-auto",
-    allowed="inertias with numbers",
-    remedy="write the mass and the inertia that the shapes have",
+    allowed="inertias given as numbers",
+    remedy="write the mass and the inertia of the shapes",
 )
 GRAVITY = Rule(
     code="sdf-gravity",
     allowed="links with gravity",
-    remedy="balance the weight of the link in the model",
+    remedy="add the torques that balance the weight of the link",
 )
 FREE_LINK = Rule(
     code="sdf-free-link",

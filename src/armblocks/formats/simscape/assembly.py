@@ -1,7 +1,8 @@
-"""An assembly of parts that welds, revolute and prismatic joints connect, and the robot that it is.
+"""Assemblies of parts with welds, revolute and prismatic joints, and their conversion to robots.
 
-Parts that welds connect form a group. Every group moves as one body: its first part is a link with the joint,
-the other parts are links that are fixed to it. The groups must form a tree whose root is the ground.
+Parts that are connected by welds form a group. Every group moves as one body: its first part is a link with
+the joint, the other parts are links that are fixed to it. The groups must form a tree whose root is the
+ground.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ class Connection(NamedTuple):
 class Assembly:
     """``parts`` by node. A node that is no part is a frame, such as that of a subassembly.
 
-    ``loose``: the poses of nodes that nothing may connect; ``where``: the place of the assembly in the file.
+    ``loose``: the poses of nodes that may be unconnected; ``where``: the place of the assembly in the file.
     """
 
     name: str
@@ -138,7 +139,7 @@ class _Tree:
         for node in [*(node for node in nodes if node not in followers), *nodes]:
             if node not in self._reached:
                 pose = self._assembly.poses.get(node, Transform())
-                what = "nothing connects it with the ground; it is fixed to the base"
+                what = "it is not connected with the ground; it is fixed to the base"
                 part = self._assembly.parts[node]
                 self._context.findings.append(
                     FileFinding(

@@ -3,7 +3,7 @@
 The file has a tree of instances of parts and subassemblies with poses, mass properties of parts, and joints
 or mates between instances. A joint has a frame on each of its two instances, and moves about or along the z
 axis of these frames; its coordinate is zero where the frames coincide. Mates are pairs of points, lines and
-planes; the joint that they leave has the coordinate zero in the assembled position.
+planes; the joint that remains has the coordinate zero in the assembled position.
 
 Numbers are in the units of ``<DataUnits>``. ``<Inertia>`` is ``Ixx Iyy Izz Iyz Izx Ixy`` about the centre of
 mass, along the axes of the part; the products are entries of the matrix. ``<Rotation>`` is a matrix by rows.
@@ -315,7 +315,7 @@ class _Reader:
             yield found
 
     def _mated(self, assembly: Assembly) -> list[Connection]:
-        """The connections that the mates leave between groups of welded nodes."""
+        """The joints that remain between groups of welded nodes under all mates."""
         poses = {GROUND: Transform(), **assembly.poses}
         groups = _Groups([c for c in assembly.connections if c.kind is Kind.WELD])
         found: list[Connection] = []

@@ -105,9 +105,10 @@ def _translations(point: _Array, directions: _Array) -> _Array:
 
 
 class Motion(NamedTuple):
-    """The motion that mates leave: ``freedoms``; if there is one, its kind, a point of its axis and the axis.
+    """The motion that remains under mates: the number ``freedoms`` of its degrees of freedom.
 
-    ``kind`` is ``None`` for a screw and for other degrees of freedom than 0 and 1.
+    ``kind``, a ``position`` on the axis, and ``axis`` describe a motion with one degree of freedom. ``kind``
+    is ``None`` for a screw and for other degrees of freedom than 0 and 1.
     """
 
     freedoms: int

@@ -10,10 +10,10 @@ from armblocks.robot import Robot
 
 
 def read_import_xml(data: bytes, file: str, context: FileContext) -> Robot:
-    """The robot of an import XML file. Raises ``FormatError`` for what cannot be read, and for loops."""
+    """The robot of an import XML file. Raises ``FormatError`` for invalid content and closed loops."""
     return robot_of(read_assembly(data, file, context), file, context)
 
 
 def read_smi_data(data: bytes, file: str, context: FileContext) -> Robot:
-    """The robot of a data file. Raises ``FormatError`` for what cannot be read, and for loops."""
+    """The robot of a data file. Raises ``FormatError`` for invalid content and closed loops."""
     return robot_of(read_data_file(data, file, context), file, context)

@@ -19,7 +19,7 @@ FREE = Rule(
 )
 FRAMES = Rule(
     code="simscape-frames",
-    allowed="joints whose two frames agree in the assembled position, but for the motion of the joint",
+    allowed="joints whose two frames agree in the assembled position, except for the motion of the joint",
     remedy="rebuild the assembly in the CAD program and export it again",
 )
 MASS = Rule(

@@ -31,7 +31,7 @@ def _unit_axis(axis: Element, _: XmlFile) -> Iterator[Edit]:
 
 
 def _ordered_limits(limit: Element, _: XmlFile) -> Iterator[Edit]:
-    """Reversed limits are exchanged; limits of zero, with which nothing moves, become those without limit."""
+    """Reversed limits are exchanged. Limits of zero, which would lock the joint, become infinite."""
     low, high = (limit.attributes.get(name, "0") for name in ("lower", "upper"))
     if limit.number("lower", 0.0) > limit.number("upper", 0.0):
         what = f"limits exchanged: from {high} to {low}"

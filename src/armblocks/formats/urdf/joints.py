@@ -40,7 +40,7 @@ _SINGLE = ("revolute", "continuous", "prismatic")
 UNIT_LENGTH = 1e-3
 """Maximum deviation of an axis's length from 1 without a finding."""
 UNLIMITED = 1e9
-"""Limits of this size are no limits: the writer uses them where other programs require a number."""
+"""A limit of this size means no limit. The writer uses it because other programs require a number."""
 _INFINITE = {"inf", "+inf", "-inf", "infinity", "+infinity", "-infinity"}
 
 

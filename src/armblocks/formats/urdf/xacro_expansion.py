@@ -16,7 +16,7 @@ from armblocks.formats.xml_elements import Element, read_elements
 SECONDS = 5.0
 """Maximum processor time of an expansion."""
 _PATIENCE = 8.0
-"""Maximum duration of an expansion, as a multiple: other programs may need the processor."""
+"""Maximum duration of an expansion, as a multiple of that time, because other programs run as well."""
 _SIGNALS = (-9, -24)
 """Return codes of a process that the limit of processor time has ended: SIGKILL, SIGXCPU."""
 
@@ -62,7 +62,7 @@ def expanded(data: bytes, file: str, context: FileContext) -> Element:
             timeout=_PATIENCE * SECONDS,
             env={**os.environ, "PYTHONPATH": path, "PYTHONIOENCODING": "utf-8"},
         )
-        reply = json.loads(completed.stdout or json.dumps({"error": _silent_end(completed.returncode)}))
+        reply = json.loads(completed.stdout or json.dumps({"error": _exit_reason(completed.returncode)}))
     except subprocess.TimeoutExpired:
         reply = {"error": f"the expansion takes more than {_PATIENCE * SECONDS:g} s"}
     if "text" not in reply:
@@ -75,7 +75,7 @@ def expanded(data: bytes, file: str, context: FileContext) -> Element:
     return read_elements(reply["text"].encode(), f"{file} (expanded)")
 
 
-def _silent_end(code: int) -> str:
+def _exit_reason(code: int) -> str:
     if code in _SIGNALS:
         return f"the expansion takes more than {SECONDS:g} s of processor time"
     return "the expansion ended without a result"

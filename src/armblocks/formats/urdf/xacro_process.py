@@ -175,7 +175,7 @@ def main() -> None:
     try:
         reply = {"text": expanded(request)}
     except RecursionError:
-        reply = {"error": "macros call each other without an end"}
+        reply = {"error": "macros call each other without end"}
     except MemoryError:
         reply = {"error": "the expansion needs too much memory"}
     except Exception as error:  # xacro raises errors of many types

@@ -1,4 +1,4 @@
-"""The base classes of constraints: relations between links beside those of the joints of the tree."""
+"""The base classes of constraints: equations in addition to the joints of the tree."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Attachment(metaclass=ArgumentErrors):
 
 @dataclass(frozen=True, kw_only=True)
 class Constraint(ABC, metaclass=ArgumentErrors):
-    """Equations that the coordinates of a robot satisfy at all times, beside the tree of its joints.
+    """Equations that the coordinates of a robot satisfy at all times, in addition to the joints of its tree.
 
     ``name`` is unique in the robot.
     """
@@ -52,7 +52,7 @@ class Constraint(ABC, metaclass=ArgumentErrors):
 
     @abstractmethod
     def with_renamed_link(self, old: str, new: str) -> Self:
-        """The constraint after a link, and with it its joint, has got another name."""
+        """The constraint with the new name of a link; the joint of the link has the same name."""
 
     @property
     def links(self) -> tuple[str | None, ...]:

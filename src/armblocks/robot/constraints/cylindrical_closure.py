@@ -13,7 +13,7 @@ from armblocks.robot.constraints.relations import Z_AXES_PARALLEL, NoDisplacemen
 class CylindricalClosure(Closure):
     """A cylindrical joint that closes a loop.
 
-    The frames have the same z axis as a line; they rotate about it and slide along it.
+    The z axes of the frames are on one line. The frames rotate about this line and slide along it.
     """
 
     title: ClassVar[str] = "cylindrical"

@@ -1,7 +1,7 @@
 """The elementary relations of which the closures of loops are composed.
 
-A closure is a sequence of them. The algorithms of :mod:`armblocks.dynamics` know only these three; a type of
-closure is therefore described by its sequence alone. ``a`` is the first frame of a closure and ``b`` the
+A closure is a sequence of them. The algorithms of :mod:`armblocks.dynamics` use these three relations only,
+so the sequence describes a type of closure completely. ``a`` is the first frame of a closure and ``b`` the
 second one; both have the axes x, y, z with the indices 0, 1, 2.
 """
 
@@ -29,7 +29,7 @@ class Perpendicular:
 class Distance:
     """The origins of a and b have a distance ``length`` (m).
 
-    The residual is (d² - length²) / (2 length) in m, which has no kink.
+    The residual is (d² - length²) / (2 length) in m, which is differentiable everywhere.
     """
 
     length: float

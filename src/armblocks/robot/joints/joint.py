@@ -24,8 +24,8 @@ class Joint(ABC, metaclass=ArgumentErrors):
     Its coordinates q (nq,) are those of its motions, one after the other, and its speeds qd (nv,) as well.
 
     ``axis``: the axis of its motion in the joint frame, a unit vector; it is normalised here, and the robot
-    rejects a zero axis. ``offset`` (rad or m) is added to the coordinate. ``limits``: those of every
-    coordinate, or a sequence with one entry for each entry of qd. A type has the parameters that
+    rejects a zero axis. ``offset`` (rad or m) is added to the coordinate. ``limits``: one value for all
+    coordinates, or a sequence with one entry for each entry of qd. A type has the parameters that
     ``parameters`` lists; the others must keep their defaults. Raises RobotError.
     """
 
@@ -36,7 +36,7 @@ class Joint(ABC, metaclass=ArgumentErrors):
     letter: ClassVar[str] = ""
     """The letter of the type, as in the toolbox's ``RRRRRR``."""
     parameters: ClassVar[tuple[str, ...]] = ("axis", "offset")
-    """The parameters of the type beside the limits, which are also its members in files."""
+    """The parameters of the type, without the limits. Files have members of the same names."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", unit_axis(self.axis))
@@ -63,7 +63,7 @@ class Joint(ABC, metaclass=ArgumentErrors):
                     f"{counted(len(entries), 'limit is', 'limits are')} given",
                     where="limits of a joint",
                     allowed=f"{self.nv} for a {type(self).__name__} joint, or one for all coordinates",
-                    fix="give JointLimits(), where nothing is known",
+                    fix="give JointLimits() where nothing is known",
                 )
             object.__setattr__(self, "limits", entries[0] if len(set(entries)) == 1 else tuple(entries))
         axes = [isinstance(motion, AxisMotion) for motion in self.motions for _ in motion.speeds]

@@ -1,7 +1,7 @@
 """The elementary motions of which the motions of all joints are composed.
 
-A joint is a sequence of them, from its parent to its link. The algorithms of :mod:`armblocks.dynamics` know
-only these two; a joint type is therefore described by its sequence alone.
+A joint is a sequence of them, from its parent to its link. The algorithms of :mod:`armblocks.dynamics` use
+these two motions only, so the sequence describes a joint type completely.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ class Universal(Joint):
     """Two rotations about axes that intersect: by q[0] rad about ``axis``, which is fixed to the parent, then
     by q[1] rad about ``second_axis``, which is fixed to the link.
 
-    Both axes are in the joint frame at q = 0; they are usually perpendicular (Cardan joint).
+    Both axes are given in the joint frame at q = 0; they are usually perpendicular (Cardan joint).
     """
 
     axis: Vector3 = (1.0, 0.0, 0.0)
