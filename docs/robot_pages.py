@@ -35,7 +35,8 @@ INTRODUCTION = """
 parameters of this robot with its sources. The robot editor of `armblocks studio` shows robots and edits
 copies.
 
-Lengths and ranges are facts from publications; each page names the sources. Most arms were compared with a
+Lengths and ranges are facts from publications; each page names the sources and their licence. If only facts
+are used, no text, drawing or program of the source was copied. Most arms were compared with a
 second source that shares no code with the first. The bodies are drawn from the kinematics and are not the
 shapes of the real arms. Masses, centres of mass and inertias are those of a publication or of the
 manufacturer, or computed from CAD models by the authors of a package. Where there are none, they are

@@ -68,7 +68,7 @@ class Arm:
     reach: float | None = None
     sources: tuple[str, ...]
     checked: str = ""
-    licence: str = "AGPL (program); facts"
+    licence: str = "AGPL (program); only facts are used"
     note: str
 
     @property
@@ -107,8 +107,8 @@ class Arm:
             f"The pins of the linkages are not published: lever {LEVER:g}, level rods {TRIANGLE:g} of the "
             f"upper arm. {self.payload_note} Masses are estimated, not measured: those of the KUKA KR 180 of "
             "the paper, in proportion to payload and length (armblocks.robot.palletiser.Masses; two digits), "
-            "in beams of square section. A factor of two is possible. The counterbalance spring is not "
-            "modelled. No friction and no motor data."
+            "in beams of square section. Real values may differ by a factor of two. The counterbalance "
+            "spring is not modelled. No friction and no motor data."
         )
 
     @property
@@ -232,7 +232,7 @@ ARMS = {
             "(360, 144, 136, 720 deg)",
         ),
         checked="envelope of the data sheet",
-        licence="facts; no file is copied",
+        licence="only facts are used; no file is copied",
         note=FANUC_NOTE,
     ),
 }

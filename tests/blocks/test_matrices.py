@@ -85,7 +85,7 @@ def test_matrices_of_unsuitable_shape_are_refused() -> None:
     A = np.ones((2, 3))
     with pytest.raises(DiagramError, match=r"the matrix has shape \(2, 3\).*Allowed: a square matrix"):
         evaluate(MatrixInverse(), A)
-    with pytest.raises(DiagramError, match=r"the matrix has shape \(2, 2\) and the right side \(3,\)"):
+    with pytest.raises(DiagramError, match=r"the matrix has shape \(2, 2\) and the right-hand side \(3,\)"):
         evaluate(LinearSolve(), np.eye(2), [1.0, 2.0, 3.0])
     with pytest.raises(DiagramError, match=r"6 elements cannot form a matrix with 4 rows"):
         evaluate(Reshape(output="matrix", rows=4), A)

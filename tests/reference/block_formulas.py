@@ -193,7 +193,7 @@ def contradictions(
     Inputs are near if they differ by at most ``SWITCHING_TOLERANCE``.
     """
     rank = y.ndim
-    wide = {name: _spread(value, rank) for name, value in inputs.items()}
+    wide = {name: _broadcastable(value, rank) for name, value in inputs.items()}
     t = t.reshape((-1,) + (1,) * (rank - 1))
     size = 1.0 + np.abs(y) + sum(np.abs(v).max(initial=0.0) for v in wide.values())
 
@@ -234,6 +234,6 @@ def _has_rounding_error(value: np.ndarray) -> np.ndarray:
     return (error > 0.0) & (error < 1e-12)
 
 
-def _spread(value: np.ndarray, rank: int) -> np.ndarray:
+def _broadcastable(value: np.ndarray, rank: int) -> np.ndarray:
     """Reshape (N,) to (N, 1, …), so that a scalar is broadcast to every element."""
     return value.reshape(value.shape + (1,) * (rank - value.ndim)) if value.ndim < rank else value

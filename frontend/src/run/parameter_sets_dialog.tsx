@@ -99,7 +99,7 @@ function SaveForm({ table }: { table: ParameterSetTable }) {
           onChange={(event) => setComplete(event.currentTarget.checked)}
           label={
             `Also the model’s ${otherValues} ` +
-            'of the sets below, so that the order in which sets are put into the model does not matter'
+            'of the sets below, so that the order in which sets are applied to the model does not matter'
           }
         />
       )}

@@ -98,7 +98,7 @@ def _diagonals(h: Array) -> tuple[Array, Array, Array]:
 
 
 def _right_side(h: Array, quotients: Array) -> Array:
-    """The right side ``(n, …)`` of the system, from the difference quotients ``(n - 1, …)``."""
+    """The right-hand side ``(n, …)`` of the system, from the difference quotients ``(n - 1, …)``."""
     n = len(h) + 1
     right = np.empty((n, *quotients.shape[1:]))
     before, after = (part.reshape(-1, *[1] * (quotients.ndim - 1)) for part in (h[:-1], h[1:]))

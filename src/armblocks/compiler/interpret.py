@@ -100,7 +100,7 @@ def _solve(values: Sequence[Values], n: int, *, fused: bool) -> Values:
         return multiply_add(-a, *np.broadcast_arrays(b, c)) if fused else c - a * b
 
     weights = 1.0 / np.max(np.where(np.isnan(matrix), 0.0, np.abs(matrix)), axis=-1)
-    # Each exchange concerns the rows of the factors and of the matrix, the weight and the right side.
+    # Each exchange concerns the rows of the factors and of the matrix, the weight and the right-hand side.
     rows = np.concatenate([matrix, matrix, weights[..., None], right[..., None]], axis=-1)
     for k in range(n):
         for i in range(k + 1, n):

@@ -91,7 +91,7 @@ def _blocks(tape: Tape, operands: Sequence[int]) -> Iterator[tuple[int, int]]:
 
 
 class _Solver:
-    """Emits the function; its memory ``m`` has the matrix, right side, solution, then work space."""
+    """Emits the function; its memory ``m`` has the matrix, right-hand side, solution, then work space."""
 
     def __init__(self, n: int, m: LaneArray) -> None:
         self.n = n
@@ -160,7 +160,7 @@ class _Solver:
             self.factors.subtract_from_row(r, i, factor, k)
 
     def substitute(self, r: Routine) -> None:
-        """Replace the right side in ``work`` by the solution."""
+        """Replace the right-hand side in ``work`` by the solution."""
         factors = self.factors
         factors.substitute(r, self.work, lambda value, i: value / factors.numbers[factors.index(i, i)])
 

@@ -80,10 +80,10 @@ class FactoredInertia:
             for i in self._ancestors[k]:
                 H[k][i] = factors[i]
 
-    def solve(self, right: Sequence[Scalar]) -> list[SX]:
-        """``x`` with ``M x = right``, both in the order of the bodies."""
-        n = len(right)
-        x = [SX(entry) for entry in right]
+    def solve(self, b: Sequence[Scalar]) -> list[SX]:
+        """``x`` with ``M x = b``, both in the order of the bodies."""
+        n = len(b)
+        x = [SX(entry) for entry in b]
         for k in reversed(range(n)):
             for i in self._ancestors[k]:
                 x[i] = x[i] - self._factors[k][i] * x[k]

@@ -104,7 +104,7 @@ class Mechanism:
         return np.asarray(self._move(q, step).full())[:, 0]
 
     def assembled(self, guess: Array, locked: Sequence[str] = ()) -> Array:
-        """Coordinates near ``guess`` that satisfy the constraints; the ``locked`` joints keep theirs.
+        """Coordinates near ``guess`` that satisfy the constraints; the ``locked`` joints do not move.
 
         Levenberg-Marquardt method with the exact Jacobian. If it does not converge to a solution, it starts
         again near the guess. Raises AssemblyError with the constraint that has the largest gap, and

@@ -4,7 +4,7 @@ The member ``facts`` of ``robot.json`` contains them::
 
     "facts": {
       "checked": "the table of another publication",
-      "licence": "facts; BSD-3-Clause (package)",
+      "licence": "BSD-3-Clause (package); only facts are used",
       "masses": "published",
       "payload": 3,
       "reach": 0.855,

@@ -60,7 +60,7 @@ class LinearEquationsLayout:
 
 
 class LinearEquations:
-    """The functions of a program that factor the matrix of a step and solve for its right sides.
+    """The functions of a program that factor the matrix of a step and solve for its right-hand sides.
 
     ``gamma`` is the coefficient of the method. :attr:`factor` is the cheapest elimination,
     :attr:`factor_dense` the elimination with pivoting.
@@ -146,7 +146,7 @@ class _Dense:
         self.elimination(scratch).factor(r)
 
     def solve_linear(self, r: Routine, scratch: Reals) -> None:
-        """Solve for the right side in ``scratch`` with the latest factors."""
+        """Solve for the right-hand side in ``scratch`` with the latest factors."""
         layout = self.layout
         if self.solve_sparse is not None:
             with r.unless(scratch.integers[layout.dense] != 0):

@@ -61,8 +61,8 @@ class PivotedElimination:
                 self.full.subtract_from_row(r, i, factor, k)
 
     def solve(self, r: Routine, y: Reals) -> None:
-        """Replace the right side ``y`` by the solution."""
-        # Whole rows were exchanged, also in L, so the right side is permuted before the substitution.
+        """Replace the right-hand side ``y`` by the solution."""
+        # Whole rows were exchanged, also in L, so the right-hand side is permuted before the substitution.
         for k in r.range(0, self.size):
             row = self.swaps[k]
             a, b = y[k], y[row]

@@ -2,7 +2,7 @@
 
 The eliminations differ in pivot selection and storage: :mod:`armblocks.compiler.linear_solution` weighs rows
 and exchanges them lane by lane, :mod:`armblocks.integration.pivoted_elimination` factors one matrix for many
-right sides.
+right-hand sides.
 """
 
 from __future__ import annotations

@@ -368,7 +368,7 @@ class _FunctionText:
         if operation is Operation.ANY:
             return self._any(texts[0])
         if operation is Operation.SPREAD:
-            return self._spread(texts[0])
+            return self._in_all_lanes(texts[0])
         if operation is Operation.FMA:
             return self._fma(kind, texts)
         if operation in _INTRINSICS:
@@ -382,7 +382,7 @@ class _FunctionText:
         table = _OF_TWO[_OF_EACH_LANE.get(kind, kind)]
         return f"{table[operation]} {self._type(kind)} {texts[0]}, {texts[1]}"
 
-    def _spread(self, number: str) -> str:
+    def _in_all_lanes(self, number: str) -> str:
         if self.lanes == 1:
             return f"bitcast double {number} to double"
         lanes = self._type(Kind.LANES)

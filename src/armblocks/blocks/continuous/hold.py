@@ -75,7 +75,10 @@ class FirstOrderHold(Block):
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         shape = self.output_shapes(inputs)["y"]
-        samples = (State("last", shape, "the last sample"), State("before", shape, "the sample before"))
+        samples = (
+            State("last", shape, "the last sample"),
+            State("before", shape, "the sample before the last one"),
+        )
         return (COUNT, WHEN, ODD, *samples)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:

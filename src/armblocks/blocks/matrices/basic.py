@@ -127,7 +127,7 @@ class LinearSolve(Block):
     )
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("A", "the matrix (n, n)"), Port("B", "the right side (n,) or (n, k)"))
+        return (Port("A", "the matrix (n, n)"), Port("B", "the right-hand side (n,) or (n, k)"))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the solution, of the shape of B"),)
@@ -136,7 +136,7 @@ class LinearSolve(Block):
         rows = (*inputs["B"], 1)[0]
         if _square(inputs["A"])[0] != rows:
             raise InputError(
-                f"the matrix has shape {inputs['A']} and the right side {inputs['B']}",
+                f"the matrix has shape {inputs['A']} and the right-hand side {inputs['B']}",
                 allowed="A (n, n) with B (n,) or (n, k)",
                 fix="change the width of one of the signals",
             )
@@ -297,7 +297,9 @@ class MatrixConcatenate(Block):
 
     inputs: int = parameter(2, minimum=1, doc="number of inputs")
     direction: str = parameter(
-        "horizontal", choices=("horizontal", "vertical"), doc="horizontal (beside) or vertical (under)"
+        "horizontal",
+        choices=("horizontal", "vertical"),
+        doc="side by side (horizontal) or one below the other (vertical)",
     )
 
     def input_ports(self) -> tuple[Port, ...]:

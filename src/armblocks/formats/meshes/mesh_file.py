@@ -62,7 +62,7 @@ def mesh_corners(data: bytes, name: str, scale: ArrayLike = (1.0, 1.0, 1.0)) -> 
 
 
 def scaled(corners: Corners, scale: NDArray[np.float64]) -> Corners:
-    """The triangles multiplied by ``scale`` along x, y, z; a mirror image keeps its outside outside."""
+    """The triangles multiplied by ``scale`` along x, y, z; a reflection reverses the corners."""
     return (corners * scale)[:, ::-1] if scale.prod() < 0 else corners * scale
 
 

@@ -57,7 +57,8 @@ def flag_in(parent: Element, tag: str) -> bool:
 
 
 class RelativePose(NamedTuple):
-    """``transform`` in the frame named ``relative_to``; an empty name is the default frame of the place."""
+    """``transform`` in the frame named ``relative_to``; an empty name means the default frame of the
+    element."""
 
     transform: Transform = Transform()
     relative_to: str = ""
