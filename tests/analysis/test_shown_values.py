@@ -1,4 +1,4 @@
-"""Displayed values near zero: rounding errors are shown as 0, true small values stay."""
+"""Displayed values near zero: rounding errors are shown as 0, small values are unchanged."""
 
 from __future__ import annotations
 
@@ -173,7 +173,8 @@ def test_entries_of_matrices_are_shown_as_zero_only_beside_larger_ones_in_any_un
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_transfer_function_is_printed_without_rounding_errors(seed: int) -> None:
-    """(s^2 + 4) / (s^2 (s + 1)) has exact coefficients; the small ones of 1 / (s + 1e-12)^2 stay."""
+    """(s^2 + 4) / (s^2 (s + 1)) has exact coefficients; the small ones of 1 / (s + 1e-12)^2 are not changed
+    to 0."""
     A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
     hidden, T = similar(A, np.random.default_rng(seed))
     system = LinearSystem(

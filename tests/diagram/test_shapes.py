@@ -75,7 +75,7 @@ def test_the_error_about_inconsistent_inputs_names_their_sources() -> None:
     builder.add("sum", Sum(), two, three)
     with pytest.raises(
         DiagramError,
-        match=r"block 'sum' \(Sum\), fed at 'u1' by 'two/y', 'u2' by 'three/y': "
+        match=r"block 'sum' \(Sum\), inputs 'u1' from 'two/y', 'u2' from 'three/y': "
         r"'u1' has shape \(2,\) and 'u2' has shape \(3,\)",
     ):
         builder.build()

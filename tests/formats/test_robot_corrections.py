@@ -81,7 +81,7 @@ def test_a_corrected_urdf_file_has_no_corrected_finding_and_the_same_poses(seed:
     assert_allclose(evaluate(again, "inertia", q), evaluate(robot, "inertia", q), rtol=1e-12, atol=1e-12)
     turning = np.array([entry.unit == "rad" for entry in again.positions])
     assert (np.nan_to_num(again.qlim[turning], posinf=0) <= 7).all()
-    # Everything else stays: comments, and the elements in their order.
+    # Everything else is unchanged: comments, and the order of the elements.
     text = copy.read_text(encoding="utf-8")
     assert text.count("<!-- axis -->") == path.read_text(encoding="utf-8").count("<!-- axis -->") > 0
     assert re.findall(r"<link name=\"(\w+)", text) == re.findall(

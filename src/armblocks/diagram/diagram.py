@@ -256,7 +256,7 @@ class Diagram(metaclass=ArgumentErrors):
             raise UnknownNameError("block", name, self.blocks, where=f"diagram '{self.name}'")
         return self.blocks[name]
 
-    def keep(self, name: str, compute: Callable[[], _Result]) -> _Result:
+    def cached(self, name: str, compute: Callable[[], _Result]) -> _Result:
         """The result of a pure function of this diagram, cached with the diagram under a name."""
         if name not in self._cache:
             self._cache[name] = compute()

@@ -25,7 +25,7 @@ def flatten_hierarchy(diagram: Diagram) -> FlatForm:
     Raises ``DiagramError`` for unconnected inputs, unmatched tags and bus elements, connections in a cycle
     without a block, and too deeply nested subsystems; ``where`` names the path.
     """
-    return diagram.keep("flat form", lambda: _flat_form(diagram))
+    return diagram.cached("flat form", lambda: _flat_form(diagram))
 
 
 def flat_diagram(diagram: Diagram) -> Diagram:

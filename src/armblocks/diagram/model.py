@@ -99,4 +99,4 @@ def sampling_of(diagram: Diagram) -> Sampling:
 
     Raises ``DiagramError`` for a diagram that cannot be traced.
     """
-    return diagram.keep("sampling", lambda: diagram_model(diagram).sampling)
+    return diagram.cached("sampling", lambda: diagram_model(diagram).sampling)

@@ -82,10 +82,12 @@ def _checked(form: FlatForm, known: Mapping[PortRef, Shape]) -> DiagramShapes:
             if complete:
                 block.output_shapes(input_shapes)
         except InputError as error:
-            fed = ", ".join(f"'{port}' by '{drivers[PortRef(name, port)]}'" for port in input_shapes)
+            drivers_text = ", ".join(
+                f"'{port}' from '{drivers[PortRef(name, port)]}'" for port in input_shapes
+            )
             raise DiagramError(
                 error.what,
-                where=f"block '{name}' ({block.title}), fed at {fed}",
+                where=f"block '{name}' ({block.title}), inputs {drivers_text}",
                 allowed=error.allowed,
                 fix=error.fix,
             ) from None

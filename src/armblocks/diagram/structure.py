@@ -242,7 +242,7 @@ def port_blocks(
 
 def block_count(diagram: Diagram) -> int:
     """The number of blocks of a diagram, including its subsystems."""
-    return diagram.keep(
+    return diagram.cached(
         "block count",
         lambda: sum(
             1 + (block_count(block.diagram) if isinstance(block, DiagramBlock) else 0)
@@ -264,7 +264,7 @@ def check_block_count(count: int, where: str) -> None:
 
 def inner_inputs(diagram: Diagram) -> tuple[Port, ...]:
     """The input ports of a subsystem, from its In blocks."""
-    return diagram.keep(
+    return diagram.cached(
         "inner inputs",
         lambda: tuple(
             Port(name, f"In block '{name}'", block.unit, declared_shape(block))
@@ -275,7 +275,7 @@ def inner_inputs(diagram: Diagram) -> tuple[Port, ...]:
 
 def inner_outputs(diagram: Diagram) -> tuple[Port, ...]:
     """The output ports of a subsystem, from its Out blocks."""
-    return diagram.keep(
+    return diagram.cached(
         "inner outputs",
         lambda: tuple(
             Port(name, f"Out block '{name}'", block.unit, declared_shape(block))

@@ -58,7 +58,7 @@ def arranged_layout(diagram: Diagram) -> dict[str, Placement]:
 def _boxes_from_layout(diagram: Diagram) -> Mapping[str, Box]:
     """The boxes of all blocks at their positions in the layout; the inputs of round sums are not adapted."""
     drawn = drawn_blocks(diagram)
-    return diagram.keep(
+    return diagram.cached(
         "placed boxes",
         lambda: {name: box_at_placement(name, block, diagram.layout[name]) for name, block in drawn.items()},
     )
@@ -66,7 +66,7 @@ def _boxes_from_layout(diagram: Diagram) -> Mapping[str, Box]:
 
 def drawn_blocks(diagram: Diagram) -> Mapping[str, Block]:
     """The blocks for drawing: In and Out blocks without a stated number show their actual number."""
-    return diagram.keep("drawn blocks", lambda: _numbered(diagram))
+    return diagram.cached("drawn blocks", lambda: _numbered(diagram))
 
 
 def _numbered(diagram: Diagram) -> dict[str, Block]:
@@ -94,7 +94,7 @@ def sum_with_sides(box: Box, sides: SumSides) -> Box:
 
 def sum_sides(diagram: Diagram) -> Mapping[str, SumSides]:
     """The rear, upper and lower inputs of each round sum whose ports follow its wires."""
-    return diagram.keep("sum sides", lambda: _sum_sides(diagram, _boxes_from_layout(diagram)))
+    return diagram.cached("sum sides", lambda: _sum_sides(diagram, _boxes_from_layout(diagram)))
 
 
 def _sum_sides(diagram: Diagram, placed_boxes: Mapping[str, Box]) -> dict[str, SumSides]:

@@ -51,19 +51,19 @@ def rotation_of(quaternion: Quaternion) -> Matrix:
 def axis_accelerations(tree: KinematicTree, qd: Sequence[Scalar], qdd: Sequence[Scalar]) -> Sequence[Scalar]:
     """The accelerations of the bodies' joints if each axis were fixed in the body before it, by ``speed``.
 
-    With ``w = wx x + wy y + wz z`` in axes that are fixed in the last body, the angular acceleration relative
-    to the base of the joint is ``w' + …`` without the cross products of the components that a series of
-    three axes has: ``wx x × wy y + (wx x + wy y) × wz z = (wy wz, -wx wz, wx wy)``.
+    The angular velocity is ``w = wx x + wy y + wz z`` in axes that are fixed in the last body, and the
+    angular acceleration is ``w'``. For a series of three axes the algorithms add the cross products
+    ``wx x × wy y + (wx x + wy y) × wz z = (wy wz, -wx wz, wx wy)``, which are therefore subtracted here.
     """
-    return _without(tree, qd, qdd, 1.0)
+    return _without_cross_products(tree, qd, qdd, 1.0)
 
 
 def speed_rates(tree: KinematicTree, qd: Sequence[Scalar], accelerations: Sequence[SX]) -> list[SX]:
     """``qdd`` from the accelerations of :func:`axis_accelerations`."""
-    return [SX(entry) for entry in _without(tree, qd, accelerations, -1.0)]
+    return [SX(entry) for entry in _without_cross_products(tree, qd, accelerations, -1.0)]
 
 
-def _without(
+def _without_cross_products(
     tree: KinematicTree, qd: Sequence[Scalar], accelerations: Sequence[Scalar], sign: float
 ) -> Sequence[Scalar]:
     balls = [body.speed for body in tree.bodies if body.ball == 0]

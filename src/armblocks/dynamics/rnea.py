@@ -86,12 +86,13 @@ def _body_motion(
     acceleration = joint.to_body(add(parent.acceleration, rotate(parent.U, joint.p)))
     spin, spin_acceleration = body.angular * qd[j], body.angular * qdd[j]
     if body.linear:
-        slide_speed, slide_acceleration = body.linear * qd[j], body.linear * qdd[j]
-        # 2 w x (slide_speed z) + slide_acceleration z; w without the joint's rotation, which is along z
+        linear_speed, linear_acceleration = body.linear * qd[j], body.linear * qdd[j]
+        # 2 w x (linear_speed z) + linear_acceleration z. The joint's own rotation is along z and adds
+        # nothing.
         acceleration = (
-            acceleration[0] + 2.0 * slide_speed * w[1],
-            acceleration[1] - 2.0 * slide_speed * w[0],
-            acceleration[2] + slide_acceleration,
+            acceleration[0] + 2.0 * linear_speed * w[1],
+            acceleration[1] - 2.0 * linear_speed * w[0],
+            acceleration[2] + linear_acceleration,
         )
     alpha = (alpha[0] + w[1] * spin, alpha[1] - w[0] * spin, alpha[2] + spin_acceleration)
     w = (w[0], w[1], w[2] + spin)

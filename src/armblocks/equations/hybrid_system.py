@@ -166,7 +166,7 @@ class HybridSystem:
     ranks: EventRanks | None = None
     """The order of events at one instant; ``None`` if all events are processed together."""
     tangents: tuple[int, int, int] | None = None
-    """With sensitivities: the indices in ``x``, in ``z`` and in the guards at which their part begins."""
+    """The first indices in ``x``, ``z`` and the guards that belong to derivatives, if there are any."""
     contradictions: TracedFunction | None = None
     """The function that is nonzero for inconsistent modes; ``None`` without modes."""
     delays: Delays | None = None

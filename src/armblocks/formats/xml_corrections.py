@@ -1,4 +1,4 @@
-"""Corrections of XML files as changes of their text: comments, spaces and all other elements stay."""
+"""Corrections of XML files as changes of their text: comments, spaces and all other elements are kept."""
 
 from __future__ import annotations
 

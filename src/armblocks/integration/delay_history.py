@@ -308,7 +308,8 @@ class DelayHistory:
             reals[target] = reals[target + shift]
         for k in range(self.count):
             first, last = self.first_rows(counts), self.last_rows(counts)
-            # ``first`` becomes 0 if its row was dropped. -1 in ``last`` means the newest row and stays.
+            # ``first`` becomes 0 if its row was dropped. -1 in ``last`` means the newest row and is not
+            # changed.
             for rows, unknown in ((first, 0), (last, last[k])):
                 shifted = rows[k] - dropped_rows
                 rows[k] = select(shifted >= 0, shifted, unknown)

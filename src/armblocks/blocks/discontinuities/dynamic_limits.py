@@ -53,7 +53,7 @@ class MovingLimits(Block):
 class SaturationDynamic(MovingLimits):
     """The input limited by two signals: y = min(max(u, lower), upper).
 
-    If ``lower`` exceeds ``upper``, y is ``upper`` where u > upper, and else ``lower`` where u < lower.
+    If ``lower`` exceeds ``upper``, y is ``upper`` where u > upper; otherwise it is ``lower`` where u < lower.
     """
 
     title: ClassVar[str] = "Saturation Dynamic"

@@ -109,8 +109,9 @@ class SampledPidBlock(Block):
 class DiscretePID(SampledPidBlock):
     """Sampled PID: y = limit(P u + i + N (D u - f)), i(k+1) = i + T I u, f(k+1) = f + T N (D u - f).
 
-    This is Simulink's Discrete PID Controller with forward Euler rules. The integral and the filter may each
-    use ``backward_euler`` or ``trapezoidal`` instead. While the output is limited, ``clamping`` stops the
+    u is the error, i the integral action and f the state of the derivative filter. This is Simulink's
+    Discrete PID Controller with forward Euler rules. The integral and the filter may each use
+    ``backward_euler`` or ``trapezoidal`` instead. While the output is limited, ``clamping`` stops the
     integral if it drives the output further beyond the limit. ``back_calculation`` adds T Kb (y - unlimited
     y) to the integral. ``tracking`` adds T Kt (tracking - y) to the integral. A reset happens at the first
     tick after the trigger has crossed zero.

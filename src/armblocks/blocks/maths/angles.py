@@ -159,7 +159,9 @@ class AngleDifference(Block):
         return (Port("y", "a - b, at least -pi and below pi", "rad"),)
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return quotient_modes(broadcast(inputs)) if self.zero_crossing else ()
+        if not self.zero_crossing:
+            return ()
+        return quotient_modes(broadcast(inputs), "the integer n in y = a - b - 2 pi n")
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         return quotient_guards(broadcast(inputs)) if self.zero_crossing else ()

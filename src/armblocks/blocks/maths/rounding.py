@@ -97,7 +97,9 @@ class Modulo(Block):
         return {"y": common_unit(inputs)}
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return quotient_modes(broadcast(inputs)) if self.zero_crossing else ()
+        if not self.zero_crossing:
+            return ()
+        return quotient_modes(broadcast(inputs), "the integer n in u - n v")
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         return quotient_guards(broadcast(inputs)) if self.zero_crossing else ()
@@ -150,9 +152,9 @@ def remainder_for_quotient(function: str, u: SX, v: SX, quotient: SX) -> SX:
     return if_else(quotient_of(function, u, v) == quotient, remainder(function, u, v), u - quotient * v)
 
 
-def quotient_modes(shape: Shape) -> tuple[State, ...]:
-    """The integer n of the remainder u - n v."""
-    return (State("turns", shape, "the integer n in u - n v"),)
+def quotient_modes(shape: Shape, doc: str) -> tuple[State, ...]:
+    """The mode of the integer n in a remainder u - n v; ``doc`` describes it."""
+    return (State("turns", shape, doc),)
 
 
 def quotient_guards(shape: Shape) -> tuple[Guard, ...]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from casadi import SX, floor, if_else
@@ -85,7 +85,7 @@ class JointSensor(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         q, qd = q_port(self.robot, "q_measured"), qd_port(self.robot, "qd_measured")
-        return q, qd
+        return replace(q, doc="measured joint coordinates"), replace(qd, doc="measured joint speeds")
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         return stream_states((2 * self.robot.n,))

@@ -87,12 +87,12 @@ def _across(axis: _Array) -> _Array:
 
 
 def _aligned(a: Geometry, b: Geometry) -> _Array:
-    """Both axes stay parallel: no rotation about directions across them."""
+    """The axes stay parallel: no rotation about directions perpendicular to them."""
     return np.hstack((np.zeros((2, 3)), _across(a.axis)))
 
 
 def _angle(a: Geometry, b: Geometry) -> _Array:
-    """The angle between two axes stays: no rotation about their common normal."""
+    """The angle between two axes is constant: no rotation about their common normal."""
     normal = np.cross(a.axis, b.axis)
     if np.linalg.norm(normal) < _TOLERANCE:  # at the angle 0 both axes stay parallel
         return _aligned(a, b)

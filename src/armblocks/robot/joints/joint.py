@@ -108,7 +108,8 @@ class Joint(ABC, metaclass=ArgumentErrors):
 
     @property
     def neutral(self) -> tuple[float, ...]:
-        """Zero for each coordinate, 1 0 0 0 for a quaternion: the pose ``motion(neutral)`` has no offset."""
+        """Zero for each coordinate, 1 0 0 0 for a quaternion; ``motion(neutral)`` is the motion by the
+        offset."""
         return tuple(value for motion in self.motions for value in motion.neutral)
 
     @property
