@@ -105,7 +105,7 @@ def test_an_algebraic_loop_is_solved() -> None:
     np.testing.assert_allclose(y + y**3, np.sin(TIMES), atol=1e-12)
 
 
-def test_a_signal_that_passes_through_zero_is_zero_for_a_moment_on_request() -> None:
+def test_a_signal_that_passes_through_zero_is_zero_for_one_instant_on_request() -> None:
     """The condition u ~= 0 of ramps u triggers a hold of the time at which u passes through 0, or never."""
     inside = DiagramBuilder("hold")
     inside.add("y", bl.Outport(port=1, initial=-1.0), inside.add("u", bl.Inport(port=1)))

@@ -77,7 +77,7 @@ class Robot(metaclass=ArgumentErrors):
 
     @cached_property
     def tree_links(self) -> tuple[Link, ...]:
-        """The links whose joints move, also those that follow from other joints."""
+        """The links whose joints move, including joints that couplings determine."""
         return tuple(link for link in self.links if link.joint.moves)
 
     @cached_property
@@ -88,7 +88,7 @@ class Robot(metaclass=ArgumentErrors):
 
     @cached_property
     def couplings(self) -> tuple[Coupling, ...]:
-        """The constraints that make a joint depend on others, which leaves it out of q."""
+        """The constraints that make a joint depend on others. This joint is not an entry of q."""
         return tuple(entry for entry in self.constraints if isinstance(entry, Coupling))
 
     @cached_property
@@ -125,7 +125,8 @@ class Robot(metaclass=ArgumentErrors):
 
     @cached_property
     def nq(self) -> int:
-        """Number of joint coordinates: the length of q. A quaternion has four for three speeds."""
+        """Number of joint coordinates: the length of q. A ball joint has four coordinates and three
+        speeds."""
         return sum(joint.nq for joint in self.joints)
 
     @cached_property

@@ -299,7 +299,7 @@ class QuaternionNormalize(Block):
     title: ClassVar[str] = "Quaternion Normalize"
     sign: ClassVar[FaceSign] = Words("q / |q|")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A quaternion of growing length, normalized to length 1.",
+        shows="A quaternion of growing length, normalised to length 1.",
         inputs={
             "u": driver("Ramp", slope=(0.1, 0.0, 0.0, 0.3), initial=(1.0, 0.0, 0.0, 0.0)).named("quaternion")
         },

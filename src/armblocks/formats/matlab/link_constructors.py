@@ -39,7 +39,7 @@ def link_from_row(
         order = " ".join(columns)
         raise location.error(
             f"a row of {counted(count, 'number')} is not a link",
-            allowed=f"4 to 6 numbers {order}, or a legacy row with m r I Jm G B Tc behind the first 5: "
+            allowed=f"4 to 6 numbers {order}, or a legacy row with m r I Jm G B Tc after the first 5: "
             f"{_MIN_DYN_LENGTH} to 18 or {_MAX_DYN_LENGTH} numbers",
         )
     link = LinkRecord(location=location, release=release, modified=modified)

@@ -1,7 +1,7 @@
 """The background check of diagrams whose blocks name files.
 
-Shapes behind a Python function follow from its code. This code runs in a separate process, so that an endless
-loop or a crash does not affect the editor.
+Shapes downstream of a Python function follow from its code. This code runs in a separate process, so that an
+endless loop or a crash does not affect the editor.
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ class Checks:
         faults = await asyncio.to_thread(self._faults, diagram)
         if faults or not await asyncio.to_thread(has_functions, diagram):
             findings, wires = await asyncio.to_thread(check, diagram)
-            # With faults, the shapes behind these blocks are unknown: only unconnected inputs are certain.
+            # With faults, the shapes downstream of these blocks are unknown: only unconnected inputs are
+            # certain.
             return [*faults, *(finding for finding in findings if finding.port or not faults)], wires
         message = await process_reply(send_findings, self.job(diagram), MAX_SECONDS)
         if not message:
