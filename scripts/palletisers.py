@@ -108,7 +108,7 @@ class Arm:
             f"upper arm. {self.payload_note} Masses are estimated, not measured: those of the KUKA KR 180 of "
             "the paper, in proportion to payload and length (armblocks.robot.palletiser.Masses; two digits), "
             "in beams of square section. Real values may differ by a factor of two. The counterbalance "
-            "spring is not modelled. No friction and no motor data."
+            "spring is not modelled. The model has no friction and no motor data."
         )
 
     @property

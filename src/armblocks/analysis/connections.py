@@ -90,7 +90,7 @@ def parallel(first: SystemT, second: StateSpaceModel) -> SystemT:
 
 
 def feedback(forward: SystemT, back: StateSpaceModel | float, sign: int) -> SystemT:
-    """The closed loop of ``forward`` with ``back`` (a system, or one gain for all outputs) in the feedback.
+    """The closed loop of ``forward`` with the feedback path ``back``: a system, or one gain for all outputs.
 
     Raises ``InputError`` if the numbers of signals or the sample times differ, or if the matrix
     ``I - sign D_back D_forward`` is singular.
