@@ -29,7 +29,7 @@ KUKA_AXES = (
     AxisConvention(sign=-1.0),
 )
 KUKA_NOTE = (
-    "Joints A1, A2, A3 and A6 are turret, lower_arm, upper_arm and flange. A1 turns about the downward "
+    "Joints A1, A2, A3 and A6 are turret, lower_arm, upper_arm and flange. A1 rotates about the downward "
     "and A6 about the upward vertical, A2 = 0 is the lower arm stretched forward, and A3 is relative "
     "to the lower arm, as in the source."
 )

@@ -106,7 +106,8 @@ def test_small_and_full_matrices_have_no_plan() -> None:
 
 
 def test_a_vanishing_pivot_is_detected_and_pivoting_solves_the_equations() -> None:
-    """A chain in which every fourth pivot ``1 / gamma - h J`` is relatively a rounding error."""
+    """A chain in which every fourth pivot ``1 / gamma - h J`` is as small as the rounding errors of its
+    terms."""
     n = 40
     J = np.diag(np.full(n - 1, 1.0), 1) + np.diag(np.full(n - 1, -2.0), -1) + np.diag(np.full(n, -1.0))
     for k in range(0, n, 4):

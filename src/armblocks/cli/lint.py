@@ -50,7 +50,7 @@ def lint(
 ) -> None:
     """Check a robot file: parts that are not read, impossible and implausible values.
 
-    --fix corrects the findings whose remedy is certain, in a copy of the file.
+    --fix corrects the findings whose remedy is unambiguous, in a copy of the file.
 
     Exit code 0: no findings (with --fix: none remain), 1: some, 2: the file cannot be read or written.
     """

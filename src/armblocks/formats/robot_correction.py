@@ -1,4 +1,4 @@
-"""Corrected copies of robot files: the findings of :func:`lint_robot` whose remedy is certain."""
+"""Corrected copies of robot files: the findings of :func:`lint_robot` whose remedy is unambiguous."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def correct_robot(
     packages: Mapping[str, str | PathLike[str]] | None = None,
     arguments: Mapping[str, object] | None = None,
 ) -> CorrectedFile:
-    """The content of a robot file in which the findings with a certain remedy are corrected.
+    """The content of a robot file in which the findings with an unambiguous remedy are corrected.
 
     The arguments are those of ``load_robot``. Nothing is written. Everything else in the file stays as it is:
     its other elements, comments and spaces. Findings in files that it includes remain, and so do those of

@@ -67,7 +67,7 @@ class XmlFile:
 
 
 Edits = Callable[[FileFinding, Element, XmlFile], Sequence[Edit]]
-"""The changes that remove a finding about an element, none if the remedy is not certain.
+"""The changes that remove a finding about an element, none if the remedy is ambiguous.
 
 For findings about a link, which have no element of the file, the element is the root."""
 

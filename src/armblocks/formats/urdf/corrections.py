@@ -1,4 +1,4 @@
-"""Corrections of URDF files: the findings whose remedy is certain."""
+"""Corrections of URDF files: the findings whose remedy is unambiguous."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from armblocks.formats.xml_elements import Element
 
 
 def edits_of(finding: FileFinding, element: Element, file: XmlFile) -> Sequence[Edit]:
-    """The changes that remove a finding; none if its remedy is not certain."""
+    """The changes that remove a finding; none if its remedy is ambiguous."""
     if finding.rule is IMPLAUSIBLE:
         return [*_limits_in_degrees(finding.link, file)]
     correction = _CORRECTIONS.get(finding.rule.code)
