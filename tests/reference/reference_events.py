@@ -2,7 +2,8 @@
 
 The rank of a block is the largest number of blocks with events on a path of direct feedthrough to it. Blocks
 that depend on each other in a loop have one rank. At an instant the events of the lowest rank are processed
-first; then all signals are evaluated again.
+first; then all signals are evaluated again. Events on which no sampled block acts have lower ranks than all
+others and come before the ticks.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ def has_own_events(block: Any) -> bool:
     return not block.block.following_modes and any(not guard.locates for guard in block.guards)
 
 
-def event_ranks(order: EvaluationOrder) -> Mapping[str, int]:
-    """The rank of each block."""
+def event_ranks(order: EvaluationOrder) -> tuple[Mapping[str, int], int]:
+    """The rank of each block, and the highest rank before the ticks (-1: none)."""
     blocks = order.blocks
     graph: dict[Node, set[Node]] = {}
     pending: list[Node] = [("events", name, "") for name in blocks]
@@ -46,7 +47,14 @@ def event_ranks(order: EvaluationOrder) -> Mapping[str, int]:
                 for needed in graph[node]
             }
             graph["events", control, ""] |= {node for node in read if not node[1].startswith(inside)}
-    return _ranks(graph, {name for name, block in blocks.items() if has_own_events(block)})
+    counted = {name for name, block in blocks.items() if has_own_events(block)}
+    ranks = _ranks(graph, counted)
+    sampled = {("out", name, port) for name, b in blocks.items() if b.clock is not None for port in b.outputs}
+    after = {
+        name for name in blocks if sampled & ({("events", name, "")} | _reached(graph, ("events", name, "")))
+    }
+    last = max((ranks[name] for name in counted - after), default=-1)
+    return {name: rank + (last + 1) * (name in after) for name, rank in ranks.items()}, last
 
 
 def _needs(order: EvaluationOrder, node: Node) -> set[Node]:

@@ -46,7 +46,7 @@ class Network:
         self._locate_states()
         self.clocks = assign_clocks(flat, self.blocks, self.drivers)
         self.order = EvaluationOrder(self.blocks, self.drivers, flat.gates)
-        self.ranks = event_ranks(self.order)
+        self.ranks, self.rank_before_ticks = event_ranks(self.order)
         self.links = {b.name: [self._link(b, port) for port in b.inputs_read] for b in self.blocks.values()}
         self.links_of_node: dict[Node, list[Link]] = {}
         self.plans: dict[tuple[bool, bool], list[Work]] = {}
@@ -387,11 +387,11 @@ class Network:
             if isinstance(block, Enable):
                 block.ticking = bool(clocks)
 
-    def iterate(self, t: float, first: bool = False) -> bool:
+    def iterate(self, t: float, first: bool = False, last_rank: float = math.inf) -> bool:
         """Perform one iteration of an instant; return whether it has changed a state or a mode.
 
         Guards and resets of a block use consistent signals at its inputs, but its previous modes: an event is
-        the end of the previous mode.
+        the end of the previous mode. With a ``last_rank``, only events up to this rank are processed.
         """
         before = self.fingerprint()
         eventful = [block for block in self.blocks.values() if block.has_events]
@@ -402,6 +402,8 @@ class Network:
             block.set_modes(old[block.name])
         fired = {} if first else self.fired()
         lowest = math.inf if first else self._lowest_rank(fired)
+        if lowest > last_rank:
+            return False
         fired = {key: e for key, e in fired.items() if self.ranks[key[0]] <= lowest}
         later = {block.name for block in self.blocks.values() if self.ranks[block.name] > lowest}
         if not first:

@@ -23,7 +23,8 @@ the time of an event. At an instant, in this order:
 
 1. left limits: values "just before" the instant, such as the held output of a subsystem that is disabled,
    are evaluated with the old modes and states;
-2. ticks: the outputs of all blocks whose clock ticks are evaluated with the others, from the previous
+2. events on which no sampled signal acts, if a clock ticks;
+   ticks: the outputs of all blocks whose clock ticks are evaluated with the others, from the previous
    discrete states; then all their discrete states are updated together;
 3. mode iteration: modes are made consistent with the signals; guards whose sign has changed fire, and
    ``resets`` gives new states; controls of conditional subsystems act. This is repeated until nothing
@@ -39,6 +40,7 @@ Unsupported diagrams raise ``UnsupportedError``.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -216,6 +218,8 @@ class ReferenceRun:
             network.capture(t)
         self.t = t
         if clocks:
+            if t > 0.0:
+                self.iterate(t, network.rank_before_ticks)
             network.tick(t, clocks)
         if t == 0.0:
             # Guards have no sign yet: resets without events give states consistent with the signals.
@@ -231,10 +235,11 @@ class ReferenceRun:
         network.end_instant()
         self.stopped = network.ended()
 
-    def iterate(self, t: float) -> None:
-        """Repeat the iteration of an instant until nothing changes."""
+    def iterate(self, t: float, last_rank: float = math.inf) -> None:
+        """Repeat the iteration of an instant until nothing changes; with a ``last_rank``, only for events up
+        to this rank."""
         for _ in range(MAX_ITERATIONS):
-            if not self.network.iterate(t):
+            if not self.network.iterate(t, last_rank=last_rank):
                 return
         raise EndlessEventsError(f"the events at {t} do not end")
 

@@ -2,7 +2,8 @@
 
 Sources jump at the same times. Conditional subsystems and resettable integrators read sums of earlier
 signals, so that all signals are constant between jumps. Observers read one sum each. They must agree with
-state machines that read the recorded values of this sum before and after each jump.
+state machines that read the recorded values of this sum before and after each jump. Holds that tick at a jump
+sample the value after it.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from armblocks.blocks import (
     Sum,
     TriggeredSubsystem,
     UnitDelay,
+    ZeroOrderHold,
 )
 from armblocks.diagram import Diagram
 
@@ -133,6 +135,8 @@ def random_diagram(
         builder.add(f"relay{k}", Relay(on_point=0.5, off_point=-0.5), v)
         builder.add(f"hit{k}", HitCrossing(), v)
         builder.add(f"integral{k}", Integrator(), v)
+        if sources is fixed_sources:
+            builder.add(f"hold{k}", ZeroOrderHold(sample_time=0.1), v)
     return builder.build(), [f"v{k}" for k in range(4)]
 
 
@@ -152,6 +156,7 @@ def test_blocks_react_to_the_recorded_values_only(seed: int) -> None:
         assert result[f"hit{k}/count"][-1] == crossings
         assert result[f"relay{k}"][-1] == on
         assert np.isclose(result[f"since{k}"][-1], STOP - last)
+        assert np.array_equal(result[f"hold{k}"][2::2], result[name][2::2])
 
 
 @pytest.mark.parametrize("seed", [2, 17])

@@ -24,7 +24,7 @@ from armblocks.diagram.block_equations import BlockSlot
 from armblocks.diagram.conditional_equations import FIRE, ON
 from armblocks.diagram.controls import EnableControl, TriggerControl
 from armblocks.diagram.diagram import Diagram
-from armblocks.diagram.event_order import event_ranks
+from armblocks.diagram.event_order import event_order
 from armblocks.diagram.features import SlotKind
 from armblocks.diagram.flat_values import broadcast_column
 from armblocks.diagram.hierarchy import FlatForm, flatten_hierarchy
@@ -302,12 +302,14 @@ def _recaptured_states(model: Model, symbols: Symbols) -> tuple[int, ...]:
 
 def _ranks(model: Model, symbols: Symbols, guards: Sequence[tuple[str, Guard]]) -> EventRanks | None:
     """The ranks of all events; ``None`` if all events are processed together."""
-    rank_of = event_ranks(model.flow)
-    if not rank_of:
+    order = event_order(model.flow)
+    if order is None:
         return None
+    rank_of = order.rank_of
     names = [name for slot in symbols.discrete_slots for name in [slot.name.rpartition("/")[0]] * slot.size]
     ranges = signature(*symbols.discrete_slots).ranges
     return EventRanks(
+        before_ticks=order.before_ticks,
         guards=tuple(rank_of[name] for name, _ in guards),
         hysteresis_modes=tuple(rank_of[names[mode]] for mode, _, _ in _hysteresis_modes(model, symbols)),
         recaptured_states=tuple(rank_of[names[index]] for index in _recaptured_states(model, symbols)),

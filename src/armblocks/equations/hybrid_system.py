@@ -67,7 +67,7 @@ class LinearLoops:
 @dataclass(frozen=True, kw_only=True)
 class EventRanks:
     """The ranks of events at one instant: events of a lower rank are processed first. Events of a negative
-    rank change only derivatives.
+    rank change only derivatives. Those up to the rank ``before_ticks`` come before the ticks.
 
     ``guards``, ``hysteresis_modes``, ``recaptured_states``: the ranks of the entries of the fields of
     :class:`HybridSystem` with these names. ``controls``: for each control of a conditional subsystem, the
@@ -75,6 +75,7 @@ class EventRanks:
     its rank. While events of a lower rank are processed, the mode has its old value.
     """
 
+    before_ticks: int
     guards: tuple[int, ...]
     hysteresis_modes: tuple[int, ...]
     recaptured_states: tuple[int, ...]

@@ -170,6 +170,13 @@ class Instants:
             **{name: if_else(begins, new, c.added[name]) for name, new in left_values.items()},
         }
         added["ticked"] = if_else(begins, 0.0, 1.0)
+        # Events that come before the ticks of the same instant; the time of the ticks is fixed.
+        moved = logic_and(self.open, _any_marked(vertcat(*self.instant_p)))
+        number = SX(1.0)
+        for k in range(self.guards):
+            number = if_else(self.located[k], float(k + 1), number)
+        mixes = logic_and(logic_and(logic_not(begins), moved), self.mixed[0] < 0.0)
+        added["mixed"] = if_else(mixes, vertcat(c.t, number), self.mixed)
         return vertcat(updated, *Z, *added.values())
 
     def _captured_by(self, updated: SX, k: int) -> SX:

@@ -139,6 +139,27 @@ class Events:
         least index rule the iteration ends for every complementarity problem with a P-matrix (Murty 1974). If
         the iteration does not end, no choice of the modes is consistent, and the run ends.
         """
+        f, r = self.frame, self.frame.r
+        self._iterate(time)
+        self._store_previous_modes()
+        r.call(self.functions.store_signs, f.reals, r.constant_boolean(False))
+        self._end_instant()
+        workspace, derivatives = f.workspace, f.vector(f.workspace.guard_derivatives)
+        f.copy(workspace.guards, workspace.guards_before, self.guards)
+        for i in r.each(self.guards):
+            derivatives[i] = float("nan")
+
+    def process_before_ticks(self, time: Real) -> None:
+        """Process the events on which no sampled signal acts.
+
+        All other modes and signs have their values only after the ticks, so none is stored here.
+        """
+        if self.frame.sizes.rank_before_ticks >= 0:
+            with self.frame.r.when(self.frame.counts[Count.AT_START] == 0):
+                self._iterate(time, self.frame.sizes.rank_before_ticks)
+
+    def _iterate(self, time: Real, last_rank: int | None = None) -> None:
+        """The iteration of :meth:`process`; with a ``last_rank``, only events up to this rank."""
         f, r, functions = self.frame, self.frame.r, self.functions
         yes, no = r.constant_boolean(True), r.constant_boolean(False)
         iterations = r.integer(0)
@@ -149,30 +170,31 @@ class Events:
             f.steps_of_call.value = f.steps_of_call.value + 1
             if self.modes:
                 with r.when(r.call(functions.any_inconsistent, f.reals, yes)):
+                    if last_rank is not None:
+                        loop.leave_unless(iterations.value < ITERATIONS_TOGETHER + self.modes)
                     self._iterate_following_modes(time, iterations)
                     loop.again()
                 with r.unless(r.call(functions.any_fired, f.reals, no)):
-                    loop.leave_unless(r.call(functions.any_inconsistent, f.reals, no))
-                    self._iterate_stateful_modes(time, iterations)
-                    loop.again()
+                    if last_rank is not None:
+                        loop.leave()
+                    else:
+                        loop.leave_unless(r.call(functions.any_inconsistent, f.reals, no))
+                        self._iterate_stateful_modes(time, iterations)
+                        loop.again()
             if self.ranked is None:
                 rank = None
                 r.call(functions.store_signs, f.reals, no)
             else:
-                rank = self._begin_reset(self.ranked)
+                rank = r.call(self.ranked.select_lowest, f.reals)
+                if last_rank is not None:
+                    loop.leave_when(rank > last_rank)
+                self._begin_reset(self.ranked, rank)
             self._count_events(time, yes, bounds=True)
             self._recapture(rank)
             self._store_previous_modes(rank)
             self.reset()
             self.apply_reset()
             self._store_fired_signs()
-        self._store_previous_modes()
-        r.call(functions.store_signs, f.reals, no)
-        self._end_instant()
-        workspace, derivatives = f.workspace, f.vector(f.workspace.guard_derivatives)
-        f.copy(workspace.guards, workspace.guards_before, self.guards)
-        for i in r.each(self.guards):
-            derivatives[i] = float("nan")
 
     def _iterate_following_modes(self, time: Real, iterations: IntegerVariable) -> None:
         """One iteration of the following modes."""
@@ -197,15 +219,13 @@ class Events:
         self.apply_reset()
         self._store_fired_signs()
 
-    def _begin_reset(self, ranked: RankedEvents) -> Integer:
-        """Select the marked guards of the lowest rank for the next reset, and return this rank."""
+    def _begin_reset(self, ranked: RankedEvents, rank: Integer) -> None:
+        """Prepare the reset for events of this rank."""
         f, r = self.frame, self.frame.r
-        rank = r.call(ranked.select_lowest, f.reals)
         r.call(ranked.store_signs, f.reals, rank)
         if ranked.hold_controls is not None:
             r.call(ranked.hold_controls, f.reals, rank)
             self.evaluation.solve(self.point.memory, self.x)
-        return rank
 
     def _recapture(self, rank: Integer | None) -> None:
         """Capture the present values that belong to hysteresis modes, before the reset of this iteration;

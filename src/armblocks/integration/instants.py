@@ -108,6 +108,8 @@ class Instants(Schedule):
         self.clocks.capture(time)
         if self.delays:
             self.delays.pass_jumps(time)
+        if self.events:
+            self.events.process_before_ticks(time)
         self.clocks.tick(time, until)
         if self.events:
             self.events.make_modes_consistent(time)
