@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 import armblocks as ab
+from armblocks.dynamics import mechanism as mechanism_module
 from armblocks.dynamics import (
     trace_accel,
     trace_constrained_motion,
@@ -19,12 +21,13 @@ from armblocks.dynamics import (
 )
 from armblocks.dynamics.mechanism import Mechanism
 from armblocks.errors import ArmblocksError, AssemblyError, InputError, RobotError, UnknownNameError
-from armblocks.robot import Link, Motor, Revolute, Robot
+from armblocks.robot import Link, Motor, Prismatic, Revolute, Robot
 from armblocks.robot.constraints import (
     Attachment,
     Coupling,
     RevoluteClosure,
     Rod,
+    WeldClosure,
 )
 from armblocks.spatial import Transform, rotation_about, transl
 from maximal_coordinates import accelerations
@@ -223,6 +226,67 @@ def test_a_state_far_from_the_constraints_has_no_motion() -> None:
     """The result is NaN instead of wrong numbers."""
     motion = trace_constrained_motion(four_bar())
     assert np.isnan(motion(np.full(3, 2.0), np.zeros(3), np.zeros(3))[2]).all()
+
+
+def test_torques_exist_only_for_motions_that_satisfy_the_constraints() -> None:
+    """Errors of 1e-9 are rounding; errors of 1e-3 would give wrong torques without a message."""
+    arm = ab.Arm(four_bar().with_link("crank", motor=Motor()))
+    state = arm.assemble(qd=[4.0, 0.0, 0.0], locked=("crank",))
+    motion = [state.q, state.qd, arm.accel(state.q, state.qd, [2.0, 0.0, 0.0])]
+    for k in range(3):
+        for error, exists in ((1e-9, True), (1e-3, False)):
+            changed = [value + error * np.eye(3)[1] * (i == k) for i, value in enumerate(motion)]
+            for loads in ({}, {"payload": 1.0}):
+                assert np.isfinite(arm.rne(*changed, **loads)).all() == exists
+            assert np.isfinite(arm.gravload(changed[0])).all() == (exists or k > 0)
+    fast = [state.q, 1e3 * state.qd, arm.accel(state.q, 1e3 * state.qd, np.zeros(3))]
+    assert arm.rne(*fast) == pytest.approx(np.zeros(3), abs=1e-5)
+
+
+def distant_four_bar() -> Robot:
+    """A four-bar linkage whose zeros of the joints are far from all configurations."""
+    robot = four_bar()
+    for name, offset in (("crank", 0.7), ("coupler", 2.6), ("rocker", -2.9)):
+        link = robot.link(name)
+        robot = robot.with_link(name, joint=link.joint.with_offset(offset))
+    return robot.with_link("crank", motor=Motor())
+
+
+def test_motions_near_given_coordinates() -> None:
+    """Functions of an arm assemble its loops near ``near``, by default anywhere; a run near q0."""
+    robot = distant_four_bar()
+    q = np.array([-0.7, -2.6, 2.9])
+    expected = ab.Arm(four_bar()).accel(np.zeros(3), np.zeros(3), [1.0, 0.0, 0.0])
+    for near in (None, q):
+        arm = ab.Arm(robot, near=near)
+        assert arm.accel(q, np.zeros(3), [1.0, 0.0, 0.0]) == pytest.approx(expected, abs=1e-9)
+        torque = arm.rne(q, np.zeros(3), expected)
+        assert torque == pytest.approx([1.0, 0.0, 0.0], abs=1e-9)
+    copied = pickle.loads(pickle.dumps(ab.Arm(robot, near=q)))
+    assert copied.gravload(q).tolist() == ab.Arm(robot, near=q).gravload(q).tolist()
+    with pytest.raises(InputError, match=r"near has the shape \(2,\)"):
+        ab.Arm(robot, near=[0.0, 0.0])
+
+
+def test_a_mechanism_is_assembled_anywhere_if_not_near_zero(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At q = 0 the second hinge of the door is reversed, and one start does not leave this configuration."""
+    half_turn = Transform(rotation=rotation_about((0, 0, 1), np.pi))
+    links = (
+        Link(name="door", before=half_turn, mass=1.0, centre_of_mass=(0.5, 0, 0), inertia=(0.1,) * 3),
+        Link(name="frame", parent="door", joint=Prismatic(axis=(0, 0, 1)), mass=1.0, inertia=(0.1,) * 3),
+    )
+    weld = WeldClosure(name="latch", first=Attachment(), second=Attachment(link="frame"))
+    monkeypatch.setattr(mechanism_module, "RESTARTS", 0)
+    mechanism = Mechanism(Robot(name="door", links=links, constraints=(weld,)))
+    with pytest.raises(AssemblyError, match="'latch'"):
+        mechanism.assembled(np.zeros(2))
+    assert np.cos(mechanism.assembled_anywhere()) == pytest.approx([-1.0, 1.0], abs=1e-12)
+
+
+def test_a_mechanism_that_fits_nowhere_is_refused() -> None:
+    robot = four_bar().with_link("rocker", before=transl(9.0, 0, 0))
+    with pytest.raises(AssemblyError, match="satisfies constraint 'pin'"):
+        ab.Arm(robot).accel(np.zeros(3), np.zeros(3), np.zeros(3))
 
 
 def test_a_shaft_with_a_cardan_joint_has_its_ratio_of_speeds() -> None:

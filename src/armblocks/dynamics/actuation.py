@@ -10,50 +10,61 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import wraps
+from typing import Protocol
 
 import numpy as np
 from casadi import SX, mtimes, vertcat
 
 from armblocks.dynamics.constrained import (
     ConstrainedEquations,
+    assembled_coordinates,
     independent_relations,
+    nan_unless_consistent,
     symmetric_solver,
 )
 from armblocks.dynamics.joint_motion import entries
-from armblocks.dynamics.mechanism import RANK_TOLERANCE, mechanism
+from armblocks.dynamics.mechanism import RANK_TOLERANCE, Array, mechanism
 from armblocks.equations import TracedFunction, flatten
 from armblocks.errors import RobotError, counted
 from armblocks.robot.robot import Robot
 from armblocks.robot.tree import KinematicTree
 
 
-def motor_torques(robot: Robot, tree: KinematicTree, q: SX, free_torques: SX) -> SX:
+def motor_torques(
+    robot: Robot, q: SX, free_torques: SX, qd: SX | None, qdd: SX | None, near: Array | None
+) -> SX:
     """Torques (n, 1) of the joints with a motor, and 0 at the others, in the order of qd.
 
-    ``free_torques`` (n, 1): the torques of all joints for the same motion without the closures. Raises
-    RobotError unless the motors and the degrees of freedom agree in number and the motors move all of them.
+    ``free_torques`` (n, 1): the torques of all joints for the same motion without the closures. ``near``: see
+    :func:`independent_relations`. The torques are NaN if the motion violates the constraints, because its
+    inertia torques would be wrong. Raises RobotError unless the motors and the degrees of freedom agree in
+    number and the motors move all of them.
     """
     passive = [k for k, motor in enumerate(robot.motors) if motor is None]
-    relations = independent_relations(robot)
-    _check_actuation(robot, passive, relations)
-    J = ConstrainedEquations(robot, tree, q, relations).J
+    relations = independent_relations(robot, near)
+    _check_actuation(robot, passive, relations, near)
+    equations = ConstrainedEquations(robot, KinematicTree.of(robot), q, relations)
+    J = equations.J
     # J_p' λ = tau_p by its normal equations, whose matrix is J_p J_p'.
     J_passive = J[:, passive]
     solve = symmetric_solver(mtimes(J_passive, J_passive.T))
     multipliers = vertcat(*solve(entries(mtimes(J_passive, free_torques[passive]))))
     torques = free_torques - mtimes(J.T, multipliers)
     torques[passive] = 0.0
-    return SX(torques)
+    return SX(torques + nan_unless_consistent(equations, qd, qdd))
 
 
-Trace = Callable[[Robot], TracedFunction]
+class TorqueTrace(Protocol):
+    """The trace of joint torques of a robot; ``near``: see :func:`independent_relations`."""
+
+    def __call__(self, robot: Robot, near: Array | None = None) -> TracedFunction: ...
 
 
-def of_motors(trace: Trace) -> Trace:
+def of_motors(trace: Callable[[Robot], TracedFunction]) -> TorqueTrace:
     """Make a trace of joint torques return the torques of the motors for robots with closed loops."""
 
     @wraps(trace)
-    def trace_of_motors(robot: Robot) -> TracedFunction:
+    def trace_of_motors(robot: Robot, near: Array | None = None) -> TracedFunction:
         traced = trace(robot)
         if not robot.closures:
             return traced
@@ -61,14 +72,17 @@ def of_motors(trace: Trace) -> Trace:
         def equations(*values: SX) -> SX:
             flat = [flatten(value, slot.shape) for value, slot in zip(values, traced.inputs)]
             (free,) = traced.casadi_function().call(flat, True, False)
-            return motor_torques(robot, KinematicTree.of(robot), values[0], free)
+            named = dict(zip((slot.name for slot in traced.inputs), values))
+            return motor_torques(robot, named["q"], free, named.get("qd"), named.get("qdd"), near)
 
         return TracedFunction.trace(traced.name, traced.inputs, traced.outputs, equations)
 
     return trace_of_motors
 
 
-def _check_actuation(robot: Robot, passive: Sequence[int], relations: Sequence[int]) -> None:
+def _check_actuation(
+    robot: Robot, passive: Sequence[int], relations: Sequence[int], near: Array | None
+) -> None:
     """Raise RobotError unless the joints without a motor follow from those with a motor."""
     functions = mechanism(robot)
     dof, motors = robot.nv - len(relations), robot.nv - len(passive)
@@ -81,7 +95,7 @@ def _check_actuation(robot: Robot, passive: Sequence[int], relations: Sequence[i
             allowed="as many motors as degrees of freedom, so that the torques exist and are unique",
             fix="give a motor (Motor() without inertia is enough) to the actuated joints only",
         )
-    J = functions.jacobian(functions.assembled(robot.neutral))[np.ix_(relations, passive)]
+    J = functions.jacobian(assembled_coordinates(robot, near))[np.ix_(relations, passive)]
     s = np.linalg.svd(J, compute_uv=False)
     if len(s) and s.min() <= RANK_TOLERANCE * s.max():
         raise RobotError(

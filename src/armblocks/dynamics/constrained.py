@@ -15,7 +15,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from casadi import SX, Function, fabs, fmax, if_else, jtimes, mtimes, vertcat
+import numpy as np
+from casadi import SX, Function, fabs, fmax, if_else, jtimes, logic_and, mtimes, vertcat
 
 from armblocks.dynamics.ball_joints import difference, integrated, position_rates
 from armblocks.dynamics.constraint_equations import constraint_equations
@@ -44,6 +45,11 @@ RESTORING_TIME = 0.1
 """Time constant of the decay of the distance from the constraints during a run, s."""
 MAX_RESIDUAL = 1e-9
 """Largest residual after the projection: m, or cosine of an angle. Above it accelerations are inaccurate."""
+MAX_INCONSISTENCY = 1e-6
+"""Largest residual of a motion whose torques are computed: m, or cosine of an angle.
+
+The first time derivative may be larger by the sum of the absolute speeds, the second one by the sum of the
+absolute accelerations and the square of that of the speeds."""
 
 Solve = Callable[[Sequence[Scalar]], list[SX]]
 """The solution of linear equations for one right-hand side."""
@@ -143,12 +149,55 @@ def independent_relations(robot: Robot, near: Array | None = None) -> tuple[int,
     """The indices of the relations that the equations of motion contain, see :meth:`Mechanism.mobility`.
 
     ``near`` (nq,): coordinates near which the mechanism is assembled to find them; by default the neutral
-    configuration.
+    configuration, or any other one that can be assembled.
     """
     if not robot.closures:
         return ()
+    return mechanism(robot).mobility(assembled_coordinates(robot, near)).independent
+
+
+def assembled_coordinates(robot: Robot, near: Array | None = None) -> Array:
+    """Coordinates (nq,) that satisfy the closures; ``near``: see :func:`independent_relations`."""
     functions = mechanism(robot)
-    return functions.mobility(functions.assembled(robot.neutral if near is None else near)).independent
+    return functions.assembled_anywhere() if near is None else functions.assembled(np.asarray(near, float))
+
+
+def nan_unless_consistent(equations: ConstrainedEquations, qd: SX | None = None, qdd: SX | None = None) -> SX:
+    """0 if ``equations.q``, ``qd`` and ``qdd`` satisfy the constraints within a tolerance, otherwise NaN.
+
+    The conditions are the relations and their first and second time derivatives, of those arguments that are
+    not None. ``equations.q`` consists of symbols. See ``MAX_INCONSISTENCY``.
+    """
+    J, q = equations.J, equations.q
+    excess = [_largest(equations.residuals) - MAX_INCONSISTENCY]
+    if qd is not None:
+        speed = _total(qd)
+        excess.append(_largest(entries(mtimes(J, qd))) - MAX_INCONSISTENCY * fmax(1.0, speed))
+        if qdd is not None:
+            rates = vertcat(*position_rates(equations.robot, entries(q), entries(qd)))
+            second = entries(mtimes(J, qdd) + jtimes(mtimes(J, qd), q, rates))
+            scale = fmax(1.0, _total(qdd) + speed * speed)
+            excess.append(_largest(second) - MAX_INCONSISTENCY * scale)
+    consistent = excess[0] <= 0.0
+    for value in excess[1:]:
+        consistent = logic_and(consistent, value <= 0.0)
+    return if_else(consistent, 0.0, math.nan)
+
+
+def _largest(values: Sequence[Scalar]) -> SX:
+    """The largest magnitude; 0 without values."""
+    largest = SX(0.0)
+    for value in values:
+        largest = fmax(largest, fabs(value))
+    return largest
+
+
+def _total(values: SX) -> SX:
+    """The sum of the magnitudes."""
+    total = SX(0.0)
+    for value in entries(values):
+        total = total + fabs(value)
+    return total
 
 
 def projected(robot: Robot, tree: KinematicTree, q: SX, relations: Sequence[int]) -> SX:
@@ -164,10 +213,7 @@ def projected(robot: Robot, tree: KinematicTree, q: SX, relations: Sequence[int]
         q = SX(vertcat(*integrated(robot, entries(q), entries(step(residuals)), 1.0)))
         at = tree_coordinates(robot.coordinate_map, q)
         residuals = constraint_equations(tree, at).only(relations).residuals
-    largest = SX(0.0)
-    for residual in residuals:
-        largest = fmax(largest, fabs(residual))
-    return q + if_else(largest <= MAX_RESIDUAL, 0.0, math.nan)
+    return q + if_else(_largest(residuals) <= MAX_RESIDUAL, 0.0, math.nan)
 
 
 def constrained_motion(

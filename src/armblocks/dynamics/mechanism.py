@@ -39,6 +39,8 @@ MAX_STEPS = 200
 """Maximum number of steps from one start."""
 RESTARTS = 12
 """Number of further starts after the guess."""
+WIDE_STARTS = 40
+"""Number of starts anywhere within the ranges of the joints, where no guess is given."""
 MOTIONS = 6
 """Number of configurations at which the rank of the Jacobian is determined."""
 
@@ -127,6 +129,29 @@ class Mechanism:
             if size <= RESIDUAL_TOLERANCE:
                 return q
         raise self._assembly_error(best, locked)
+
+    def assembled_anywhere(self) -> Array:
+        """Coordinates that satisfy the constraints: near the neutral ones, or else within the joint ranges.
+
+        Joints without range rotate by at most pi or move by at most 1 m. Raises AssemblyError.
+        """
+        neutral = self.robot.neutral
+        try:
+            return self.assembled(neutral)
+        except AssemblyError as error:
+            random, free = np.random.default_rng(2), list(range(self.robot.nv))
+            ranges: Array = np.array(
+                [
+                    limits.position or ((-math.pi, math.pi) if entry.unit == "rad" else (-1.0, 1.0))
+                    for limits, entry in zip(self.robot.limits, self.robot.speeds)
+                ]
+            )
+            for _ in range(WIDE_STARTS):
+                step = random.uniform(ranges[:, 0], ranges[:, 1])
+                q = self._descend(self.moved(neutral, step), free)
+                if self._distance(q) <= RESIDUAL_TOLERANCE:
+                    return q
+            raise error
 
     def consistent_speeds(self, q: Array, qd: Array, locked: Sequence[str] = ()) -> Array:
         """The speeds nearest to ``qd`` (n,) that satisfy the constraints at ``q``.

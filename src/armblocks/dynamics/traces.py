@@ -204,17 +204,18 @@ def trace_friction(robot: Robot) -> TracedFunction:
     return _trace("friction", robot, ("qd",), ("tau", (robot.n,), "N m"), equations)
 
 
-def trace_accel(robot: Robot) -> TracedFunction:
+def trace_accel(robot: Robot, near: Array | None = None) -> TracedFunction:
     """``qdd (n,)`` for given joint torques, with friction, gravity and rotor inertia.
 
-    Raises RobotError that names the joint if the inertia at a joint is zero.
+    ``near``: coordinates near which closures are assembled to find their independent relations. Raises
+    RobotError that names the joint if the inertia at a joint is zero.
     """
     tree = regrouped(KinematicTree.of(robot))
     check_accelerations_exist(tree)
 
     def equations(q: SX, qd: SX, tau: SX) -> SX:
         if robot.constraints:
-            return constrained_motion(robot, tree, q, qd, tau).qdd
+            return constrained_motion(robot, tree, q, qd, tau, near=near).qdd
         rates = entries(qd)
         net_torque = _difference(entries(tau), joint_friction(robot, rates))
         return _sum(forward_dynamics(tree, q, rates, net_torque))
@@ -222,7 +223,7 @@ def trace_accel(robot: Robot) -> TracedFunction:
     return _trace("accel", robot, ("q", "qd", "tau"), ("qdd", (robot.n,), "rad/s2"), equations, of_tree=False)
 
 
-def trace_accel_loaded(robot: Robot) -> TracedFunction:
+def trace_accel_loaded(robot: Robot, near: Array | None = None) -> TracedFunction:
     """``qdd (n,)`` as ``accel``, with a wrench at the tip and a payload at the tool.
 
     Raises RobotError that names the joint if the inertia at a joint is zero for every payload.
@@ -235,7 +236,8 @@ def trace_accel_loaded(robot: Robot) -> TracedFunction:
         loaded, wrenches = with_payload(tree, payload), tip_wrench(tree, wrench)
         if robot.constraints:
             loads = (wrench, payload)
-            return constrained_motion(robot, loaded, q, qd, tau, on_bodies=wrenches, loads=loads).qdd
+            motion = constrained_motion(robot, loaded, q, qd, tau, near=near, on_bodies=wrenches, loads=loads)
+            return motion.qdd
         rates = entries(qd)
         net_torque = _difference(entries(tau), joint_friction(robot, rates))
         return _sum(forward_dynamics(loaded, q, rates, net_torque, wrenches))
@@ -339,7 +341,9 @@ def trace_normalised(robot: Robot) -> TracedFunction:
     return _trace("normalised", robot, ("q",), ("q", (robot.nq,), ""), equations, of_tree=False)
 
 
-TRACES: Mapping[str, Callable[[Robot], TracedFunction]] = {
+ASSEMBLED = ("rne", "rne_loaded", "gravload", "accel", "accel_loaded")
+"""The functions that take ``near``, because they depend on the independent relations of closures."""
+TRACES: Mapping[str, Callable[..., TracedFunction]] = {
     "fkine": trace_fkine,
     "link_poses": trace_link_poses,
     "jacob0": trace_jacob0,
@@ -361,7 +365,7 @@ TRACES: Mapping[str, Callable[[Robot], TracedFunction]] = {
     "difference": trace_difference,
     "normalised": trace_normalised,
 }
-"""The trace functions by name: ``TRACES["rne"](robot)``."""
+"""The trace functions by name: ``TRACES["rne"](robot)``; those in ``ASSEMBLED`` also take ``near``."""
 
 
 def _trace(

@@ -15,7 +15,7 @@ from armblocks.argument_errors import ArgumentErrors
 from armblocks.compiler import Kernel, OperationCount, cached_kernel
 from armblocks.compiler.arguments import check_count, in_order
 from armblocks.errors import InputError, UnknownNameError, counted
-from armblocks.face.assembly import Assembly, assemble
+from armblocks.face.assembly import Assembly, assemble, coordinates
 from armblocks.face.notebook_views import robot_view
 from armblocks.face.payload import Payload, payload_numbers
 from armblocks.robot import FrictionModel, Robot
@@ -118,17 +118,22 @@ class Arm(metaclass=ArgumentErrors):
     for a quaternion of zeros. :meth:`neutral`, :meth:`integrate` and :meth:`difference` replace zeros, sums
     and differences of coordinates.
 
+    ``near`` (nq,): coordinates of a robot with closed loops near which its constraints can be assembled.
+    There ``accel``, ``rne`` and ``gravload`` find which of the equations of the loops are independent. By
+    default they search near the neutral configuration, and then within the ranges of the joints.
+
     Units are SI: rad or m, N m or N. Frames: world, unless stated otherwise.
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, near: ArrayLike | None = None) -> None:
         check_kind(robot, Robot, where="Arm")
         self.robot = robot
+        self._near = None if near is None else coordinates(robot, "near", near, robot.nq)
         self._kernels: dict[str, Kernel] = {}
 
-    def __reduce__(self) -> tuple[object, ...]:
+    def __reduce__(self) -> tuple[type[Arm], tuple[object, ...]]:
         """Pickle and copy the robot alone; code is compiled again or loaded from the cache."""
-        return Arm, (self.robot,)
+        return Arm, (self.robot, self._near)
 
     # ---- description -------------------------------------------------------------------------------------
     @property
@@ -160,7 +165,8 @@ class Arm(metaclass=ArgumentErrors):
         kinds = ("coulomb", "viscous", "all")
         if which not in kinds:
             raise UnknownNameError("kind of friction", which, kinds, where=self.name)
-        return Arm(self.robot.nofriction(coulomb=which != "viscous", viscous=which != "coulomb"))
+        robot = self.robot.nofriction(coulomb=which != "viscous", viscous=which != "coulomb")
+        return Arm(robot, self._near)
 
     def with_friction_model(self, model: FrictionModel | str) -> Arm:
         """The arm with the friction formula of another toolbox release, see :class:`FrictionModel`."""
@@ -169,7 +175,7 @@ class Arm(metaclass=ArgumentErrors):
             if model not in names:
                 raise UnknownNameError("friction model", model, names, where=self.name)
             model = names[model]
-        return Arm(self.robot.with_friction_model(model))
+        return Arm(self.robot.with_friction_model(model), self._near)
 
     # ---- kinematics --------------------------------------------------------------------------------------
     @cached_property
@@ -239,6 +245,8 @@ class Arm(metaclass=ArgumentErrors):
     def rne(self) -> MotionFunction:
         """``rne(q, qd, qdd)`` → tau (n,) N m or N: joint torques of a motion, with motors and friction.
 
+        For a motion that violates the constraints of the robot they are NaN.
+
         ``wrench=`` [fx fy fz mx my mz] in the last link's frame, ``payload=`` a :class:`Payload` at the tool,
         or the mass (kg) of a point mass at the tool.
         """
@@ -301,14 +309,17 @@ class Arm(metaclass=ArgumentErrors):
     def _kernel(self, method: str) -> Kernel:
         kernel = self._kernels.get(method)
         if kernel is None:
-            key = f"robot/{method}/{self._description_key}"
-            kernel = self._kernels[method] = cached_kernel(key, lambda: _traces()[method](self.robot))
+            key, options = f"robot/{method}/{self._description_key}", {}
+            if self._near is not None and method in _assembled():
+                key, options = f"{key}/near {self._near.tolist()}", {"near": self._near}
+            kernel = cached_kernel(key, lambda: _traces()[method](self.robot, **options))
+            self._kernels[method] = kernel
         return kernel
 
     def _entry(self, method: str) -> Callable[..., Array]:
         """The native function of a method; pickling stores the robot and the name of the method."""
         kernel = self._kernel(method)
-        return kernel.entry_with_fallback(kernel.__call__, maker=(Arm, (self.robot,)))
+        return kernel.entry_with_fallback(kernel.__call__, maker=self.__reduce__())
 
     def _loaded_method(self, method: str) -> Callable[..., Array]:
         """A function that calls the kernel of a method, or with a wrench or payload a second kernel.
@@ -343,7 +354,7 @@ class Arm(metaclass=ArgumentErrors):
                 )  # the message is about positional arguments only
                 raise
 
-        return kernel.entry_with_fallback(call, maker=(Arm, (self.robot,)))
+        return kernel.entry_with_fallback(call, maker=self.__reduce__())
 
     def __repr__(self) -> str:
         return f"<Arm {self.name}: {counted(len(self.robot.joints), 'joint')} {self.robot.joint_letters}>"
@@ -357,7 +368,14 @@ class Arm(metaclass=ArgumentErrors):
         return robot_view(self.robot)
 
 
-def _traces() -> Mapping[str, Callable[[Robot], TracedFunction]]:
+def _assembled() -> Sequence[str]:
+    """The methods whose equations depend on an assembled configuration of the robot."""
+    from armblocks.dynamics.traces import ASSEMBLED
+
+    return ASSEMBLED
+
+
+def _traces() -> Mapping[str, Callable[..., TracedFunction]]:
     """All traced quantities; imported here, because code from the disk cache needs no tracing."""
     from armblocks.dynamics import TRACES
 

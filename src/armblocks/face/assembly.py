@@ -54,8 +54,8 @@ def assemble(robot: Robot, q: ArrayLike | None, qd: ArrayLike | None, locked: Se
     """The state near ``q`` and ``qd`` that satisfies the constraints, see :meth:`Arm.assemble`."""
     from armblocks.dynamics.mechanism import mechanism
 
-    guess = robot.neutral if q is None else _vector(robot, "q", q, robot.nq)
-    speeds = np.zeros(robot.nv) if qd is None else _vector(robot, "qd", qd, robot.nv)
+    guess = robot.neutral if q is None else coordinates(robot, "q", q, robot.nq)
+    speeds = np.zeros(robot.nv) if qd is None else coordinates(robot, "qd", qd, robot.nv)
     functions = mechanism(robot)
     found = functions.assembled(guess, locked)
     mobility = functions.mobility(found)
@@ -69,13 +69,13 @@ def assemble(robot: Robot, q: ArrayLike | None, qd: ArrayLike | None, locked: Se
     )
 
 
-def _vector(robot: Robot, name: str, value: ArrayLike, size: int) -> Array:
-    """Finite numbers (size,). Raises InputError."""
+def coordinates(robot: Robot, name: str, value: ArrayLike, size: int) -> Array:
+    """The argument ``name`` as finite numbers (size,). Raises InputError."""
     vector = numbers(value, where=f"{name} of robot '{robot.name}'")
     if vector.shape != (size,) or not np.isfinite(vector).all():
         raise InputError(
             f"{name} has the shape {vector.shape}" if vector.shape != (size,) else f"{name} is not finite",
-            where=f"assemble, robot '{robot.name}'",
+            where=f"robot '{robot.name}'",
             allowed=f"({size},), finite numbers",
             fix="give one number for each coordinate",
         )

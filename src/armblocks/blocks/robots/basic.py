@@ -26,6 +26,7 @@ from armblocks.blocks.robots.ports import (
     qd_port,
     qdd_port,
     start_coordinates,
+    start_numbers,
     tau_port,
 )
 from armblocks.blocks.robots.robot_field import RobotField
@@ -341,7 +342,8 @@ class ForwardDynamics(Block):
         return {"q": coordinate_rates(self.robot, x["q"], x["qd"]), "qd": qdd}
 
     def _constrained_motion(self, x: Signals, u: Signals) -> tuple[SX, ...]:
-        return apply_all(dynamics.trace_constrained_motion(self.robot), x["q"], x["qd"], u["tau"])
+        near = start_numbers(self, self.robot, "q0")
+        return apply_all(dynamics.trace_constrained_motion(self.robot, near), x["q"], x["qd"], u["tau"])
 
     def initial_states(self, p: Signals) -> Signals:
         return {"q": start_coordinates(self.robot, p["q0"]), "qd": p["qd0"]}

@@ -115,8 +115,7 @@ def check_consistent_start(block: Block, robot: Robot, q_name: str, qd_name: str
     if not robot.closures:
         return
     functions = mechanism(robot)
-    given = np.asarray(block.parameter_value(q_name), dtype=float)
-    q = given if given.shape else robot.neutral + given
+    q = start_numbers(block, robot, q_name)
     qd = np.broadcast_to(np.asarray(block.parameter_value(qd_name), dtype=float), (robot.n,))
     rates = functions.jacobian(q) @ qd
     for name, values, unit in (
@@ -133,6 +132,12 @@ def check_consistent_start(block: Block, robot: Robot, q_name: str, qd_name: str
                 allowed="a state that satisfies the constraints of the robot",
                 fix="take q and qd of arm.assemble(q0, qd0)",
             )
+
+
+def start_numbers(block: Block, robot: Robot, name: str) -> NDArray[np.float64]:
+    """The initial q (nq,) of a parameter that :func:`check_start` accepted, as numbers."""
+    given = np.asarray(block.parameter_value(name), dtype=float)
+    return given if given.shape else robot.neutral + given
 
 
 def check_no_constraints(block: Block, robot: Robot) -> None:
