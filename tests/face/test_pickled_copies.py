@@ -67,7 +67,12 @@ def examples() -> Mapping[str, Any]:
             if issubclass(kind, Closure)
             for more in ([{"length": 1.0}] if kind is ab.Rod else [{}])
         ),
-        *(ab.Attachment(), ab.Coupling(name="c", terms=(("a", 1.0), ("b", 2.0))), arm.assemble()),
+        *(
+            ab.NamedFrame(name="camera"),
+            ab.Attachment(),
+            ab.Coupling(name="c", terms=(("a", 1.0), ("b", 2.0))),
+            arm.assemble(),
+        ),
         *(ab.Cylindrical(), ab.Universal(), ab.Planar(), ab.Spherical(), ab.Free(), ab.Screw(pitch=0.1)),
         *(ab.FrictionModel.RELEASE_6, ab.JointLimits(speed=1.0), ab.standard_dh("one", a=1.0).dh),
         *(ab.Payload(mass=2.0), ab.Transform(), ab.jtraj([0, 0], [1, 1], 5)),

@@ -86,6 +86,7 @@ def print_robot(robot: Robot, console: Console) -> None:
         _print_links(robot, console, note, _MOTORS)
     _print_limits(robot, console)
     _print_constraints(robot, console)
+    _print_named_frames(robot, console)
     _print_frames(robot, console)
 
 
@@ -150,6 +151,18 @@ def _print_constraints(robot: Robot, console: Console) -> None:
         from armblocks.face.assembly import assemble
 
         console.print(str(assemble(robot, None, None, ())), highlight=False, markup=False)
+
+
+def _print_named_frames(robot: Robot, console: Console) -> None:
+    """Print the named frames with their links and positions."""
+    if not robot.frames:
+        return
+    console.print()
+    console.print("Named frames", style=STRONG)
+    for frame in robot.frames:
+        x, y, z = frame.pose.translation
+        text = f"{frame.name}: on {frame.link or '(base)'} at {x:.6g}, {y:.6g}, {z:.6g} m"
+        console.print(text, highlight=False, markup=False)
 
 
 def _print_tree(robot: Robot, console: Console) -> None:

@@ -82,11 +82,7 @@ def constraint_equations(tree: KinematicTree, q: SX) -> ConstraintEquations:
 
 def attached_frame(tree: KinematicTree, attachment: Attachment) -> Frame:
     """The frame of an attachment, fixed to a body of the tree or to the base."""
-    if attachment.link is None:
-        return Frame(body=BASE, pose=attachment.pose)
-    index = [link.name for link in tree.robot.links].index(attachment.link)
-    frame = tree.links[index]
-    return Frame(body=frame.body, pose=frame.pose @ attachment.pose)
+    return tree.attached(attachment.link, attachment.pose)
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,9 +53,9 @@ from armblocks.robot.tree import KinematicTree
 from armblocks.spatial.vectors import Scalar, add, rotate, scale
 
 
-def trace_fkine(robot: Robot) -> TracedFunction:
-    """``T (4, 4)``: pose of the tool in the world, base and tool transform included; m."""
-    tree = KinematicTree.of(robot)
+def trace_fkine(robot: Robot, frame: str | None = None) -> TracedFunction:
+    """``T (4, 4)``: pose of the tool, or of a frame of the robot, in the world; m."""
+    tree = KinematicTree.of(robot).with_tool_at(frame)
 
     def equations(q: SX) -> SX:
         ground = constant_pose(tree.base)
@@ -77,9 +77,12 @@ def trace_link_poses(robot: Robot) -> TracedFunction:
     return _trace("link_poses", robot, ("q",), ("poses", (len(robot.links) + 2, 4, 4), "m"), equations)
 
 
-def trace_jacob0(robot: Robot) -> TracedFunction:
-    """``J (6, n)``: velocity of the tool's origin, then angular velocity of the tool, in world axes."""
-    tree = KinematicTree.of(robot)
+def trace_jacob0(robot: Robot, frame: str | None = None) -> TracedFunction:
+    """``J (6, n)``: velocity of the tool's origin, then angular velocity of the tool, in world axes.
+
+    ``frame``: the name of another frame of the robot that takes the place of the tool.
+    """
+    tree = KinematicTree.of(robot).with_tool_at(frame)
 
     def equations(q: SX) -> SX:
         return jacobian_matrix(world_columns(tree, entries(q)))
@@ -87,9 +90,12 @@ def trace_jacob0(robot: Robot) -> TracedFunction:
     return _trace("jacob0", robot, ("q",), ("J", (6, robot.n), ""), equations)
 
 
-def trace_jacobe(robot: Robot) -> TracedFunction:
-    """``J (6, n)``: velocity of the tool's origin, then angular velocity of the tool, in tool axes."""
-    tree = KinematicTree.of(robot)
+def trace_jacobe(robot: Robot, frame: str | None = None) -> TracedFunction:
+    """``J (6, n)``: velocity of the tool's origin, then angular velocity of the tool, in tool axes.
+
+    ``frame``: the name of another frame of the robot that takes the place of the tool.
+    """
+    tree = KinematicTree.of(robot).with_tool_at(frame)
 
     def equations(q: SX) -> SX:
         return jacobian_matrix(tool_columns(tree, q))
@@ -341,6 +347,8 @@ def trace_normalised(robot: Robot) -> TracedFunction:
     return _trace("normalised", robot, ("q",), ("q", (robot.nq,), ""), equations, of_tree=False)
 
 
+FRAMED = ("fkine", "jacob0", "jacobe")
+"""The functions that take ``frame``, the name of a frame in the place of the tool."""
 ASSEMBLED = ("rne", "rne_loaded", "gravload", "accel", "accel_loaded")
 """The functions that take ``near``, because they depend on the independent relations of closures."""
 TRACES: Mapping[str, Callable[..., TracedFunction]] = {
@@ -365,7 +373,8 @@ TRACES: Mapping[str, Callable[..., TracedFunction]] = {
     "difference": trace_difference,
     "normalised": trace_normalised,
 }
-"""The trace functions by name: ``TRACES["rne"](robot)``; those in ``ASSEMBLED`` also take ``near``."""
+"""The trace functions by name: ``TRACES["rne"](robot)``; those in ``FRAMED`` also take ``frame``, those
+in ``ASSEMBLED`` also ``near``."""
 
 
 def _trace(

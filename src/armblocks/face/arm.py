@@ -34,6 +34,14 @@ class ConfigurationFunction(Protocol):
     def __call__(self, q: ArrayLike, *, out: Array | None = None, threads: int = 1) -> Array: ...
 
 
+class FrameFunction(Protocol):
+    """``f(q)`` of the tool, or of the frame with the name ``frame``."""
+
+    def __call__(
+        self, q: ArrayLike, *, frame: str | None = None, out: Array | None = None, threads: int = 1
+    ) -> Array: ...
+
+
 class SpeedFunction(Protocol):
     """``f(qd)``: ``qd`` (n,) or (N, n)."""
 
@@ -179,9 +187,13 @@ class Arm(metaclass=ArgumentErrors):
 
     # ---- kinematics --------------------------------------------------------------------------------------
     @cached_property
-    def fkine(self) -> ConfigurationFunction:
-        """``fkine(q)`` → T (4, 4): pose of the tool in the world, lengths in m."""
-        return self._entry("fkine")
+    def fkine(self) -> FrameFunction:
+        """``fkine(q)`` → T (4, 4): pose of the tool in the world, lengths in m.
+
+        ``frame=`` the name of another frame in the place of the tool: a named frame of the robot, or a link.
+        ``robot.frame_names`` lists them.
+        """
+        return self._framed_method("fkine")
 
     @cached_property
     def link_poses(self) -> ConfigurationFunction:
@@ -189,17 +201,20 @@ class Arm(metaclass=ArgumentErrors):
         return self._entry("link_poses")
 
     @cached_property
-    def jacob0(self) -> ConfigurationFunction:
+    def jacob0(self) -> FrameFunction:
         """``jacob0(q)`` → J (6, n): velocity of the tool in world axes is ``J qd``.
 
-        Rows: linear velocity x y z in m/s, then angular velocity x y z in rad/s.
+        Rows: linear velocity x y z in m/s, then angular velocity x y z in rad/s. ``frame=`` as for ``fkine``.
         """
-        return self._entry("jacob0")
+        return self._framed_method("jacob0")
 
     @cached_property
-    def jacobe(self) -> ConfigurationFunction:
-        """``jacobe(q)`` → J (6, n): velocity of the tool in tool axes is ``J qd``, rows as ``jacob0``."""
-        return self._entry("jacobe")
+    def jacobe(self) -> FrameFunction:
+        """``jacobe(q)`` → J (6, n): velocity of the tool in tool axes is ``J qd``, rows as ``jacob0``.
+
+        ``frame=`` as for ``fkine``; the axes are those of the frame.
+        """
+        return self._framed_method("jacobe")
 
     @cached_property
     def manipulability(self) -> ConfigurationFunction:
@@ -320,6 +335,35 @@ class Arm(metaclass=ArgumentErrors):
         """The native function of a method; pickling stores the robot and the name of the method."""
         kernel = self._kernel(method)
         return kernel.entry_with_fallback(kernel.__call__, maker=self.__reduce__())
+
+    def _framed_method(self, method: str) -> Callable[..., Array]:
+        """A function that calls the kernel of a method for the tool, or for another frame of the robot."""
+        kernel = self._kernel(method)
+
+        def call(
+            *arguments: ArrayLike,
+            frame: str | None = None,
+            out: Array | None = None,
+            threads: int = 1,
+            **named: ArrayLike,
+        ) -> Array:
+            of_frame = kernel if frame is None else self._kernel_at(method, frame)
+            if named:
+                arguments = in_order(method, kernel.inputs, arguments, named, ("frame", "out", "threads"))
+            return (of_frame.entry if named or frame else of_frame)(*arguments, out=out, threads=threads)
+
+        return kernel.entry_with_fallback(call, maker=self.__reduce__())
+
+    def _kernel_at(self, method: str, frame: str) -> Kernel:
+        """The kernel of a method for a frame of the robot. Raises UnknownNameError."""
+        name = f"{method} of {frame}"
+        kernel = self._kernels.get(name)
+        if kernel is None:
+            self.robot.frame(frame)
+            key = f"robot/{name}/{self._description_key}"
+            kernel = cached_kernel(key, lambda: _traces()[method](self.robot, frame))
+            self._kernels[name] = kernel
+        return kernel
 
     def _loaded_method(self, method: str) -> Callable[..., Array]:
         """A function that calls the kernel of a method, or with a wrench or payload a second kernel.

@@ -33,6 +33,7 @@ from armblocks.robot import (
     JointLimits,
     Link,
     Motor,
+    NamedFrame,
     Revolute,
     Robot,
     link_from_dh,
@@ -56,6 +57,7 @@ _ROBOT_KEYS = (
     "friction_model",
     "links",
     "constraints",
+    "frames",
 )
 _MASS_KEYS = ("mass", "centre_of_mass", "inertia")
 _LINK_KEYS = ("name", "parent", "dh", "joint", "before", "after", "limits", *_MASS_KEYS, "motor", "geometry")
@@ -92,6 +94,9 @@ def robot_from_json(node: Node) -> Robot:
         constraint_from_json(member, _transform_from_json)
         for member in (members["constraints"].elements() if "constraints" in members else ())
     )
+    frames = tuple(
+        _frame_from_json(member) for member in (members["frames"].elements() if "frames" in members else ())
+    )
     try:
         return Robot(
             name=texts["name"],
@@ -103,6 +108,7 @@ def robot_from_json(node: Node) -> Robot:
             gravity=_vector_from_json(members["gravity"]) if "gravity" in members else STANDARD_GRAVITY,
             friction_model=model,
             constraints=constraints,
+            frames=frames,
         )
     except (RobotError, UnknownNameError) as error:
         raise FormatError(
@@ -134,10 +140,26 @@ def robot_to_json(robot: Robot) -> dict[str, object]:
         document["constraints"] = [
             constraint_to_json(constraint, _transform_to_json) for constraint in robot.constraints
         ]
+    if robot.frames:
+        document["frames"] = [_frame_to_json(frame) for frame in robot.frames]
     return {key: _without_signed_zeros(value) for key, value in document.items()}
 
 
+def _frame_to_json(frame: NamedFrame) -> dict[str, object]:
+    pose = {} if frame.pose.is_identity else {"pose": _transform_to_json(frame.pose)}
+    return {"name": frame.name, "link": frame.link, **pose}
+
+
 # -- reading -----------------------------------------------------------------------------------------------
+
+
+def _frame_from_json(node: Node) -> NamedFrame:
+    members = closed_members(node, ("name", "link", "pose"), required=("name", "link"))
+    return NamedFrame(
+        name=members["name"].text(),
+        link=None if members["link"].value is None else members["link"].text(),
+        pose=_transform_from_json(members["pose"]) if "pose" in members else Transform(),
+    )
 
 
 def _link_from_json(node: Node) -> Link:

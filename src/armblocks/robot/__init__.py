@@ -34,6 +34,7 @@ from armblocks.robot.joints import (
     Universal,
 )
 from armblocks.robot.link import Link, Motor, inertia_matrix
+from armblocks.robot.named_frame import NamedFrame
 from armblocks.robot.physicality import InertiaFinding, inertia_findings, warn_of_inertias
 from armblocks.robot.plausibility import (
     PlausibilityFinding,
@@ -62,6 +63,7 @@ __all__ = [
     "JointLimits",
     "Link",
     "Motor",
+    "NamedFrame",
     "Planar",
     "PlanarClosure",
     "PlausibilityFinding",

@@ -19,6 +19,7 @@ from armblocks.robot.fields import pose
 from armblocks.robot.friction_model import FrictionModel
 from armblocks.robot.joints import Coordinate, Joint, JointLimits
 from armblocks.robot.link import Link, Motor
+from armblocks.robot.named_frame import NamedFrame, check_frames
 from armblocks.spatial import Transform, Vector3, vector3
 
 STANDARD_GRAVITY: Vector3 = (0.0, 0.0, -9.81)
@@ -32,7 +33,8 @@ class Robot(metaclass=ArgumentErrors):
     the last link; both accept a (4, 4) matrix. ``gravity`` m/s2 in the world frame, the acceleration
     of a falling body (toolbox files have the opposite sign); ``friction_model`` see :class:`FrictionModel`.
     ``constraints``: equations in addition to the joints of the tree, such as the closures of loops and the
-    couplings of joints. The joint coordinates q (nq,) and speeds qd (nv,) are in the order of the moving
+    couplings of joints. ``frames``: named frames on the links, such as end effectors; each link's own frame
+    has the name of the link. The joint coordinates q (nq,) and speeds qd (nv,) are in the order of the moving
     links. A joint has the name of its link.
 
     Robots are values: two robots are equal and have the same hash if all their numbers and names are equal.
@@ -54,6 +56,7 @@ class Robot(metaclass=ArgumentErrors):
     gravity: Vector3 = STANDARD_GRAVITY
     friction_model: FrictionModel = FrictionModel.SQUARED_GEAR
     constraints: tuple[Constraint, ...] = ()
+    frames: tuple[NamedFrame, ...] = ()
     source: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
@@ -70,6 +73,8 @@ class Robot(metaclass=ArgumentErrors):
         )
         object.__setattr__(self, "constraints", tuple(self.constraints))
         check_constraints(self.name, self.links, self.constraints)
+        object.__setattr__(self, "frames", tuple(self.frames))
+        check_frames(self.name, self.links, self.frames)
         if self.couplings:
             _ = self.coordinate_map  # raises RobotError for couplings that contradict each other
 
@@ -223,6 +228,20 @@ class Robot(metaclass=ArgumentErrors):
             if link.name == name:
                 return link
         raise UnknownNameError("link", name, [link.name for link in self.links], where=f"robot '{self.name}'")
+
+    @property
+    def frame_names(self) -> tuple[str, ...]:
+        """The names that :meth:`frame` accepts: the named frames, then the links."""
+        return (*(frame.name for frame in self.frames), *(link.name for link in self.links))
+
+    def frame(self, name: str) -> NamedFrame:
+        """The frame of this name; the frame of a link has its name. Raises UnknownNameError."""
+        for frame in self.frames:
+            if frame.name == name:
+                return frame
+        if name in self.frame_names:
+            return NamedFrame(name=name, link=name)
+        raise UnknownNameError("frame", name, self.frame_names, where=f"robot '{self.name}'")
 
     def with_link(self, name: str, **changes: object) -> Robot:
         """A copy with changed fields of the named link, given by name as for ``dataclasses.replace``."""

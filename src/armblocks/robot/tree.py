@@ -74,8 +74,9 @@ class KinematicTree:
 
     ``robot``: without couplings, so that every joint has coordinates of its own.
     ``bodies``: parents before children. ``links``: the frame of each link, in the robot's order. ``tip``: the
-    frame of the last link. ``tool``: the tool frame. ``base``: pose of the base in the world. ``gravity``:
-    m/s2, in *base* axes. ``grounded``: the inertia of the links fixed to the base.
+    frame of the last link. ``tool``: the tool frame, or the frame ``end`` if it is given. ``base``: pose of
+    the base in the world. ``gravity``: m/s2, in *base* axes. ``grounded``: the inertia of the links fixed to
+    the base.
     """
 
     robot: Robot
@@ -84,6 +85,7 @@ class KinematicTree:
     base: Transform
     gravity: Vector3
     grounded: RigidInertia
+    end: Frame | None = None
 
     @classmethod
     def of(cls, robot: Robot) -> KinematicTree:
@@ -135,8 +137,27 @@ class KinematicTree:
 
     @property
     def tool(self) -> Frame:
-        """The tool's frame."""
+        """The frame of the tool or of another end effector."""
+        if self.end is not None:
+            return self.end
         return Frame(body=self.tip.body, pose=self.tip.pose @ self.robot.tool)
+
+    def attached(self, link: str | None, pose: Transform) -> Frame:
+        """The frame with a constant ``pose`` in the frame of a link, or of the base (None)."""
+        if link is None:
+            return Frame(body=BASE, pose=pose)
+        frame = self.links[[entry.name for entry in self.robot.links].index(link)]
+        return Frame(body=frame.body, pose=frame.pose @ pose)
+
+    def with_tool_at(self, name: str | None) -> KinematicTree:
+        """The tree whose tool frame is the frame ``name`` of the robot (None: the tool itself).
+
+        Raises UnknownNameError.
+        """
+        if name is None:
+            return self
+        frame = self.robot.frame(name)
+        return replace(self, end=self.attached(frame.link, frame.pose))
 
     def ancestors(self, body: int) -> tuple[int, ...]:
         """The ancestors of ``body``, from its parent towards the base."""

@@ -22,9 +22,10 @@ from armblocks.formats.mjcf.meshes import MeshAssets
 from armblocks.formats.mjcf.poses import pose_of
 from armblocks.formats.mjcf.rules import EQUALITY, NAME, STIFFNESS, TENDON, UNREAD
 from armblocks.formats.mjcf.settings import MAIN, Defaults, Settings, sections, settings_of
-from armblocks.formats.mjcf.shapes import Geom, drawn, geom_of, is_collision_only
+from armblocks.formats.mjcf.shapes import Geom, drawn, geom_of, is_collision_only, site_pose
+from armblocks.formats.robot_writing import free_name
 from armblocks.formats.xml_elements import Element, note, read_elements, shortened
-from armblocks.robot import Fixed, Free, Link, Robot, deepest_tip, with_tip
+from armblocks.robot import Attachment, Fixed, Free, Link, NamedFrame, Robot, deepest_tip, with_tip
 from armblocks.robot.checks import MAX_LINKS
 from armblocks.robot.robot import STANDARD_GRAVITY
 from armblocks.robot.shapes import Material, Shape
@@ -59,7 +60,7 @@ def read_mjcf(data: bytes, file: str, context: FileContext) -> Robot:
         )
     name = root.attributes.get("model", "").strip() or PurePath(file).stem
     try:
-        robot = Robot(name=name, links=tuple(links), gravity=_gravity(root))
+        robot = Robot(name=name, links=tuple(links), gravity=_gravity(root), frames=model.frames())
         return with_tip(robot, deepest_tip(links))
     except RobotError as error:
         raise FormatError(
@@ -93,6 +94,7 @@ class _Contents:
     joints: list[tuple[Element, Transform]] = field(default_factory=list[tuple[Element, Transform]])
     geoms: list[Geom] = field(default_factory=list[Geom])
     bodies: list[tuple[Element, _Place]] = field(default_factory=list[tuple[Element, _Place]])
+    sites: list[tuple[Element, Transform]] = field(default_factory=list[tuple[Element, Transform]])
 
 
 class _Model:
@@ -109,6 +111,7 @@ class _Model:
         self.names: set[str] = set()
         self.read_bodies: set[str] = set()
         self.has_shapes = False
+        self.sites: dict[str, Attachment] = {}
         self._note_left_out()
 
     def links(self) -> list[Link]:
@@ -118,6 +121,7 @@ class _Model:
         for world in reversed([*self.root.all("worldbody")]):
             default_class = world.attributes.get("childclass", MAIN)
             contents = self._contents(world, _Place(parent=None, default_class=default_class), shapes=False)
+            self._add_sites(None, contents)
             waiting += reversed(contents.bodies)
         while waiting:
             body, place = waiting.pop()
@@ -178,6 +182,7 @@ class _Model:
             parent, before = link, offset
         if not series:
             series.append(Link(name=name, parent=parent, joint=Fixed(), before=before))
+        self._add_sites(name, inside)
         properties = mass_properties(body, inside.geoms, self.settings, self.meshes, self.context)
         series[-1] = replace(
             series[-1],
@@ -187,6 +192,21 @@ class _Model:
             geometry=self._drawing(body, inside.geoms),
         )
         return series, [(child, replace(at, parent=name)) for child, at in inside.bodies]
+
+    def _add_sites(self, link: str | None, contents: _Contents) -> None:
+        """Add the named sites of a body, or of the world."""
+        for element, pose in contents.sites:
+            name = element.attributes.get("name", "").strip()[:MAX_NAME]
+            if name and name not in self.sites:
+                self.sites[name] = Attachment(link=link, pose=pose)
+
+    def frames(self) -> tuple[NamedFrame, ...]:
+        """The named sites as frames. A site with the name of a link gets another name."""
+        used = set(self.names)
+        return tuple(
+            NamedFrame(name=free_name(name, used), link=site.link, pose=site.pose)
+            for name, site in self.sites.items()
+        )
 
     def _contents(self, element: Element, place: _Place, *, shapes: bool = True) -> _Contents:
         """The joints, shapes and bodies of a body or of the world; frames are replaced by their contents."""
@@ -203,6 +223,9 @@ class _Model:
                 contents.bodies.append((child, at))
             elif child.tag in ("joint", "freejoint"):
                 contents.joints.append((self.defaults.applied(child, at.default_class), at.pose))
+            elif child.tag == "site":
+                site = self.defaults.applied(child, at.default_class)
+                contents.sites.append((site, at.pose @ site_pose(site, self.settings)))
             elif child.tag == "geom" and shapes:
                 self.has_shapes = True
                 geom = self.defaults.applied(child, at.default_class)

@@ -52,6 +52,13 @@ def geom_of(element: Element, around: Transform, settings: Settings) -> Geom:
     return Geom(element=element, kind=kind, size=size, pose=around @ pose_of(element, settings))
 
 
+def site_pose(element: Element, settings: Settings) -> Transform:
+    """The pose of a site in the frame around it: between two points, or as other elements."""
+    if "fromto" not in element.attributes:
+        return pose_of(element, settings)
+    return _between_points(element, "capsule", (1.0,), Transform(), settings).pose
+
+
 def _between_points(
     element: Element, kind: str, size: tuple[float, ...], around: Transform, settings: Settings
 ) -> Geom:

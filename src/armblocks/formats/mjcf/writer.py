@@ -80,7 +80,8 @@ def write_mjcf(robot: Robot) -> bytes:
     names = file_names(robot, _is_changed, "MJCF")
     meshes: list[str] = []
     bodies, roots = _bodies(robot)
-    lines = _nested(robot, bodies, roots, names, meshes)
+    sites = _sites(robot)
+    lines = _nested(robot, bodies, roots, names, meshes, sites)
     head = [
         f"<mujoco model={quoted(robot.name or 'robot', robot)}>",
         '  <compiler angle="radian" inertiafromgeom="false" autolimits="true"/>',
@@ -88,7 +89,7 @@ def write_mjcf(robot: Robot) -> bytes:
     ]
     if meshes:
         head += ["  <asset>", *(f"    {mesh}" for mesh in meshes), "  </asset>"]
-    text = "\n".join([*head, "  <worldbody>", *lines, "  </worldbody>", "</mujoco>"])
+    text = "\n".join([*head, "  <worldbody>", *sites[None], *lines, "  </worldbody>", "</mujoco>"])
     data = f'<?xml version="1.0"?>\n{text}\n'.encode()
     tip = names[robot.links[-1].name] if robot.tool.is_identity else _tool_name(robot, names)
     warn_of_order(robot, tip, read_mjcf(data, "robot.xml", FileContext()), "MJCF")
@@ -138,6 +139,17 @@ def _tool_name(robot: Robot, names: Mapping[str | None, str]) -> str:
     return free_name("tool", {*names.values(), *(link.name for link in robot.links)})
 
 
+def _sites(robot: Robot) -> dict[str | None, list[str]]:
+    """The elements of the named frames, by their link; None is the world."""
+    sites: dict[str | None, list[str]] = {None: []}
+    for frame in robot.frames:
+        pose = frame.pose if frame.link is not None else robot.base @ frame.pose
+        name = quoted(frame.name, robot)
+        indent = "    " if frame.link is None else "  "
+        sites.setdefault(frame.link, []).append(f"{indent}<site name={name} {_placed(pose)}/>")
+    return sites
+
+
 def _bodies(robot: Robot) -> tuple[dict[str, _Body], list[str]]:
     """The bodies by the name of the link, and those at the base."""
     children: dict[str | None, list[Link]] = {}
@@ -180,6 +192,7 @@ def _only_carries_a_joint(robot: Robot, link: Link, children: Sequence[Link]) ->
         and inertial_in(link, Transform()) is None
         and not link.geometry
         and link is not robot.links[-1]
+        and all(frame.link != link.name for frame in robot.frames)
     )
 
 
@@ -189,6 +202,7 @@ def _nested(
     roots: Sequence[str],
     names: Mapping[str | None, str],
     meshes: list[str],
+    sites: Mapping[str | None, list[str]],
 ) -> list[str]:
     """The lines of the nested bodies; the tool is the last body in that of the tip."""
     tip = robot.links[-1].name
@@ -209,6 +223,7 @@ def _nested(
             continue
         body = bodies[name]
         lines += [f"{indent}{line}" for line in _body_lines(robot, body, names, meshes)]
+        lines += [f"{indent}{line}" for line in sites.get(name, ())]
         if name == tip and not robot.tool.is_identity:
             tool = _tool_name(robot, names)
             lines.append(f"{indent}  <body name={quoted(tool, robot)} {_placed(robot.tool)}/>")

@@ -21,16 +21,18 @@ from typing import NamedTuple
 
 from armblocks.errors import ArmblocksError, FormatError, RobotError
 from armblocks.formats.file_findings import FileContext
+from armblocks.formats.robot_writing import free_name
 from armblocks.formats.sdf.frames import WORLD, Frame, Frames, Scope
 from armblocks.formats.sdf.inertials import inertial_of
 from armblocks.formats.sdf.joints import GEARBOX, joint_type_of, joints_of
 from armblocks.formats.sdf.models import Models, source_of
-from armblocks.formats.sdf.rules import COUPLING, FREE_LINK, GRAVITY, UNKNOWN
+from armblocks.formats.sdf.rules import COUPLING, FRAME, FREE_LINK, GRAVITY, UNKNOWN
 from armblocks.formats.sdf.shapes import shapes_of
 from armblocks.formats.sdf.values import is_true, text_in
 from armblocks.formats.xml_elements import Element, note, read_elements, shortened
-from armblocks.robot import Fixed, Link, Robot, deepest_tip, with_tip
+from armblocks.robot import Fixed, Link, NamedFrame, Robot, deepest_tip, with_tip
 from armblocks.robot.checks import MAX_LINKS
+from armblocks.robot.named_frame import MAX_FRAMES
 from armblocks.robot.shapes import Material
 from armblocks.spatial import Transform, Vector3
 
@@ -133,16 +135,33 @@ def robot_of(model: Frame, world: Scope, context: FileContext) -> Robot:
         described += _links(edge, model, frames, used)
     if not any(link.element.first("visual") or link.element.first("collision") for link in links):
         described = [replace(link, geometry=None) for link in described]
+    named = _named_frames(model, scope, frames, used)
     base = frames.between(world.frame, model)
     gravity = _gravity(world.frame.element)
     try:
-        robot = Robot(name=model.name, links=tuple(described), base=base)
+        robot = Robot(name=model.name, links=tuple(described), base=base, frames=named)
         robot = robot if gravity is None else replace(robot, gravity=gravity)
         return with_tip(robot, deepest_tip(described))
     except RobotError as error:
         raise FormatError(
             f"{error.where}: {error.what}", where=model.element.where, allowed=error.allowed, fix=error.fix
         ) from error
+
+
+def _named_frames(model: Frame, scope: Scope, frames: Frames, used: set[str]) -> tuple[NamedFrame, ...]:
+    """The elements ``<frame>`` of a model; a finding for those whose place is not defined."""
+    named: list[NamedFrame] = []
+    for frame in [*scope.frames("frame")][:MAX_FRAMES]:
+        try:
+            body = frames.body(frame)
+            fixed = body.kind == WORLD or body.scope.fixed
+            pose = frames.between(model if fixed else body, frame)
+        except ArmblocksError as error:
+            note(frames.context, FRAME, frame.element, f"it is not read: {error.what}")
+            continue
+        name = free_name(frame.name, used)
+        named.append(NamedFrame(name=name, link=None if fixed else body.name, pose=pose))
+    return tuple(named)
 
 
 def _note_unknown(element: Element, context: FileContext) -> None:

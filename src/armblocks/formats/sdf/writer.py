@@ -70,6 +70,14 @@ def write_sdf(robot: Robot) -> bytes:
     if not robot.tool.is_identity:
         tip, last = free_name("tool", used), tip
         lines += _tool_lines(robot, last, tip, free_name(f"{tip}_joint", used))
+    for frame in robot.frames:
+        if frame.link is None:
+            where = f"robot '{robot.name}', frame '{frame.name}'"
+            warn_of_loss(where, "frames on the base are not part of the SDF file")
+        else:
+            name = quoted(free_name(frame.name, used), robot)
+            at = quoted(names[frame.link], robot)
+            lines.append(f"  <frame name={name} attached_to={at}>{_pose(frame.pose)}</frame>")
     lines.append("</model>")
     if not np.allclose(robot.gravity, STANDARD_GRAVITY, rtol=1e-15, atol=0.0):
         gravity = f"  <gravity>{numbers(robot.gravity)}</gravity>"

@@ -53,6 +53,9 @@ def write_urdf(robot: Robot) -> bytes:
     if not np.allclose(robot.gravity, STANDARD_GRAVITY, rtol=1e-15, atol=0.0):
         what = f"gravity {robot.gravity} is not part of a URDF file, which is read with -9.81 along z"
         warn_of_loss(f"robot '{robot.name}'", what)
+    if robot.frames:
+        what = "named frames are not part of the URDF file; use fixed links for them"
+        warn_of_loss(f"robot '{robot.name}'", what)
     warn_of_shapes(robot, (Box, Cylinder, Sphere), "URDF")
     mimics = mimics_of(robot, "URDF", supported=True)
     names = {link.name for link in robot.links}

@@ -141,7 +141,8 @@ def _rename(edit: RenameLink, robot: Robot) -> Robot:
         for link in robot.links
     )
     constraints = tuple(constraint.with_renamed_link(old, name) for constraint in robot.constraints)
-    return replace(robot, links=links, constraints=constraints)
+    frames = tuple(frame.with_renamed_link(old, name) for frame in robot.frames)
+    return replace(robot, links=links, constraints=constraints, frames=frames)
 
 
 def _is_chain(robot: Robot) -> bool:
