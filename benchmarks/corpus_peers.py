@@ -106,7 +106,8 @@ def difference_to_mujoco(robot: Robot, model: mujoco.MjModel, max_joints: int) -
     links = tuple(
         replace(link, before=Transform()) if isinstance(link.joint, Free) else link for link in robot.links
     )
-    robot = replace(robot, links=links)
+    # The constraints of MuJoCo are soft forces; the trees are compared.
+    robot = replace(robot, links=links, constraints=())
     rows: list[int] = []
     columns: list[int] = []
     for joint, j in zip(robot.joints, joints_of(robot, model)):

@@ -216,7 +216,7 @@ def test_actuators_give_the_torque_limits_of_their_joints() -> None:
     [
         (body("<joint type='ball' range='0 1'/><geom size='0.1'/>"), "mjcf-limit"),
         (body("<joint stiffness='3'/><geom size='0.1'/>"), "mjcf-stiffness"),
-        (body(HINGE, "<equality><connect body1='a' anchor='0 0 0'/></equality>"), "mjcf-equality"),
+        (body(HINGE, "<equality><connect body1='a' body2='z' anchor='0 0 0'/></equality>"), "mjcf-equality"),
         (
             body(HINGE, "<tendon><fixed stiffness='2'><joint joint='j' coef='1'/></fixed></tendon>"),
             "mjcf-tendon",

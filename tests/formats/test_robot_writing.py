@@ -13,8 +13,9 @@ from numpy.testing import assert_allclose
 
 from armblocks.errors import ArmblocksWarning, FormatError
 from armblocks.formats.file_findings import FileContext
+from armblocks.formats.mjcf.equality_writing import quaternion_of
 from armblocks.formats.mjcf.reader import read_mjcf
-from armblocks.formats.mjcf.writer import quaternion_of, write_mjcf
+from armblocks.formats.mjcf.writer import write_mjcf
 from armblocks.formats.sdf.reader import read_sdf
 from armblocks.formats.sdf.writer import write_sdf
 from armblocks.robot import (

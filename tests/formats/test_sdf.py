@@ -114,7 +114,7 @@ FOUND = [
     (
         two(axis(more="<mimic joint='k'/>")),
         "sdf-coupling",
-        "it mimics joint 'k'; its coordinate is independent in armblocks",
+        "it mimics joint 'k' with the multiplier 1; it stays independent",
     ),
     (
         two(
@@ -122,7 +122,7 @@ FOUND = [
             more='<joint name="g" type="gearbox"><parent>base</parent><child>arm</child></joint>',
         ),
         "sdf-coupling",
-        "the gearbox is not read; the coordinates that it couples are independent",
+        "no revolute joint connects 'arm' with the reference body of the gearbox",
     ),
     (
         two(Z).replace(f"0 1.5707963267948966</pose>{INERTIAL}", "0 0</pose>"),

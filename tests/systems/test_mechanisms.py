@@ -104,3 +104,17 @@ def test_a_start_beside_the_constraints_is_refused_with_the_gap() -> None:
 def test_blocks_of_independent_joints_refuse_constraints(block: type) -> None:
     with pytest.raises(InputError, match="robot 'four-bar' has constraints, such as 'pin'"):
         block(robot=four_bar())
+
+
+def test_computed_torque_moves_a_palletiser_with_its_linkages() -> None:
+    """The errors of the four axes decay with critical damping: e = e0 (1 + 10 t) exp(-10 t)."""
+    robot, q0 = ab.load_robot("irb660").robot, np.array([0.1, -0.2, 0.15, 0.3])
+    builder = ab.DiagramBuilder("palletiser")
+    zero = builder.add("zero", blocks.Constant(value=np.zeros(4)))
+    plant = builder.add("plant", blocks.ForwardDynamics(robot=robot, q0=q0))
+    law = blocks.ComputedTorque(robot=robot, Kp=100.0, Kd=20.0)
+    control = builder.add("control", law, zero, zero, zero, plant["q"], plant["qd"])
+    builder.connect(control, plant["tau"])
+    result = ab.simulate(builder.build(), stop_time=1.0, rtol=1e-9, atol=1e-11)
+    t = result.time[:, None]
+    assert result["plant/q"] == pytest.approx(q0 * (1 + 10 * t) * np.exp(-10 * t), abs=1e-7)

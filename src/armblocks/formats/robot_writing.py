@@ -9,7 +9,7 @@ from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
 from armblocks.errors import FormatError, counted, warn
-from armblocks.robot import Coupling, Joint, JointLimits, Link, Robot, with_tip
+from armblocks.robot import Closure, Coupling, Joint, JointLimits, Link, Robot, with_tip
 from armblocks.robot.shapes import Shape
 from armblocks.spatial import Transform
 
@@ -46,20 +46,23 @@ class Mimic(NamedTuple):
     offset: float
 
 
-def mimics_of(robot: Robot, format: str, *, supported: bool) -> dict[str, Mimic]:
+def mimics_of(robot: Robot, format: str, closures: Collection[type[Closure]] = ()) -> dict[str, Mimic]:
     """The joints that follow another one, by the name of their link.
 
-    Raises ``FormatError`` for closures of loops, for couplings of three or more joints, and for all couplings
-    if the format has none (``supported``).
+    Raises ``FormatError`` for closures of other types than ``closures``, and for couplings of one joint or of
+    three or more.
     """
     mimics: dict[str, Mimic] = {}
     for constraint in robot.constraints:
-        if not (supported and isinstance(constraint, Coupling) and len(constraint.terms) == 2):
+        if type(constraint) in closures:
+            continue
+        if not (isinstance(constraint, Coupling) and len(constraint.terms) == 2):
             kind = "coupling" if isinstance(constraint, Coupling) else f"{constraint.title} closure"
+            types = ", ".join(closure.title for closure in closures)
             raise FormatError(
                 f"constraint '{constraint.name}', a {kind}, is not part of {format} files here",
                 where=f"robot '{robot.name}'",
-                allowed="joints that follow one other joint" if supported else "robots without constraints",
+                allowed="joints that follow one other joint" + (f", closures: {types}" if types else ""),
                 fix="save the robot as .json",
             )
         (follower, own), (leader, factor) = constraint.terms

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from armblocks import dynamics
 from armblocks.blocks.robots.ports import (
     apply_traced,
-    check_no_constraints,
+    check_no_closures,
     check_speeds_are_rates,
     q_port,
     qd_port,
@@ -153,7 +153,8 @@ class ComputedTorque(Block):
     """Inverse dynamics control: tau = M(q) (qddr + Kd e' + Kp e) + C qd + g + friction, e = qr - q.
 
     If the model equals the robot, the errors of all joints obey e'' + Kd e' + Kp e = 0 independently:
-    critically damped for Kd = 2 sqrt(Kp).
+    critically damped for Kd = 2 sqrt(Kp). The model may have couplings, such as those of palletising arms,
+    but no closed loops, because the coordinates and accelerations of a loop are not independent.
     """
 
     title: ClassVar[str] = "Computed Torque Controller"
@@ -181,7 +182,7 @@ class ComputedTorque(Block):
     )
 
     def check(self) -> None:
-        check_no_constraints(self, self.robot)
+        check_no_closures(self, self.robot)
         _check_gains(self, self.robot)
 
     def input_ports(self) -> tuple[Port, ...]:

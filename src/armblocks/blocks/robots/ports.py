@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from casadi import SX
 from numpy.typing import NDArray
@@ -11,7 +13,7 @@ from armblocks.diagram import Block, Port, rate_unit, shape_of
 from armblocks.dynamics.mechanism import mechanism
 from armblocks.equations import TracedFunction, flatten, unflatten
 from armblocks.errors import InputError, counted
-from armblocks.robot import Robot
+from armblocks.robot import Constraint, Robot
 
 MAX_START_RESIDUAL = 1e-6
 """Largest residual of a start state that counts as consistent: m, or cosine of an angle, also per second."""
@@ -140,11 +142,21 @@ def start_numbers(block: Block, robot: Robot, name: str) -> NDArray[np.float64]:
     return given if given.shape else robot.neutral + given
 
 
+def check_no_closures(block: Block, robot: Robot) -> None:
+    """Raise ``InputError`` for a robot with closed loops, whose coordinates are not independent."""
+    check_independent(block, robot, robot.closures)
+
+
 def check_no_constraints(block: Block, robot: Robot) -> None:
     """Raise ``InputError`` for a robot with constraints, whose joints do not move independently."""
-    if robot.constraints:
+    check_independent(block, robot, robot.constraints)
+
+
+def check_independent(block: Block, robot: Robot, constraints: Sequence[Constraint]) -> None:
+    """Raise ``InputError`` for the first of the constraints that a block does not support."""
+    if constraints:
         raise InputError(
-            f"robot '{robot.name}' has constraints, such as '{robot.constraints[0].name}'",
+            f"robot '{robot.name}' has constraints, such as '{constraints[0].name}'",
             where=block.type_name(),
             allowed="robots whose joints move independently",
             fix="use the block ForwardDynamics for its motion, and controllers of its motor joints",

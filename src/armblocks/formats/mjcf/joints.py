@@ -113,6 +113,12 @@ def _force_limit(element: Element, attribute: str, factor: float = 1.0) -> float
     return limit if 0.0 < limit < math.inf else None
 
 
+def actuated_joints(root: Element, defaults: Defaults) -> set[str]:
+    """The names of the joints at which actuators act."""
+    actuators = [defaults.applied(element) for element in sections(root, "actuator")]
+    return {element.attributes.get("joint", "").strip() for element in actuators} - {""}
+
+
 def torque_limits(root: Element, defaults: Defaults, context: FileContext) -> dict[str, float]:
     """The largest torque (N m or N) of the actuators of each joint, by the joint's name.
 

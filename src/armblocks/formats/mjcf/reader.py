@@ -15,17 +15,30 @@ from pathlib import PurePath
 
 from armblocks.errors import FormatError, RobotError
 from armblocks.formats.file_findings import FileContext
+from armblocks.formats.mjcf.equality import Parts, constraints_of
 from armblocks.formats.mjcf.includes import with_includes
 from armblocks.formats.mjcf.inertials import mass_properties
-from armblocks.formats.mjcf.joints import joint_of, torque_limits
+from armblocks.formats.mjcf.joints import actuated_joints, joint_of, torque_limits
 from armblocks.formats.mjcf.meshes import MeshAssets
 from armblocks.formats.mjcf.poses import pose_of
-from armblocks.formats.mjcf.rules import EQUALITY, NAME, STIFFNESS, TENDON, UNREAD
+from armblocks.formats.mjcf.rules import NAME, STIFFNESS, TENDON, UNREAD
 from armblocks.formats.mjcf.settings import MAIN, Defaults, Settings, sections, settings_of
 from armblocks.formats.mjcf.shapes import Geom, drawn, geom_of, is_collision_only, site_pose
 from armblocks.formats.robot_writing import free_name
 from armblocks.formats.xml_elements import Element, note, read_elements, shortened
-from armblocks.robot import Attachment, Fixed, Free, Link, NamedFrame, Robot, deepest_tip, with_tip
+from armblocks.robot import (
+    Attachment,
+    Closure,
+    Constraint,
+    Fixed,
+    Free,
+    Link,
+    Motor,
+    NamedFrame,
+    Robot,
+    deepest_tip,
+    with_tip,
+)
 from armblocks.robot.checks import MAX_LINKS
 from armblocks.robot.robot import STANDARD_GRAVITY
 from armblocks.robot.shapes import Material, Shape
@@ -60,7 +73,16 @@ def read_mjcf(data: bytes, file: str, context: FileContext) -> Robot:
         )
     name = root.attributes.get("model", "").strip() or PurePath(file).stem
     try:
-        robot = Robot(name=name, links=tuple(links), gravity=_gravity(root), frames=model.frames())
+        constraints = model.constraints(links)
+        if any(isinstance(constraint, Closure) for constraint in constraints):
+            links = model.with_motors(links)
+        robot = Robot(
+            name=name,
+            links=tuple(links),
+            gravity=_gravity(root),
+            constraints=constraints,
+            frames=model.frames(),
+        )
         return with_tip(robot, deepest_tip(links))
     except RobotError as error:
         raise FormatError(
@@ -112,6 +134,7 @@ class _Model:
         self.read_bodies: set[str] = set()
         self.has_shapes = False
         self.sites: dict[str, Attachment] = {}
+        self.joints: dict[str, str] = {}
         self._note_left_out()
 
     def links(self) -> list[Link]:
@@ -168,6 +191,7 @@ class _Model:
                 joint = replace(joint, axis=Transform(rotation=around.rotation).apply(joint.axis))
             is_last = index == len(inside.joints) - 1
             link = name if is_last else self._free_name(element.attributes.get("name", ""), f"{name} joint")
+            self.joints[element.attributes.get("name", "").strip()] = link
             series.append(
                 Link(
                     name=link,
@@ -207,6 +231,33 @@ class _Model:
             NamedFrame(name=free_name(name, used), link=site.link, pose=site.pose)
             for name, site in self.sites.items()
         )
+
+    def constraints(self, links: list[Link]) -> tuple[Constraint, ...]:
+        """The constraints of the section ``<equality>``."""
+        offsets = {link.name: link.joint.offset for link in links if link.joint.nv == 1}
+        bodies = [*_bodies(self.root)]
+        parts = Parts(
+            links=links,
+            sites=self.sites,
+            joints={name: (link, -offsets[link]) for name, link in self.joints.items() if link in offsets},
+            mocap=frozenset(
+                body.attributes.get("name", "").strip()
+                for body in bodies
+                if body.attributes.get("mocap", "").strip() == "true"
+            ),
+        )
+        return constraints_of(self.root, self.defaults, parts, self.context)
+
+    def with_motors(self, links: list[Link]) -> list[Link]:
+        """The links of a model with closed loops: the joints of actuators have motors.
+
+        The torques of these joints are those that inverse dynamics computes.
+        """
+        driven = {self.joints.get(name) for name in actuated_joints(self.root, self.defaults)}
+        return [
+            replace(link, motor=Motor()) if link.name in driven and link.motor is None else link
+            for link in links
+        ]
 
     def _contents(self, element: Element, place: _Place, *, shapes: bool = True) -> _Contents:
         """The joints, shapes and bodies of a body or of the world; frames are replaced by their contents."""
@@ -254,10 +305,6 @@ class _Model:
 
     def _note_left_out(self) -> None:
         """Findings for the parts of a model that a robot does not have."""
-        for constraint in sections(self.root, "equality"):
-            if constraint.attributes.get("active", "true").strip() != "false":
-                what = f"the constraint <{shortened(constraint.tag)}> is left out: its joints are independent"
-                note(self.context, EQUALITY, constraint, what)
         for tendon in sections(self.root, "tendon"):
             element = self.defaults.applied(tendon)
             if any(element.number(name, 0.0) for name in ("stiffness", "damping", "frictionloss")):

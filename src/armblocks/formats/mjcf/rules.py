@@ -11,8 +11,8 @@ STIFFNESS = Rule(
 )
 EQUALITY = Rule(
     code="mjcf-equality",
-    allowed="joints that move independently, in a tree",
-    remedy="choose joint coordinates and torques that satisfy the constraint",
+    allowed="connect and weld between bodies or sites, and joint with a linear polynomial",
+    remedy="choose joint coordinates and torques that satisfy the constraint, or replace it",
 )
 TENDON = Rule(
     code="mjcf-tendon",

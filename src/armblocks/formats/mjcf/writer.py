@@ -9,7 +9,6 @@ The pose of the tool becomes a last body, so that ``fkine`` stays the same.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -17,6 +16,7 @@ import numpy as np
 
 from armblocks.errors import FormatError
 from armblocks.formats.file_findings import FileContext
+from armblocks.formats.mjcf.equality_writing import CLOSURES, add_site, equality_lines, placed
 from armblocks.formats.mjcf.reader import MAX_NAME, read_mjcf
 from armblocks.formats.robot_writing import (
     check_joint,
@@ -35,7 +35,7 @@ from armblocks.formats.robot_writing import (
 from armblocks.formats.xml_elements import MAX_DEPTH
 from armblocks.robot import Fixed, Free, Joint, Link, Prismatic, Revolute, Robot, Spherical
 from armblocks.robot.shapes import Box, Cylinder, Mesh, Shape, Sphere
-from armblocks.spatial import IDENTITY3, Matrix3, Transform
+from armblocks.spatial import IDENTITY3, Transform
 
 _KINDS: Mapping[type[Joint], str] = {
     Revolute: "hinge",
@@ -64,14 +64,14 @@ class _Body:
 def write_mjcf(robot: Robot) -> bytes:
     """The MJCF of a robot. Reading it gives the same kinematics and dynamics up to rounding.
 
-    Raises ``FormatError`` for robots with constraints and for joint types that MJCF does not have, and for
-    chains of bodies that exceed the maximum depth of XML files. Warns of data that MJCF does not have: gear
-    ratios (rotor inertia and friction are written at the joint), speed limits, the tip and the order of the
-    coordinates of some trees, Coulomb friction that depends on the direction, friction that accelerates,
-    housings. MuJoCo does not accept moving bodies without mass or with physically impossible inertias; they
-    are written as they are.
+    Raises ``FormatError`` for constraints and joint types that MJCF does not have, and for chains of bodies
+    that exceed the maximum depth of XML files. A revolute closure becomes two coincident pairs of points.
+    Warns of data that MJCF does not have: gear ratios (rotor inertia and friction are written at the joint),
+    speed limits, the tip and the order of the coordinates of some trees, Coulomb friction that depends on the
+    direction, friction that accelerates, housings. MuJoCo does not accept moving bodies without mass or with
+    physically impossible inertias; they are written as they are.
     """
-    mimics_of(robot, "MJCF", supported=False)
+    mimics = mimics_of(robot, "MJCF", CLOSURES)
     for link in robot.links:
         check_joint(robot, link, _KINDS, "MJCF")
         if link.joint.nq != link.joint.nv:
@@ -81,6 +81,7 @@ def write_mjcf(robot: Robot) -> bytes:
     meshes: list[str] = []
     bodies, roots = _bodies(robot)
     sites = _sites(robot)
+    equality = equality_lines(robot, mimics, names, sites)
     lines = _nested(robot, bodies, roots, names, meshes, sites)
     head = [
         f"<mujoco model={quoted(robot.name or 'robot', robot)}>",
@@ -89,7 +90,8 @@ def write_mjcf(robot: Robot) -> bytes:
     ]
     if meshes:
         head += ["  <asset>", *(f"    {mesh}" for mesh in meshes), "  </asset>"]
-    text = "\n".join([*head, "  <worldbody>", *sites[None], *lines, "  </worldbody>", "</mujoco>"])
+    tail = ["  <equality>", *equality, "  </equality>", "</mujoco>"] if equality else ["</mujoco>"]
+    text = "\n".join([*head, "  <worldbody>", *sites[None], *lines, "  </worldbody>", *tail])
     data = f'<?xml version="1.0"?>\n{text}\n'.encode()
     tip = names[robot.links[-1].name] if robot.tool.is_identity else _tool_name(robot, names)
     warn_of_order(robot, tip, read_mjcf(data, "robot.xml", FileContext()), "MJCF")
@@ -143,10 +145,7 @@ def _sites(robot: Robot) -> dict[str | None, list[str]]:
     """The elements of the named frames, by their link; None is the world."""
     sites: dict[str | None, list[str]] = {None: []}
     for frame in robot.frames:
-        pose = frame.pose if frame.link is not None else robot.base @ frame.pose
-        name = quoted(frame.name, robot)
-        indent = "    " if frame.link is None else "  "
-        sites.setdefault(frame.link, []).append(f"{indent}<site name={name} {_placed(pose)}/>")
+        add_site(robot, sites, frame)
     return sites
 
 
@@ -193,6 +192,7 @@ def _only_carries_a_joint(robot: Robot, link: Link, children: Sequence[Link]) ->
         and not link.geometry
         and link is not robot.links[-1]
         and all(frame.link != link.name for frame in robot.frames)
+        and all(link.name not in closure.links for closure in robot.closures)
     )
 
 
@@ -226,7 +226,7 @@ def _nested(
         lines += [f"{indent}{line}" for line in sites.get(name, ())]
         if name == tip and not robot.tool.is_identity:
             tool = _tool_name(robot, names)
-            lines.append(f"{indent}  <body name={quoted(tool, robot)} {_placed(robot.tool)}/>")
+            lines.append(f"{indent}  <body name={quoted(tool, robot)} {placed(robot.tool)}/>")
         waiting.append(("", depth))
         waiting += [(child, depth + 1) for child in reversed(body.children)]
     return lines
@@ -235,7 +235,7 @@ def _nested(
 def _body_lines(robot: Robot, body: _Body, names: Mapping[str | None, str], meshes: list[str]) -> list[str]:
     """The start tag of a body, its joints, inertia and shapes."""
     link = body.link
-    lines = [f"<body name={quoted(names[link.name], robot)} {_placed(body.pose)}>"]
+    lines = [f"<body name={quoted(names[link.name], robot)} {placed(body.pose)}>"]
     lines += [f"  {_joint(robot, carried, after, names)}" for carried, after in body.joints]
     inertial = inertial_in(link, Transform())
     if inertial is not None:
@@ -247,7 +247,7 @@ def _body_lines(robot: Robot, body: _Body, names: Mapping[str | None, str], mesh
     for shape in link.geometry or ():
         geometry = _geometry(shape, meshes)
         if geometry:
-            pose = _placed(Transform.from_matrix(np.array(shape.pose)))
+            pose = placed(Transform.from_matrix(np.array(shape.pose)))
             lines.append(f'  <geom {geometry} {pose} contype="0" conaffinity="0" group="1"/>')
     return lines
 
@@ -290,27 +290,3 @@ def _geometry(shape: Shape, meshes: list[str]) -> str:
             return f'type="mesh" mesh="{name}"'
         case _:
             return ""
-
-
-def _placed(pose: Transform) -> str:
-    """The attributes of a pose."""
-    position = f'pos="{numbers(pose.translation)}"'
-    if pose.rotation == IDENTITY3:
-        return position
-    return f'{position} quat="{numbers(quaternion_of(pose.rotation))}"'
-
-
-def quaternion_of(R: Matrix3) -> tuple[float, float, float, float]:
-    """The quaternion w x y z of a rotation, by Shepperd's method, which divides by the largest component."""
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R
-    fours = (1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz)
-    products = (
-        (fours[0], zy - yz, xz - zx, yx - xy),
-        (zy - yz, fours[1], yx + xy, xz + zx),
-        (xz - zx, yx + xy, fours[2], zy + yz),
-        (yx - xy, xz + zx, zy + yz, fours[3]),
-    )
-    row = products[max(range(4), key=lambda k: fours[k])]
-    length = math.hypot(*row)
-    w, x, y, z = (value / length for value in row)
-    return w, x, y, z

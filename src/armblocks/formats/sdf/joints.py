@@ -6,9 +6,9 @@ import math
 
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.sdf.frames import MODEL_FRAME, Frame, Frames
-from armblocks.formats.sdf.rules import AXIS, COUPLING, DAMPING, LIMIT, SPRING
+from armblocks.formats.sdf.rules import AXIS, DAMPING, LIMIT, SPRING
 from armblocks.formats.sdf.values import flag_in, number_in, unbounded_number_in
-from armblocks.formats.xml_elements import Element, note, shortened
+from armblocks.formats.xml_elements import Element, note
 from armblocks.robot import Joint, JointLimits, Motor, Prismatic, Revolute, Screw, Spherical
 from armblocks.spatial import Transform, Vector3
 
@@ -55,7 +55,7 @@ def joints_of(joint: Frame, frames: Frames, reverse: bool) -> list[tuple[Joint, 
     axes: list[tuple[Joint, Motor | None]] = []
     for tag in AXES[kind]:
         axis = joint.element.first(tag)
-        x, y, z = _direction(joint, axis, tag, frames)
+        x, y, z = direction_of(joint, axis, tag, frames)
         limits = _limits(joint, axis, kind == "continuous", frames.context)
         direction = (-x, -y, -z) if reverse else (x, y, z)
         if kind == "screw":
@@ -82,7 +82,7 @@ def _pitch(joint: Element) -> float:
     return pitch
 
 
-def _direction(joint: Frame, axis: Element | None, tag: str, frames: Frames) -> Vector3:
+def direction_of(joint: Frame, axis: Element | None, tag: str, frames: Frames) -> Vector3:
     """The axis in the frame of the joint."""
     xyz = axis.first("xyz") if axis is not None else None
     if axis is None or (xyz is None and "xyz" not in axis.attributes):
@@ -146,15 +146,10 @@ def motor_of(joint: Frame, axis: Element | None, context: FileContext) -> Motor 
     """The motor that gives a joint the friction of ``<dynamics>``: ``tau = damping qd + friction sign(qd)``.
 
     Rotor and gear are those of Drake's elements ``drake:rotor_inertia`` and ``drake:gear_ratio``. Findings
-    name springs and couplings, which are not read.
+    name springs, which are not read.
     """
     if axis is None:
         return None
-    mimic = axis.first("mimic")
-    if mimic is not None:
-        leader = shortened(mimic.attributes.get("joint", ""))
-        what = f"it mimics joint '{leader}'; its coordinate is independent in armblocks"
-        note(context, COUPLING, mimic, what, joint.element.label)
     rotor = number_in(joint.element, "drake:rotor_inertia", 0.0)
     gear = number_in(joint.element, "drake:gear_ratio", 1.0)
     if rotor < 0 or gear == 0:

@@ -22,11 +22,12 @@ from typing import NamedTuple
 from armblocks.errors import ArmblocksError, FormatError, RobotError
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.robot_writing import free_name
+from armblocks.formats.sdf.constraints import Coordinate, closure_of, couplings_of
 from armblocks.formats.sdf.frames import WORLD, Frame, Frames, Scope
 from armblocks.formats.sdf.inertials import inertial_of
-from armblocks.formats.sdf.joints import GEARBOX, joint_type_of, joints_of
+from armblocks.formats.sdf.joints import AXES, GEARBOX, joint_type_of, joints_of
 from armblocks.formats.sdf.models import Models, source_of
-from armblocks.formats.sdf.rules import COUPLING, FRAME, FREE_LINK, GRAVITY, UNKNOWN
+from armblocks.formats.sdf.rules import FRAME, FREE_LINK, GRAVITY, UNKNOWN
 from armblocks.formats.sdf.shapes import shapes_of
 from armblocks.formats.sdf.values import is_true, text_in
 from armblocks.formats.xml_elements import Element, note, read_elements, shortened
@@ -131,15 +132,34 @@ def robot_of(model: Frame, world: Scope, context: FileContext) -> Robot:
     context.lines.update({link.name: link.element.line for link in links})
     used = {link.name for link in links}
     described: list[Link] = []
-    for edge in _depth_first(links, _edges(links, joints, frames), frames):
-        described += _links(edge, model, frames, used)
+    edges, closing = _edges(links, joints, frames)
+    coordinates: list[Coordinate] = []
+    for edge in _depth_first(links, edges, frames):
+        series = [*_links(edge, model, frames, used)]
+        described += series
+        if edge.joint is not None:
+            tags = AXES[joint_type_of(edge.joint)]
+            for link, tag in zip(series, tags[::-1] if edge.reverse else tags):
+                at = Coordinate(
+                    link=link.name, joint=edge.joint, tag=tag, carrier=edge.carrier, carried=edge.link
+                )
+                coordinates.append(at)
+    closures = tuple(closure_of(joint, (parent, child), model, frames) for joint, parent, child in closing)
+    gearboxes = [joint for joint in joints if joint_type_of(joint) == GEARBOX]
+    couplings = couplings_of(described, coordinates, gearboxes, frames)
     if not any(link.element.first("visual") or link.element.first("collision") for link in links):
         described = [replace(link, geometry=None) for link in described]
     named = _named_frames(model, scope, frames, used)
     base = frames.between(world.frame, model)
     gravity = _gravity(world.frame.element)
     try:
-        robot = Robot(name=model.name, links=tuple(described), base=base, frames=named)
+        robot = Robot(
+            name=model.name,
+            links=tuple(described),
+            base=base,
+            frames=named,
+            constraints=(*closures, *couplings),
+        )
         robot = robot if gravity is None else replace(robot, gravity=gravity)
         return with_tip(robot, deepest_tip(described))
     except RobotError as error:
@@ -181,13 +201,12 @@ def _gravity(world: Element) -> Vector3 | None:
     return x, y, z
 
 
-def _edges(
-    links: list[Frame], joints: list[Frame], frames: Frames
-) -> list[tuple[Frame, Frame | None, Frame | None]]:
-    """Each joint with the links of its parent and child; ``None`` is the base.
+Ends = tuple[Frame, Frame | None, Frame | None]
+"""A joint with the links of its parent and child; ``None`` is the base."""
 
-    Raises ``FormatError`` for a joint that closes a loop.
-    """
+
+def _edges(links: list[Frame], joints: list[Frame], frames: Frames) -> tuple[list[Ends], list[Ends]]:
+    """The joints of a tree, and those that close loops of it."""
     group: dict[Frame | None, Frame | None] = {link: link for link in (*links, None)}
 
     def leader(link: Frame | None) -> Frame | None:
@@ -196,29 +215,24 @@ def _edges(
             link = group[link]
         return link
 
-    edges: list[tuple[Frame, Frame | None, Frame | None]] = []
+    edges: list[Ends] = []
+    closing: list[Ends] = []
     for joint in joints:
         kind = joint_type_of(joint)
         parent, child = (_end(joint, tag, frames) for tag in ("parent", "child"))
-        if joint.scope.fixed:
-            continue
-        if kind == GEARBOX:
-            what = "the gearbox is not read; the coordinates that it couples are independent"
-            note(frames.context, COUPLING, joint.element, what)
+        if joint.scope.fixed or kind == GEARBOX:
             continue
         a, b = leader(parent), leader(child)
         if a is b:
-            ends = " and ".join(
-                "the world" if end is None else f"link '{shortened(end.name)}'" for end in (parent, child)
-            )
-            raise joint.element.error(
-                f"{ends} are already connected by other joints",
-                allowed="a tree of links: closed loops are not supported",
-                fix="remove one of the joints of the loop",
-            )
+            if parent is child:
+                raise joint.element.error(
+                    "the joint connects a link with itself", allowed="two links", fix="correct its parent"
+                )
+            closing.append((joint, parent, child))
+            continue
         group[b] = a
         edges.append((joint, parent, child))
-    return edges
+    return edges, closing
 
 
 def _end(joint: Frame, tag: str, frames: Frames) -> Frame | None:
@@ -233,9 +247,7 @@ def _end(joint: Frame, tag: str, frames: Frames) -> Frame | None:
     return None if link.kind == WORLD or link.scope.fixed else link
 
 
-def _depth_first(
-    links: list[Frame], edges: list[tuple[Frame, Frame | None, Frame | None]], frames: Frames
-) -> Iterator[Edge]:
+def _depth_first(links: list[Frame], edges: list[Ends], frames: Frames) -> Iterator[Edge]:
     """Each link with the joint that carries it, carriers before their children."""
     at: dict[Frame | None, list[Edge]] = {}
     children: set[Frame | None] = set()

@@ -26,8 +26,13 @@ SPRING = Rule(
 )
 COUPLING = Rule(
     code="sdf-coupling",
-    allowed="joints that move independently: neither <mimic> nor gearboxes",
-    remedy="compute the coupled coordinates from the others",
+    allowed="<mimic> of a joint with one axis, and gearboxes between revolute joints of one body",
+    remedy="correct the names of joints and bodies, or compute the coupled coordinates from the others",
+)
+CLOSURE = Rule(
+    code="sdf-closure",
+    allowed="joints that close a loop without limits and friction",
+    remedy="close the loop at another joint: move this one up in the file",
 )
 NO_INERTIA = Rule(
     code="sdf-inertia-default",
@@ -86,6 +91,7 @@ SDF_RULES = (
     DAMPING,
     SPRING,
     COUPLING,
+    CLOSURE,
     NO_INERTIA,
     AUTO_INERTIA,
     GRAVITY,

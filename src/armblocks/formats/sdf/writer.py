@@ -10,12 +10,16 @@ Motors have the elements ``drake:rotor_inertia`` and ``drake:gear_ratio`` of Dra
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from xml.sax.saxutils import escape
 
 import numpy as np
+from numpy.typing import NDArray
 
+from armblocks.errors import FormatError
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.robot_writing import (
+    Mimic,
     check_joint,
     file_names,
     free_name,
@@ -30,7 +34,24 @@ from armblocks.formats.robot_writing import (
     warn_of_shapes,
 )
 from armblocks.formats.sdf.reader import read_sdf
-from armblocks.robot import Fixed, Joint, Link, Prismatic, Revolute, Robot, Screw, Spherical
+from armblocks.robot import (
+    Closure,
+    Fixed,
+    Joint,
+    Link,
+    Prismatic,
+    PrismaticClosure,
+    Revolute,
+    RevoluteClosure,
+    Robot,
+    Screw,
+    Spherical,
+    SphericalClosure,
+    UniversalClosure,
+    WeldClosure,
+)
+from armblocks.robot.constraints import Distance, NoDisplacement, Perpendicular
+from armblocks.robot.geometry import link_frames
 from armblocks.robot.robot import STANDARD_GRAVITY
 from armblocks.robot.shapes import Box, Cylinder, Shape, Sphere
 from armblocks.spatial import Transform
@@ -42,6 +63,13 @@ _KINDS: Mapping[type[Joint], str] = {
     Screw: "screw",
     Spherical: "ball",
 }
+_CLOSURES: Mapping[type[Closure], str] = {
+    RevoluteClosure: "continuous",
+    PrismaticClosure: "prismatic",
+    SphericalClosure: "ball",
+    WeldClosure: "fixed",
+    UniversalClosure: "universal",
+}
 _VERSION = "1.9"
 _DRAKE = "http://drake.mit.edu"
 
@@ -51,21 +79,24 @@ def write_sdf(robot: Robot) -> bytes:
 
     A robot with another gravity than -9.81 m/s2 along z is written as the model of a world with this gravity.
 
-    Raises ``FormatError`` for robots with constraints and for joint types that SDF does not have. Warns of
-    data that SDF does not have: the tip and the order of the coordinates of some trees, Coulomb friction
-    that depends on the direction, friction that accelerates, meshes and housings, names that SDF reserves.
+    Raises ``FormatError`` for constraints and joint types that SDF does not have, and for loops that are not
+    closed with all joints at zero. Warns of data that SDF does not have: the tip and the order of the
+    coordinates of some trees, Coulomb friction that depends on the direction, friction that accelerates,
+    meshes and housings, names that SDF reserves.
     """
-    mimics_of(robot, "SDF", supported=False)
+    mimics = mimics_of(robot, "SDF", tuple(_CLOSURES))
     warn_of_shapes(robot, (Box, Cylinder, Sphere), "SDF")
     names = file_names(robot, _is_reserved, "SDF")
     used = set(names.values()) | {link.name for link in robot.links}
     lines = [f"<model name={quoted(robot.name or 'robot', robot)}>"]
     if not robot.base.is_identity:
         lines.append(f"  {_pose(robot.base)}")
+    joints = {link.name: free_name(f"{names[link.name]}_joint", used) for link in robot.links}
     for link in robot.links:
-        joint = free_name(f"{names[link.name]}_joint", used)
-        lines += _link_lines(robot, link, names, joint)
-        lines += _joint_lines(robot, link, names, joint)
+        lines += _link_lines(robot, link, names, joints[link.name])
+        lines += _joint_lines(robot, link, names, joints, mimics.get(link.name))
+    for closure in robot.closures:
+        lines += _closure_lines(robot, closure, names, free_name(closure.name, used))
     tip = names[robot.links[-1].name]
     if not robot.tool.is_identity:
         tip, last = free_name("tool", used), tip
@@ -128,7 +159,14 @@ def _geometry(shape: Shape) -> str:
             return ""
 
 
-def _joint_lines(robot: Robot, link: Link, names: Mapping[str | None, str], name: str) -> list[str]:
+def _joint_lines(
+    robot: Robot,
+    link: Link,
+    names: Mapping[str | None, str],
+    joints: Mapping[str, str],
+    mimic: Mimic | None,
+) -> list[str]:
+    name = joints[link.name]
     check_joint(robot, link, _KINDS, "SDF")
     joint = link.joint
     kind = _KINDS[type(joint)]
@@ -150,12 +188,61 @@ def _joint_lines(robot: Robot, link: Link, names: Mapping[str | None, str], name
     if joint.nv == 1:
         lines += ["    <axis>", f"      <xyz>{numbers(joint.axis)}</xyz>"]
         lines += [f"      {line}" for line in (_limit(link), _dynamics(robot, link)) if line]
+        if mimic is not None:
+            leader = quoted(joints[mimic.leader], robot)
+            numbers_of = f"<multiplier>{mimic.multiplier!r}</multiplier><offset>{mimic.offset!r}</offset>"
+            lines.append(f"      <mimic joint={leader}>{numbers_of}<reference>0</reference></mimic>")
         lines.append("    </axis>")
         motor = link.motor
         if motor is not None and (motor.gear_ratio, motor.inertia) != (1.0, 0.0):
             lines.append(f"    <drake:rotor_inertia>{motor.inertia!r}</drake:rotor_inertia>")
             lines.append(f"    <drake:gear_ratio>{motor.gear_ratio!r}</drake:gear_ratio>")
     return [*lines, "  </joint>"]
+
+
+def _closure_lines(robot: Robot, closure: Closure, names: Mapping[str | None, str], name: str) -> list[str]:
+    """The joint that closes a loop, at the frame of its child."""
+    tree = replace(robot, constraints=())
+    rows = link_frames(tree, tree.neutral.tolist())
+    index = {None: 0, **{link.name: k for k, link in enumerate(robot.links, start=1)}}
+    a, b = (rows[index[end.link]] @ end.pose.matrix for end in (closure.first, closure.second))
+    check_closed(robot, closure, a, b)
+    parent, child = ("world" if link is None else names[link] for link in closure.links)
+    lines = [
+        f'  <joint name={quoted(name, robot)} type="{_CLOSURES[type(closure)]}">',
+        f"    {_pose(closure.second.pose, '__model__' if closure.second.link is None else child, robot)}",
+        f"    <parent>{escape(parent)}</parent>",
+        f"    <child>{escape(child)}</child>",
+    ]
+    if isinstance(closure, UniversalClosure):
+        first = (b[:3, :3].T @ a[:3, 2]).tolist()
+        lines.append(f"    <axis><xyz>{numbers(first)}</xyz></axis><axis2><xyz>0 1 0</xyz></axis2>")
+    elif isinstance(closure, RevoluteClosure | PrismaticClosure):
+        lines.append("    <axis><xyz>0 0 1</xyz></axis>")
+    return [*lines, "  </joint>"]
+
+
+def check_closed(robot: Robot, closure: Closure, a: NDArray[np.float64], b: NDArray[np.float64]) -> None:
+    """Raise ``FormatError`` unless a closure is closed with all joints at zero.
+
+    SDF defines both frames of a joint by this configuration. ``a`` and ``b`` (4, 4): the poses of the frames.
+    """
+    for relation in closure.relations:
+        match relation:
+            case NoDisplacement(axis):
+                gap = a[:3, axis] @ (b[:3, 3] - a[:3, 3])
+            case Perpendicular(first, second):
+                gap = a[:3, first] @ b[:3, second]
+            case Distance(length):
+                gap = np.linalg.norm(b[:3, 3] - a[:3, 3]) - length
+        reverse = any(a[:3, axis] @ b[:3, axis] < 0.0 for axis in closure.parallel_axes)
+        if reverse or abs(float(gap)) > 1e-9:
+            raise FormatError(
+                f"constraint '{closure.name}' is not satisfied with all joints at zero",
+                where=f"robot '{robot.name}'",
+                allowed="loops that are closed there: SDF defines the frames of joints by this configuration",
+                fix="add the coordinates of arm.assemble() to the offsets of the joints, or save it as .json",
+            )
 
 
 def _tool_lines(robot: Robot, last: str, tool: str, joint: str) -> list[str]:

@@ -57,7 +57,7 @@ def write_urdf(robot: Robot) -> bytes:
         what = "named frames are not part of the URDF file; use fixed links for them"
         warn_of_loss(f"robot '{robot.name}'", what)
     warn_of_shapes(robot, (Box, Cylinder, Sphere), "URDF")
-    mimics = mimics_of(robot, "URDF", supported=True)
+    mimics = mimics_of(robot, "URDF")
     names = {link.name for link in robot.links}
     root = free_name("base_link", names)
     own_root = _root_link(robot)
