@@ -7,7 +7,7 @@ relations, by NumPy's least squares. The joints of the tree are revolute, prisma
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -129,30 +129,63 @@ class Equations:
 
 def accelerations(robot: Robot, q: Array, qd: Array, tau: Array) -> Array:
     """qdd (n,) for joint torques minus friction."""
+    return _solved(robot, q, qd, tau)[0]
+
+
+def reactions(robot: Robot, q: Array, qd: Array, tau: Array, relations: Sequence[int]) -> dict[str, Array]:
+    """The wrench (6,) of the parent on each link, and of the first link of each closure on the second one.
+
+    Forces, then moments about the origin of the link's frame, in world axes. ``relations``: the indices of
+    independent relations of the closures, which alone transmit forces.
+    """
+    return _solved(robot, q, qd, tau, relations)[1]
+
+
+def _solved(
+    robot: Robot, q: Array, qd: Array, tau: Array, relations: Sequence[int] | None = None
+) -> tuple[Array, dict[str, Array]]:
+    """qdd (n,), and the wrenches of :func:`reactions`."""
     equations = Equations(robot, q, qd)
     n = equations.size
     M, force = np.zeros((n, n)), np.zeros(n)
     for k, link in zip(range(0, n, 6), robot.links):
-        M[k : k + 6, k : k + 6], force[k : k + 6] = _newton_euler(robot, link, equations.bodies[link.name])
+        M[k : k + 6, k : k + 6], force[k : k + 6] = newton_euler(robot, link, equations.bodies[link.name])
     rows, rest = [np.zeros(n)][:0], [0.0][:0]
     speeds: list[tuple[Array, float]] = []
+    owners: list[tuple[str, str | None]] = []
+    drives: dict[str, Array] = {}
     for link in robot.links:
         a, b = joint_frames(link)
         for relation in JOINT_RELATIONS.get(type(link.joint), (*XYZ, *AXES_PARALLEL)):
             row, value = equations.row(relation, a, b)
             rows.append(row)
             rest.append(value)
+            owners.append((link.name, link.name))
+        drives[link.name] = np.zeros(n)
         if link.joint.moves:
             row, value = _coordinate(equations, link, a, b)
-            force += tau[len(speeds)] * row
+            drives[link.name] = tau[len(speeds)] * row
+            force += drives[link.name]
             speeds.append((row, value))
-    for row, value in _constraint_rows(robot, equations, speeds):
+    for index, (name, second, row, value) in enumerate(_constraint_rows(robot, equations, speeds)):
+        drives[name] = np.zeros(n)
+        if relations is not None and index not in relations:
+            continue
         rows.append(row)
         rest.append(value)
+        owners.append((name, second))
     J = np.array(rows)
     system = np.block([[M, J.T], [J, np.zeros((len(J), len(J)))]])
-    solution = np.linalg.lstsq(system, np.concatenate((force, -np.array(rest))), rcond=1e-11)[0][:n]
-    return np.array([row @ solution + value for row, value in speeds])
+    solution = np.linalg.lstsq(system, np.concatenate((force, -np.array(rest))), rcond=1e-11)[0]
+    wrenches = {name: drive.copy() for name, drive in drives.items()}
+    for (name, _), row, multiplier in zip(owners, rows, solution[n:]):
+        wrenches[name] -= multiplier * row
+    on_link: dict[str, Array] = {}
+    for name, link in owners:
+        if link is not None:
+            k = 6 * equations.names.index(link)
+            on_link[name] = wrenches[name][k : k + 6]
+    return np.array([row @ solution[:n] + value for row, value in speeds]), on_link
 
 
 def _coordinate(equations: Equations, link: Link, a: Frame, b: Frame) -> tuple[Array, float]:
@@ -170,22 +203,25 @@ def _coordinate(equations: Equations, link: Link, a: Frame, b: Frame) -> tuple[A
 
 def _constraint_rows(
     robot: Robot, equations: Equations, speeds: list[tuple[Array, float]]
-) -> Iterator[tuple[Array, float]]:
+) -> Iterator[tuple[str, str | None, Array, float]]:
+    """The name of each constraint, the link that its wrench acts on, and its equation."""
     names = [link.name for link in robot.tree_links]
     for constraint in robot.constraints:
         if isinstance(constraint, Coupling):
             terms = [(speeds[names.index(joint)], factor) for joint, factor in constraint.terms]
             yield (
+                constraint.name,
+                None,
                 np.sum([factor * row for (row, _), factor in terms], axis=0),
                 float(sum(factor * value for (_, value), factor in terms)),
             )
         elif isinstance(constraint, Closure):
             a, b = (Frame(end.link, *_parts(end.pose)) for end in (constraint.first, constraint.second))
             for relation in constraint.relations:
-                yield equations.row(relation, a, b)
+                yield constraint.name, b.link, *equations.row(relation, a, b)
 
 
-def _newton_euler(robot: Robot, link: Link, body: Body) -> tuple[Array, Array]:
+def newton_euler(robot: Robot, link: Link, body: Body) -> tuple[Array, Array]:
     """Mass matrix (6, 6) about the frame's origin and applied minus gyroscopic forces, in world axes."""
     m, g = link.mass, np.asarray(robot.gravity)
     c = body.R @ np.asarray(link.centre_of_mass)

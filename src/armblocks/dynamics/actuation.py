@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import wraps
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from casadi import SX, mtimes, vertcat
@@ -30,13 +30,25 @@ from armblocks.robot.robot import Robot
 from armblocks.robot.tree import KinematicTree
 
 
-def motor_torques(
+class MotorForces(NamedTuple):
+    """Torques (n, 1) of the motors, and the multipliers of all relations of the closures, N or N m.
+
+    The multipliers of relations that follow from others are 0: their forces are statically indeterminate.
+    ``validity``: 0, or NaN if the motion violates the constraints.
+    """
+
+    torques: SX
+    multipliers: list[SX]
+    validity: SX
+
+
+def motor_forces(
     robot: Robot, q: SX, free_torques: SX, qd: SX | None, qdd: SX | None, near: Array | None
-) -> SX:
-    """Torques (n, 1) of the joints with a motor, and 0 at the others, in the order of qd.
+) -> MotorForces:
+    """Torques of the joints with a motor, and 0 at the others, in the order of qd.
 
     ``free_torques`` (n, 1): the torques of all joints for the same motion without the closures. ``near``: see
-    :func:`independent_relations`. The torques are NaN if the motion violates the constraints, because its
+    :func:`independent_relations`. The results are NaN if the motion violates the constraints, because its
     inertia torques would be wrong. Raises RobotError unless the motors and the degrees of freedom agree in
     number and the motors move all of them.
     """
@@ -51,7 +63,11 @@ def motor_torques(
     multipliers = vertcat(*solve(entries(mtimes(J_passive, free_torques[passive]))))
     torques = free_torques - mtimes(J.T, multipliers)
     torques[passive] = 0.0
-    return SX(torques + nan_unless_consistent(equations, qd, qdd))
+    validity = nan_unless_consistent(equations, qd, qdd)
+    of_all = [SX(0.0)] * len(mechanism(robot).names)
+    for index, multiplier in zip(relations, entries(multipliers)):
+        of_all[index] = SX(multiplier)
+    return MotorForces(SX(torques + validity), of_all, validity)
 
 
 class TorqueTrace(Protocol):
@@ -73,7 +89,8 @@ def of_motors(trace: Callable[[Robot], TracedFunction]) -> TorqueTrace:
             flat = [flatten(value, slot.shape) for value, slot in zip(values, traced.inputs)]
             (free,) = traced.casadi_function().call(flat, True, False)
             named = dict(zip((slot.name for slot in traced.inputs), values))
-            return motor_torques(robot, named["q"], free, named.get("qd"), named.get("qdd"), near)
+            qd, qdd = named.get("qd"), named.get("qdd")
+            return motor_forces(robot, named["q"], free, qd, qdd, near).torques
 
         return TracedFunction.trace(traced.name, traced.inputs, traced.outputs, equations)
 

@@ -9,6 +9,7 @@ from casadi import SX
 from armblocks.dynamics.joint_motion import entries
 from armblocks.dynamics.rnea import Wrench
 from armblocks.equations import Slot
+from armblocks.robot.robot import Robot
 from armblocks.robot.tree import BASE, KinematicTree
 from armblocks.spatial.inertia import RigidInertia
 from armblocks.spatial.vectors import Symmetric, Vector, add, cross, rotate
@@ -30,6 +31,14 @@ def with_payload(tree: KinematicTree, payload: SX) -> KinematicTree:
     carrier = bodies[tool.body]
     bodies[tool.body] = replace(carrier, inertia=carrier.inertia.plus(load))
     return replace(tree, bodies=tuple(bodies))
+
+
+def tip_loads(robot: Robot, wrench: SX, payload: SX) -> tuple[Wrench, RigidInertia]:
+    """A wrench at the frame of the last link, and the inertia of a payload at the tool in this frame."""
+    fx, fy, fz, nx, ny, nz = entries(wrench)
+    mass, x, y, z, *second = entries(payload)
+    load = RigidInertia.at_centre(mass, Symmetric(*second)).shifted((x, y, z)).moved(robot.tool)
+    return Wrench((fx, fy, fz), (nx, ny, nz)), load
 
 
 def tip_wrench(tree: KinematicTree, wrench: SX) -> dict[int, Wrench]:

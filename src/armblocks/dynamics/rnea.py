@@ -75,6 +75,21 @@ def rnea(
     return tau
 
 
+def body_motions(
+    tree: KinematicTree,
+    joints: Sequence[JointMotion],
+    qd: Sequence[Scalar],
+    qdd: Sequence[Scalar],
+    gravity: Vector,
+) -> list[BodyMotion]:
+    """The motions of the base and of all bodies, with gravity as an acceleration of the base."""
+    qdd = axis_accelerations(tree, qd, qdd)
+    motions = [BodyMotion(ZERO, ZERO, scale(-1.0, gravity), _rotation_accelerations(ZERO, ZERO))]
+    for body, joint in zip(tree.bodies, joints):
+        motions.append(_body_motion(motions[body.parent + 1], joint, qd, qdd))
+    return motions
+
+
 def _body_motion(
     parent: BodyMotion, joint: JointMotion, qd: Sequence[Scalar], qdd: Sequence[Scalar]
 ) -> BodyMotion:

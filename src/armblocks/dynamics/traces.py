@@ -17,10 +17,11 @@ Invalid robots are already rejected by :class:`armblocks.robot.Robot`.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 from casadi import SX, jacobian, mtimes, vertcat
 
-from armblocks.dynamics.actuation import of_motors
+from armblocks.dynamics.actuation import motor_forces, of_motors
 from armblocks.dynamics.ball_joints import (
     difference,
     integrated,
@@ -36,20 +37,23 @@ from armblocks.dynamics.forward import check_accelerations_exist, forward_dynami
 from armblocks.dynamics.friction import joint_friction, rotor_torques
 from armblocks.dynamics.jacobian import jacobian_matrix, tool_columns, world_columns, yoshikawa
 from armblocks.dynamics.joint_motion import entries, joint_motions
+from armblocks.dynamics.joint_wrenches import reaction_wrenches
 from armblocks.dynamics.kinematics import body_poses, constant_pose, frame_pose
-from armblocks.dynamics.loads import PAYLOAD_SLOT, WRENCH_SLOT, tip_wrench, with_payload
+from armblocks.dynamics.loads import PAYLOAD_SLOT, WRENCH_SLOT, tip_loads, tip_wrench, with_payload
 from armblocks.dynamics.mechanism import Array
 from armblocks.dynamics.reduction import (
     in_independent_coordinates,
     reduced_columns,
     tree_coordinates,
+    tree_speeds,
 )
-from armblocks.dynamics.rnea import rnea
+from armblocks.dynamics.rnea import NO_WRENCH, rnea
 from armblocks.equations import Signature, TracedFunction, signature
 from armblocks.equations.signatures import Slot
 from armblocks.errors import RobotError
 from armblocks.robot.robot import Robot
 from armblocks.robot.tree import KinematicTree
+from armblocks.spatial.inertia import RigidInertia
 from armblocks.spatial.vectors import Scalar, add, rotate, scale
 
 
@@ -158,6 +162,44 @@ def trace_gravload(robot: Robot) -> TracedFunction:
         return _sum(rnea(tree, joint_motions(tree, q), no_motion, no_motion, tree.gravity))
 
     return _trace("gravload", robot, ("q",), ("tau", (robot.n,), "N m"), equations)
+
+
+def trace_joint_wrenches(robot: Robot, near: Array | None = None) -> TracedFunction:
+    """``wrenches (L + K, 6)`` as ``trace_joint_wrenches_loaded`` without loads."""
+    return _joint_wrenches(robot, ("q", "qd", "qdd"), near)
+
+
+def trace_joint_wrenches_loaded(robot: Robot, near: Array | None = None) -> TracedFunction:
+    """``wrenches (L + K, 6)``: force (N), then moment (N m), of a motion with a wrench and a payload.
+
+    Row k is the wrench that the parent exerts on link k through its joint, about the origin and in the axes
+    of the distal frame of the joint. Its component along the axis is the torque of the rigid bodies, without
+    friction and rotor inertia. The last rows are those of the closures: the wrench that the first link exerts
+    on the second one, about the origin and in the axes of the second frame.
+    """
+    return _joint_wrenches(robot, ("q", "qd", "qdd", "wrench", "payload"), near)
+
+
+def _joint_wrenches(robot: Robot, inputs: Sequence[str], near: Array | None) -> TracedFunction:
+    tree, coordinates = KinematicTree.of(robot), robot.coordinate_map
+    without_loops = replace(robot, constraints=robot.couplings)
+    free_torques = (trace_rne if len(inputs) == 3 else trace_rne_loaded)(without_loops).casadi_function()
+
+    def equations(q: SX, qd: SX, qdd: SX, *loads: SX) -> SX:
+        multipliers: list[SX] = []
+        validity = SX(0.0)
+        if robot.closures:
+            (free,) = free_torques.call([q, qd, qdd, *loads], True, False)
+            _, multipliers, validity = motor_forces(robot, q, free, qd, qdd, near)
+        motion = [entries(tree_speeds(coordinates, value)) for value in (qd, qdd)]
+        at_tip = tip_loads(robot, *loads) if loads else (NO_WRENCH, RigidInertia())
+        tree_q = tree_coordinates(coordinates, q)
+        wrenches = reaction_wrenches(tree, tree_q, motion[0], motion[1], multipliers, at_tip)
+        return wrenches + validity
+
+    rows = len(robot.links) + len(robot.closures)
+    output = ("wrenches", (rows, 6), "")
+    return _trace("joint_wrenches", robot, inputs, output, equations, of_tree=False)
 
 
 def trace_inertia(robot: Robot) -> TracedFunction:
@@ -349,7 +391,10 @@ def trace_normalised(robot: Robot) -> TracedFunction:
 
 FRAMED = ("fkine", "jacob0", "jacobe")
 """The functions that take ``frame``, the name of a frame in the place of the tool."""
-ASSEMBLED = ("rne", "rne_loaded", "gravload", "accel", "accel_loaded")
+ASSEMBLED = (
+    *("rne", "rne_loaded", "gravload", "accel", "accel_loaded"),
+    *("joint_wrenches", "joint_wrenches_loaded"),
+)
 """The functions that take ``near``, because they depend on the independent relations of closures."""
 TRACES: Mapping[str, Callable[..., TracedFunction]] = {
     "fkine": trace_fkine,
@@ -359,6 +404,8 @@ TRACES: Mapping[str, Callable[..., TracedFunction]] = {
     "manipulability": trace_manipulability,
     "rne": trace_rne,
     "rne_loaded": trace_rne_loaded,
+    "joint_wrenches": trace_joint_wrenches,
+    "joint_wrenches_loaded": trace_joint_wrenches_loaded,
     "gravload": trace_gravload,
     "inertia": trace_inertia,
     "coriolis": trace_coriolis,

@@ -268,6 +268,19 @@ class Arm(metaclass=ArgumentErrors):
         return self._loaded_method("rne")
 
     @cached_property
+    def joint_wrenches(self) -> MotionFunction:
+        """``joint_wrenches(q, qd, qdd)`` → (L + K, 6): reaction force (N) and moment (N m) of each joint.
+
+        Row k is the wrench that its parent exerts on link k, about the origin and in the axes of the distal
+        frame of the joint (NOTATION.md). The component along the axis is the torque of the rigid bodies:
+        ``rne`` without friction and rotor inertia. The last K rows are those of the closures of loops: the
+        wrench that the first link exerts on the second one, in the second frame. Where equations of closures
+        follow from others, their forces are statically indeterminate and are 0 here. ``wrench=`` and
+        ``payload=`` as for ``rne``.
+        """
+        return self._loaded_method("joint_wrenches")
+
+    @cached_property
     def accel(self) -> DrivenStateFunction:
         """``accel(q, qd, tau)`` → qdd (n,) rad/s² or m/s²: accelerations under joint torques and friction."""
         return self._loaded_method("accel")
