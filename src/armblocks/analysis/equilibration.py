@@ -17,13 +17,17 @@ def equilibrating_factors(matrix: Array) -> tuple[Array, Array]:
     Rows and columns of zeros have the factor 1. The method is that of Ruiz (Rutherford Appleton Laboratory,
     RAL-TR-2001-034), in logarithms.
     """
-    with np.errstate(divide="ignore"):
-        logarithms = np.log2(np.abs(matrix))
-    rows, columns = np.zeros((matrix.shape[0], 1)), np.zeros((1, matrix.shape[1]))
+    logarithms = np.full(matrix.shape, -np.inf)
+    logarithms[matrix != 0.0] = np.log2(np.abs(matrix[matrix != 0.0]))
+    rows, columns = np.zeros(matrix.shape[0]), np.zeros(matrix.shape[1])
     for _ in range(SWEEPS):
-        sizes = logarithms + rows + columns
-        row_sizes = sizes.max(axis=1, keepdims=True, initial=-np.inf)
-        column_sizes = sizes.max(axis=0, keepdims=True, initial=-np.inf)
-        rows -= np.where(np.isfinite(row_sizes), row_sizes, 0.0) / 2.0
-        columns -= np.where(np.isfinite(column_sizes), column_sizes, 0.0) / 2.0
-    return np.exp2(np.round(rows[:, 0])), np.exp2(np.round(columns[0]))
+        sizes = logarithms + rows[:, None] + columns
+        rows, columns = rows - _largest(sizes) / 2.0, columns - _largest(sizes.T) / 2.0
+    return np.exp2(np.round(rows)), np.exp2(np.round(columns))
+
+
+def _largest(logarithms: Array) -> Array:
+    """The largest entry of each row; 0 for a row of zeros."""
+    largest = np.array([float(row.max(initial=-np.inf)) for row in logarithms])
+    largest[~np.isfinite(largest)] = 0.0
+    return largest

@@ -4,8 +4,10 @@ The unknowns are the states that are not given, the discrete states of clocks, t
 unknowns of implicit equations, and the free parameters. The equations are: the derivatives of all non-moving
 states are 0, ticks change no state, outputs of delays equal their inputs, the implicit equations hold, and
 the chosen signals have their required values. Steps are those of Levenberg and Marquardt (Moré, Lecture Notes
-in Mathematics 630, 1978, 105-116), with each unknown scaled by its column and limited to its bounds. If there
-are several solutions, the result is one near the start. The modes are updated at the solution, and the
+in Mathematics 630, 1978, 105-116), limited to the bounds of the unknowns. Equations and unknowns are scaled
+by the rows and columns of the Jacobian, so that their units have no effect. The search ends when the
+equations hold to their rounding errors, or when a step is within the rounding errors of the unknowns. If
+there are several solutions, the result is one near the start. The modes are updated at the solution, and the
 iteration is repeated. If this fails, the modes are updated at every step. This is necessary, for example, for
 a table whose first segment, extended as a straight line, reaches zero only far beyond the last segment.
 """
@@ -15,10 +17,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.analysis.equilibration import equilibrating_factors
 from armblocks.analysis.operating_point import OperatingPoint, operating_point, solved
 from armblocks.equations import HybridSystem, Signature
 from armblocks.equations.evaluation import EvaluatedSystem, Jacobians, Point
@@ -33,6 +37,10 @@ MAX_MODE_CHANGES = 20
 """Maximum number of mode changes."""
 ROUNDING_ERROR = 4.0 * float(np.finfo(np.float64).eps)
 """Relative rounding error of a term of an equation."""
+SOLVED = 16.0 * ROUNDING_ERROR
+"""Residual of a solved equation, relative to the sum of the magnitudes of its terms."""
+START_DAMPING = 1e-3
+"""Damping of the first step; without failed steps it decreases."""
 MAX_NAMED_EQUATIONS = 6
 """Maximum number of equations that a message names."""
 
@@ -147,6 +155,33 @@ def _elements(layout: Signature) -> list[str]:
     return [name for slot in layout for name in slot.elements]
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Scales:
+    """Factors of the equations (``rows``) and of the unknowns (``columns``).
+
+    ``rounding``: residuals that can be rounding errors.
+    """
+
+    rows: Array
+    columns: Array
+    rounding: Array
+
+    @classmethod
+    def of(cls, derivatives: Array, residuals: Array, rounding: Array) -> Self:
+        """The scales for derivatives of these magnitudes."""
+        rows, columns = equilibrating_factors(derivatives)
+        # An equation that depends on no unknown has no scale but its residual.
+        constant = ~derivatives.any(axis=1) & (residuals != 0.0)
+        rows = np.where(constant, 1.0 / np.where(constant, np.abs(residuals), 1.0), rows)
+        return cls(rows=rows, columns=columns, rounding=rounding)
+
+    def excess(self, residuals: Array) -> float:
+        """The scaled size of the residuals beyond their rounding errors; infinite if one is not finite."""
+        if not np.isfinite(residuals).all():
+            return np.inf
+        return float(np.linalg.norm(self.rows * np.maximum(np.abs(residuals) - self.rounding, 0.0)))
+
+
 class _Search:
     """Equations, derivatives and steps of one problem."""
 
@@ -235,45 +270,67 @@ class _Search:
         blocks.append((evaluated.signal_jacobians(point), np.arange(problem.rows.size), none))
         return blocks
 
-    def jacobian(self, point: Point) -> Array:
-        """Derivatives of the equations with respect to the unknowns."""
+    def jacobian_and_sizes(self, point: Point) -> tuple[Array, Array]:
+        """Derivatives of the equations with respect to the unknowns, and the sizes of the equations.
+
+        Each equation is a sum of terms, derivative times value. Its size is the sum of their magnitudes.
+        """
         problem = self.problem
+        free = point.p[problem.free_parameters]
         rows: list[Array] = []
+        sizes: list[Array] = []
         for j, chosen, subtracted in self._jacobian_rows(point):
             by_z = j.z[np.ix_(chosen, self.free_discrete)]
+            with np.errstate(invalid="ignore"):  # at a point without finite derivatives
+                terms = np.abs(j.x[chosen]) @ np.abs(point.x) + np.abs(j.z[chosen]) @ np.abs(point.z)
+                terms += np.abs(j.w[chosen]) @ np.abs(point.w) + np.abs(j.p[chosen]) @ np.abs(free)
             if subtracted.size:
                 by_z = by_z - (subtracted[:, None] == self.free_discrete)
+                terms += np.abs(point.z[subtracted])
             by_x = j.x[np.ix_(chosen, problem.free_states)]
             rows.append(np.hstack([by_x, by_z, j.w[chosen], j.p[chosen]]))
-        return np.vstack(rows)
+            sizes.append(terms)
+        return np.vstack(rows), np.concatenate(sizes)
 
     def errors(self, point: Point) -> Array:
         """Bound of the rounding error of every unknown at a solution.
 
-        Each equation is a sum of terms, derivative times value, each with a few roundings. The error of the
-        equation and its residual, multiplied by the inverse Jacobian, bound the error of the unknowns (Golub
-        and Van Loan, Matrix Computations, 4th ed., 2.6).
+        The terms of an equation have a few roundings each. The error of the equation and its residual,
+        multiplied by the inverse Jacobian, bound the error of the unknowns (Golub and Van Loan, Matrix
+        Computations, 4th ed., 2.6).
         """
-        matrix = self.jacobian(point)
+        matrix, sizes = self.jacobian_and_sizes(point)
         if not np.isfinite(matrix).all():  # the search has failed
             return np.zeros(len(self.unknowns))
-        free = point.p[self.problem.free_parameters]
-        sizes: list[Array] = []
-        for j, chosen, subtracted in self._jacobian_rows(point):
-            terms = np.abs(j.x[chosen]) @ np.abs(point.x) + np.abs(j.z[chosen]) @ np.abs(point.z)
-            terms += np.abs(j.w[chosen]) @ np.abs(point.w) + np.abs(j.p[chosen]) @ np.abs(free)
-            if subtracted.size:
-                terms += np.abs(point.z[subtracted])
-            sizes.append(terms)
-        equations = ROUNDING_ERROR * np.concatenate(sizes) + np.abs(self.residuals(point))
-        return np.abs(np.linalg.pinv(matrix)) @ equations
+        rows, columns = equilibrating_factors(matrix)
+        inverse = np.abs(np.linalg.pinv(matrix * rows[:, None] * columns))
+        return columns * (inverse @ (rows * (ROUNDING_ERROR * sizes + np.abs(self.residuals(point)))))
+
+    def rounding(self, point: Point, residuals: Array, jacobian: Array, sizes: Array) -> Array:
+        """Residuals that can be rounding errors.
+
+        They are proportional to the size of an equation if the equation is linear within the rounding errors
+        of the unknowns, else 0: an angle of 1e16 rad has no sine.
+        """
+        errors = SOLVED * sizes
+        if not ((residuals != 0.0) & (np.abs(residuals) <= errors)).any():
+            return errors
+        values = self.values(point)
+        nearby, _ = self.jacobian_and_sizes(self.point_with(values * (1.0 + SOLVED), point))
+        change, linear = np.abs(nearby - jacobian) @ np.abs(values), np.abs(jacobian) @ np.abs(values)
+        return np.where(change <= 1e-6 * linear, errors, 0.0)
+
+    def violated(self, point: Point) -> list[int]:
+        """The equations that hold neither to the tolerance nor to their rounding errors."""
+        residuals = self.residuals(point)
+        allowed: Array = np.full(residuals.size, self.problem.tolerance)
+        if not np.abs(residuals).max(initial=0.0) <= self.problem.tolerance:
+            allowed = np.maximum(allowed, self.rounding(point, residuals, *self.jacobian_and_sizes(point)))
+        return np.flatnonzero(~(np.abs(residuals) <= allowed)).tolist()
 
     def is_solution(self, point: Point) -> bool:
-        """Whether every equation holds to the tolerance."""
-        residuals = self.residuals(point)
-        return bool(
-            np.isfinite(residuals).all() and np.abs(residuals).max(initial=0.0) <= self.problem.tolerance
-        )
+        """Whether every equation holds."""
+        return not self.violated(point)
 
     def consistent_modes(self, point: Point) -> Array:
         """``z`` with consistent modes; the entries that clocks update are unchanged."""
@@ -294,44 +351,53 @@ class _Search:
         point = self.point_with(np.clip(self.values(start), self.lower, self.upper), start)
         if update_modes:
             point = dataclasses.replace(point, z=self.consistent_modes(point))
-        residuals = self.residuals(point)
-        damping, scale = 1e-3, np.zeros(len(self.unknowns))
+        residuals, damping = self.residuals(point), START_DAMPING
+        derivatives, values = np.zeros((len(self.equations), len(self.unknowns))), np.abs(self.values(point))
         for iteration in range(MAX_ITERATIONS):
-            if float(np.abs(residuals).max(initial=0.0)) <= 1e-6 * self.problem.tolerance:
-                return point, iteration
-            jacobian = self.jacobian(point)
+            jacobian, sizes = self.jacobian_and_sizes(point)
             if not np.isfinite(jacobian).all() or not np.isfinite(residuals).all():
                 return point, iteration
-            scale = np.maximum(scale, np.linalg.norm(jacobian, axis=0))
+            derivatives = np.maximum(derivatives, np.abs(jacobian))
+            rounding = self.rounding(point, residuals, jacobian, sizes)
+            scales = _Scales.of(derivatives, residuals, rounding)
+            size = scales.excess(residuals)
+            if size == 0.0:
+                return point, iteration
             while True:
                 if damping > 1e12:
                     return point, iteration
-                step = self._step(point, jacobian, residuals, damping, scale)
+                step = self._step(point, jacobian, residuals, damping, scales)
                 trial = self.point_with(self.values(point) + step, point)
                 if update_modes:
                     trial = dataclasses.replace(trial, z=self.consistent_modes(trial))
                 trial_residuals = self.residuals(trial)
-                if np.isfinite(trial_residuals).all() and np.linalg.norm(trial_residuals) < np.linalg.norm(
-                    residuals
-                ):
+                is_better = scales.excess(trial_residuals) < size
+                is_last = damping <= START_DAMPING and bool((np.abs(step) <= ROUNDING_ERROR * values).all())
+                if is_better or is_last:
                     break
                 damping *= 10.0
-            point, residuals, damping = trial, trial_residuals, max(damping / 30.0, 1e-18)
+            if is_better:
+                point, residuals, damping = trial, trial_residuals, max(damping / 30.0, 1e-18)
+            if is_last:
+                return point, iteration + 1
+            values = np.maximum(values, np.abs(self.values(point)))
         return point, MAX_ITERATIONS
 
-    def _step(self, point: Point, jacobian: Array, residuals: Array, damping: float, scale: Array) -> Array:
+    def _step(
+        self, point: Point, jacobian: Array, residuals: Array, damping: float, scales: _Scales
+    ) -> Array:
         """One step of the damped normal equations. Unknowns that would leave their bounds stay at them."""
         values = self.values(point)
-        weights = np.sqrt(damping) * np.where(scale > 0.0, scale, 1.0)
+        scaled = jacobian * scales.rows[:, None] * scales.columns
         free = np.ones(values.size, dtype=np.bool_)
         step = np.zeros(values.size)
         for _ in range(values.size + 1):
-            matrix = np.vstack([jacobian[:, free], np.diag(weights[free])])
+            matrix = np.vstack([scaled[:, free], np.sqrt(damping) * np.eye(int(free.sum()))])
             # The right-hand side includes the steps of the unknowns that are at their bounds.
             right = np.concatenate(
-                [-(residuals + jacobian[:, ~free] @ step[~free]), np.zeros(int(free.sum()))]
+                [-scales.rows * (residuals + jacobian[:, ~free] @ step[~free]), np.zeros(int(free.sum()))]
             )
-            step[free] = np.linalg.lstsq(matrix, right, rcond=None)[0]
+            step[free] = scales.columns[free] * np.linalg.lstsq(matrix, right, rcond=None)[0]
             beyond = free & ((values + step < self.lower) | (values + step > self.upper))
             if not beyond.any():
                 break
@@ -372,9 +438,8 @@ class _Search:
 
 def _failure(problem: TrimProblem, search: _Search, point: Point, result: TrimResult) -> SimulationError:
     """The error that names the equations that do not hold, and the likely cause."""
-    violated = {
-        name: value for name, value in result.residuals.items() if not abs(value) <= problem.tolerance
-    }
+    names = list(result.residuals)
+    violated = {names[k]: result.residuals[names[k]] for k in search.violated(point)}
     worst = sorted(
         violated, key=lambda name: -abs(violated[name]) if np.isfinite(violated[name]) else -np.inf
     )
@@ -398,7 +463,7 @@ def _residual_text(name: str, value: float) -> str:
 def _cause(
     problem: TrimProblem, search: _Search, point: Point, worst: Sequence[str], result: TrimResult
 ) -> str:
-    jacobian = search.jacobian(point)
+    jacobian, _ = search.jacobian_and_sizes(point)
     if not np.isfinite(jacobian).all():
         return "points with finite derivatives; they are not finite at this point"
     rows = {name: jacobian[k] for k, name in enumerate(search.equations)}
