@@ -197,7 +197,10 @@ class T2Quaternion(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class AngleAxis2T(Block):
-    """The rotation about an axis of any length: R = I + sin(angle) [k] + (1 - cos(angle)) [k]^2."""
+    """The rotation about an axis of any length: R = I + sin(angle) [k] + (1 - cos(angle)) [k]^2.
+
+    k is the unit vector along the axis, and [k] its cross-product matrix (Rodrigues' formula).
+    """
 
     title: ClassVar[str] = "angvec2T"
     sign: ClassVar[FaceSign] = Words("θ, a→T")
