@@ -71,5 +71,7 @@ export default defineConfig({
     emptyOutDir: true,
     assetsInlineLimit: 0, // the security policy of the studio allows only fonts and pictures of the server
     chunkSizeWarningLimit: 1200,
+    // Removes the unused components of React Flow.
+    rolldownOptions: { treeshake: { manualPureFunctions: ['memo', 'forwardRef'] } },
   },
 })

@@ -27,7 +27,6 @@ import { endConnection } from './connecting'
 import { DragPreview, useDraggedCopies } from './drag_preview'
 import { GRID } from './insert'
 import { NoteNode } from './note_node'
-import { Overview } from './overview'
 import { useRightButton } from './right_button'
 import { openBlock } from './sheet_actions'
 import { dragHandlers, dropHandlers, useSheetDrag, type SheetDrag } from './sheet_drag'
@@ -35,13 +34,15 @@ import { useSheetDrawing } from './sheet_drawing'
 import type { SheetGraph, SheetNode } from './sheet_graph'
 import { useSheetKeys } from './sheet_keys'
 import { FIT } from './sheet_layout'
-import { useFitView, useInitialView, useNameScale, useSheetView, useCentredBlock } from './sheet_view'
+import { MotionContext } from './sheet_motion'
+import { useCentredBlock, useView } from './sheet_view'
 import { SignalNames } from './signal_names'
 import { useStableHandlers } from './stable_handlers'
 import { Welcome } from './welcome'
 import { WireEdge, type WireEdgeType } from './wire_edge'
 
 const ArrangeBar = deferred(async () => (await import('./arrange_bar')).ArrangeBar)
+const LargeSheet = deferred(async () => (await import('./large_sheet')).LargeSheet)
 const nodeTypes = { block: BlockNode, note: NoteNode }
 const edgeTypes = { wire: WireEdge }
 const SNAP: [number, number] = [GRID, GRID]
@@ -140,9 +141,8 @@ function Sheet({ sheetKey }: { sheetKey: string }) {
   const { graph, nodes, edges, lines } = useSheetDrawing(sheetDrag, selectedWires)
   useCentredBlock(sheet, flow, blocks)
   useSheetKeys(sheet, selectedWires, setSelectedWires)
-  useSheetView(sheet, flow, sheetKey)
-  useNameScale(sheet)
-  useFitView(sheet, flow, sheetKey)
+  const empty = Object.keys(blocks).length === 0 && Object.keys(notes).length === 0
+  const { view, motion } = useView(sheet, flow, sheetKey, blocks, empty)
   const handlers = useStableHandlers({
     onNodesChange: (changes: NodeChange<SheetNode>[]) => nodesChanged(changes, graph, sheetDrag),
     onEdgesChange: (changes: EdgeChange<WireEdgeType>[]) =>
@@ -157,8 +157,6 @@ function Sheet({ sheetKey }: { sheetKey: string }) {
   })
   const rightButton = useRightButton(flow, edges, setSelectedWires)
   const selectedEdge = selectedWires.size === 1 ? edges.find(({ selected }) => selected) : undefined
-  const empty = Object.keys(blocks).length === 0 && Object.keys(notes).length === 0
-  const initialView = useInitialView(sheetKey, empty)
   return (
     <div
       className="canvas"
@@ -190,7 +188,7 @@ function Sheet({ sheetKey }: { sheetKey: string }) {
         zoomOnPinch
         minZoom={0.1}
         maxZoom={4}
-        {...initialView}
+        {...view}
         fitViewOptions={FIT}
         elevateNodesOnSelect={false}
         aria-label="Diagram"
@@ -200,7 +198,7 @@ function Sheet({ sheetKey }: { sheetKey: string }) {
         <DragPreview />
         <WireValues selectedEdge={selectedEdge} />
         <SignalNames lines={lines} />
-        {Object.keys(blocks).length > 40 && <Overview blocks={blocks} />}
+        <MotionContext value={motion}>{motion.isLarge && <LargeSheet />}</MotionContext>
       </ReactFlow>
       {severalSelected && <ArrangeBar />}
       {empty && <EmptySheet />}

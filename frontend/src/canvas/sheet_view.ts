@@ -7,6 +7,7 @@ import { useStudio } from '../store'
 import type { SheetNode } from './sheet_graph'
 import { sheetView } from './sheet_actions'
 import { FIT } from './sheet_layout'
+import { useSheetMotion } from './sheet_motion'
 import type { WireEdgeType } from './wire_edge'
 
 const LAYOUT_DELAY_MS = 120
@@ -60,7 +61,7 @@ function revealBlock(
  * The sheet is fitted to its panel, at every panel size, until the user moves it. The moved view is stored
  * under the key of the sheet, and shown when the sheet is shown again.
  */
-export function useFitView(sheet: Sheet, flow: Flow, key: string): void {
+function useFitView(sheet: Sheet, flow: Flow, key: string): void {
   useEffect(() => {
     const element = sheet.current
     if (!element) return
@@ -99,11 +100,11 @@ export function useFitView(sheet: Sheet, flow: Flow, key: string): void {
 }
 
 /** The stored view of a sheet, else the view of all blocks. */
-export function useInitialView(key: string, empty: boolean) {
+function useInitialView(key: string, empty: boolean) {
   const [view] = useState(() => {
     const defaultViewport = viewports.get(key)
     // An empty sheet would be fitted to the first block that is dropped on it, which would then jump.
-    return defaultViewport ? { defaultViewport } : { fitView: !empty && !partsToShow.has(key) }
+    return { defaultViewport, fitView: !defaultViewport && !empty && !partsToShow.has(key) }
   })
   return view
 }
@@ -115,13 +116,13 @@ export function nameScale(zoom: number): number {
 }
 
 /** Set the size of the names for the present zoom. */
-export function useNameScale(sheet: Sheet): void {
+function useNameScale(sheet: Sheet): void {
   const scale = useStore((s) => nameScale(s.transform[2]))
   useEffect(() => sheet.current?.style.setProperty('--name-scale', String(scale)), [sheet, scale])
 }
 
 /** The commands of the visible sheet act on this view. */
-export function useSheetView(sheet: Sheet, flow: Flow, key: string): void {
+function useSheetView(sheet: Sheet, flow: Flow, key: string): void {
   useEffect(() => {
     // After this the sheet is not fitted into its panel any more.
     const keepView = () => viewports.set(key, flow.getViewport())
@@ -154,4 +155,21 @@ export function useSheetView(sheet: Sheet, flow: Flow, key: string): void {
       sheetView.reveal = null
     }
   }, [flow, sheet, key])
+}
+
+/** The view of the visible sheet: its commands, its motion, and the properties that React Flow receives. */
+export function useView(
+  sheet: Sheet,
+  flow: Flow,
+  key: string,
+  blocks: Record<string, SheetBlock>,
+  empty: boolean,
+) {
+  const initialView = useInitialView(key, empty)
+  // Ends a motion before the other hooks store the view.
+  const motion = useSheetMotion(sheet, Object.keys(blocks).length, initialView.defaultViewport)
+  useSheetView(sheet, flow, key)
+  useNameScale(sheet)
+  useFitView(sheet, flow, key)
+  return { motion, view: { ...initialView, viewport: motion.view, onViewportChange: motion.change } }
 }

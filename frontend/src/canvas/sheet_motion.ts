@@ -1,0 +1,105 @@
+import { useStoreApi, type Viewport } from '@xyflow/react'
+import { createContext, useEffect, useState, type RefObject } from 'react'
+
+/** Time without a change of the view after which a motion has ended, ms. */
+const REST_MS = 150
+/** Number of blocks above which a sheet is moved as one layer and has a map. */
+const MANY_BLOCKS = 40
+/** Events that need the present view, or that start an action whose views are shown at once. */
+const ENDING_EVENTS = ['pointerdown', 'keydown', 'dragenter', 'pagehide'] as const
+
+/** The motion of the sheet that contains a component. */
+export const MotionContext = createContext<SheetMotion | null>(null)
+
+/** Panning and zooming of the visible sheet. */
+export function useSheetMotion(
+  sheet: RefObject<HTMLDivElement | null>,
+  blockCount: number,
+  initialView: Viewport | undefined,
+): SheetMotion {
+  const store = useStoreApi()
+  const [motion] = useState(() => new SheetMotion(store, initialView))
+  motion.isLarge = blockCount > MANY_BLOCKS
+  useEffect(() => {
+    const element = sheet.current!
+    motion.sheet = element
+    const begin = (event: WheelEvent) => !event.buttons && motion.begin()
+    element.addEventListener('wheel', begin, { capture: true, passive: true })
+    for (const kind of ENDING_EVENTS) addEventListener(kind, motion.end, true)
+    return () => {
+      motion.end()
+      element.removeEventListener('wheel', begin, true)
+      for (const kind of ENDING_EVENTS) removeEventListener(kind, motion.end, true)
+    }
+  }, [sheet, motion])
+  return motion
+}
+
+/**
+ * The view of a sheet. While a large sheet is panned or zoomed, the browser moves its picture as one layer,
+ * and React Flow receives the view when the motion has ended: for every view that it receives, it computes
+ * the ports and wires of all blocks again. React Flow receives all other views at once.
+ */
+export class SheetMotion {
+  /** The present view; the same object at every change. React Flow regards it as controlled. */
+  readonly view: Viewport
+  isLarge = false
+  sheet: HTMLElement | null = null
+  private layer: HTMLElement | null = null
+  /** The timer of the end of the motion; 0: there is no motion. */
+  private timer = 0
+  private readonly store
+  private readonly listeners = new Set<() => void>()
+
+  constructor(store: ReturnType<typeof useStoreApi>, view: Viewport = { x: 0, y: 0, zoom: 1 }) {
+    this.store = store
+    this.view = { ...view }
+  }
+
+  /** Call a function after every change of the view, also during a motion; returns the cancellation. */
+  readonly onView = (listener: () => void): (() => void) => {
+    this.listeners.add(listener)
+    return () => this.listeners.delete(listener)
+  }
+
+  /** Start or continue a motion. */
+  begin(): void {
+    if (!this.isLarge || !this.sheet) return
+    if (!this.timer) {
+      this.layer = this.sheet.querySelector<HTMLElement>('.react-flow__viewport')
+      this.sheet.classList.add('moving')
+    }
+    clearTimeout(this.timer)
+    this.timer = window.setTimeout(this.endAfterFrames, REST_MS)
+  }
+
+  /** Show a view. */
+  readonly change = (view: Viewport): void => {
+    Object.assign(this.view, view)
+    if (this.timer || this.store.getState().paneDragging) this.begin()
+    if (this.timer) this.layer!.style.transform = `translate(${view.x}px,${view.y}px) scale(${view.zoom})`
+    else this.commit()
+    for (const listener of this.listeners) listener()
+  }
+
+  /** End the motion. */
+  readonly end = (): void => {
+    if (!this.timer) return
+    clearTimeout(this.timer)
+    this.timer = 0
+    this.sheet!.classList.remove('moving')
+    this.commit()
+  }
+
+  /** End the motion if it does not continue after the next frames, which can take longer than the timer. */
+  private readonly endAfterFrames = (): void => {
+    const { timer } = this
+    const endIfUnchanged = () => setTimeout(() => this.timer === timer && this.end())
+    requestAnimationFrame(() => requestAnimationFrame(endIfUnchanged))
+  }
+
+  private commit(): void {
+    const { x, y, zoom } = this.view
+    this.store.setState({ transform: [x, y, zoom] })
+  }
+}

@@ -1,0 +1,173 @@
+"""Panning and zooming of a large sheet in the browser: the view after a motion, and the map of the sheet."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from building import block, keep_view, middle, wait_until
+from playwright.sync_api import FloatRect, Page, expect
+
+import armblocks as ab
+from armblocks import blocks
+from conftest import Studio
+
+CHAINS, PER_CHAIN = 8, 10
+WHEEL = """(pane, [deltaX, deltaY, ctrlKey]) => {
+    // A wheel event at the middle of the sheet.
+    const { x, y, width, height } = pane.getBoundingClientRect()
+    const values = { clientX: x + width / 2, clientY: y + height / 2, bubbles: true, cancelable: true }
+    pane.dispatchEvent(new WheelEvent('wheel', { ...values, deltaX, deltaY, ctrlKey }))
+}"""
+LAYERS = """(pane) => {
+    // Whether the sheet is a layer before a motion, in it, and after a press, in one task of the browser.
+    const layer = () => getComputedStyle(document.querySelector('.react-flow__viewport')).willChange
+    const before = layer()
+    pane.dispatchEvent(new WheelEvent('wheel', { deltaX: 20, bubbles: true, cancelable: true }))
+    const during = layer()
+    pane.dispatchEvent(new PointerEvent('pointerdown', { button: 2, buttons: 2, bubbles: true }))
+    return [before, during, layer()]
+}"""
+TWO_FRAMES = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+
+View = tuple[float, ...]
+
+
+def save_large_model(path: Path) -> None:
+    """Save a model with so many blocks that the sheet is moved as one layer."""
+    builder = ab.DiagramBuilder("large")
+    for row in range(CHAINS):
+        signal = builder.add(f"source {row}", blocks.SineWave())
+        for column in range(PER_CHAIN - 2):
+            kind = (blocks.Gain, blocks.FirstOrderLag, blocks.Saturation)[column % 3]
+            signal = builder.add(f"b {row} {column}", kind(), signal)
+        builder.add(f"end {row}", blocks.Terminator(), signal)
+    ab.save_diagram(builder.build(), path)
+
+
+@pytest.fixture(scope="module")
+def shared_large(open_studio: Callable[[str], Page], studio: Studio) -> Page:
+    save_large_model(studio.folder / "large.json")
+    page = open_studio("van_der_pol_pid")
+    page.keyboard.press("Control+o")
+    page.get_by_role("dialog").get_by_text("large.json").click()
+    block(page, "b 3 4").wait_for()
+    return page
+
+
+@pytest.fixture
+def large(shared_large: Page) -> Page:
+    """The large model, fitted into its panel, with a motion that has ended."""
+    shared_large.bring_to_front()  # in Firefox only the page in front has the focus
+    shared_large.get_by_role("button", name="Fit view").click()
+    keep_view(shared_large)
+    rest(shared_large)
+    return shared_large
+
+
+def view(page: Page) -> View:
+    """Shift (px) and zoom of the sheet."""
+    style = page.locator(".react-flow__viewport").evaluate("(element) => element.style.transform")
+    return tuple(float(number) for number in re.findall(r"-?[\d.]+(?:e-?\d+)?", style))
+
+
+def wheel(page: Page, across: float, down: float, *, zoom: bool = False) -> None:
+    """Turn the wheel over the middle of the sheet, and wait until the view has changed."""
+    before = view(page)
+    page.locator(".react-flow__pane").evaluate(WHEEL, [across, down, zoom])
+    wait_until(page, lambda: view(page) != before)
+
+
+def rest(page: Page) -> None:
+    """Wait until the motion has ended and its last view is drawn."""
+    expect(page.locator(".canvas.moving")).to_have_count(0)
+    page.evaluate(TWO_FRAMES)
+
+
+def sheet_area(page: Page) -> FloatRect:
+    """The sheet without the buttons and the map at its lower edge."""
+    box = page.locator(".canvas").bounding_box()
+    assert box is not None
+    return {**box, "height": box["height"] - 140}
+
+
+def picture(page: Page) -> bytes:
+    page.mouse.move(5, 5)
+    return page.screenshot(clip=sheet_area(page), animations="disabled")
+
+
+def draw_afresh(page: Page) -> None:
+    """Show another document and this one again: its sheet is created from its stored view."""
+    tabs = page.get_by_role("tab")
+    tabs.filter(has_text="van_der_pol_pid").click()
+    block(page, "PID").wait_for()
+    tabs.filter(has_text="large").click()
+    block(page, "b 3 4").wait_for()
+    page.evaluate(TWO_FRAMES)
+
+
+@pytest.mark.parametrize("zoom", [False, True], ids=["pan", "zoom"])
+def test_a_moved_view_is_the_same_picture_as_the_view_drawn_afresh(large: Page, zoom: bool) -> None:
+    for down in (-8, -12, 3, -5):
+        wheel(large, 30, down, zoom=zoom)
+    rest(large)
+    moved, moved_picture = view(large), picture(large)
+    draw_afresh(large)
+    assert view(large) == pytest.approx(moved)
+    wait_until(large, lambda: picture(large) == moved_picture)
+
+
+def test_the_sheet_moves_as_one_layer_until_it_is_pressed(large: Page) -> None:
+    assert large.locator(".react-flow__pane").evaluate(LAYERS) == ["auto", "transform", "auto"]
+
+
+def test_a_drag_immediately_after_a_motion_follows_the_pointer(large: Page) -> None:
+    name = block(large, "b 3 4")
+    wheel(large, 0, -4, zoom=True)
+    wheel(large, -40, 20)
+    x, y = middle(name)
+    large.mouse.move(x, y)
+    large.mouse.down()
+    large.mouse.move(x + 2, y)  # starts the drag
+    large.mouse.move(x + 102, y + 40, steps=4)
+    moved_x, moved_y = middle(name)
+    large.mouse.up()
+    zoom = view(large)[2]
+    grid = 10 * zoom
+    assert abs(moved_x - x - 100) <= grid
+    assert abs(moved_y - y - 40) <= grid
+    large.keyboard.press("Control+z")
+
+
+def test_wheel_during_a_drag_is_shown_at_once(large: Page) -> None:
+    x, y = middle(block(large, "b 3 4"))
+    large.mouse.move(x, y)
+    large.mouse.down()
+    large.mouse.move(x + 30, y, steps=3)
+    large.mouse.wheel(20, 10)
+    expect(large.locator(".canvas.moving")).to_have_count(0)
+    large.mouse.up()
+    large.keyboard.press("Control+z")
+
+
+def test_the_map_shows_and_moves_the_view(large: Page) -> None:
+    sheet_map = large.get_by_role("img", name="Map of the sheet")
+    expect(sheet_map).to_have_count(0)  # all blocks are visible
+    while view(large)[2] < 1:
+        wheel(large, 0, -10, zoom=True)
+    expect(sheet_map).to_be_visible()
+    frame = sheet_map.locator("div")
+    before = frame.bounding_box()
+    wheel(large, 200, 0)
+    after = frame.bounding_box()
+    assert before is not None
+    assert after is not None
+    assert after["x"] > before["x"]
+    box = sheet_map.bounding_box()
+    assert box is not None
+    sheet_map.click(position={"x": box["width"] / 2, "y": box["height"] / 2})
+    rest(large)
+    centre = middle(frame)
+    assert centre == pytest.approx(middle(sheet_map), abs=2)
