@@ -17,6 +17,7 @@ import armblocks as ab
 from armblocks.blocks import (
     ActionSubsystem,
     Bias,
+    CalledPythonFunction,
     Clock,
     CompareToConstant,
     Constant,
@@ -172,6 +173,16 @@ def test_the_sensitivity_of_integrals_follows_from_the_recorded_jumps(seed: int)
         times, before, after = jumps[name]
         expected = np.sum((after - before) * times)
         assert np.isclose(result[integral, "speed.gain"][-1], expected, rtol=1e-6, atol=1e-8)
+
+
+def test_a_called_function_reads_the_values_after_the_events_before_its_tick() -> None:
+    builder = ab.DiagramBuilder("called")
+    step, one = builder.add("step", Step(time=0.5)), builder.add("one", Constant(value=1.0))
+    integral = builder.add("integral", ResettableIntegrator(external_reset="rising"), one, step)
+    law = CalledPythonFunction(function=lambda u, w, t: u + 10.0 * w, results="y", sample_time=0.25)
+    builder.add("law", law, integral, step)
+    result = ab.simulate(builder.build(), stop_time=1.0, sample_time=0.25)
+    assert np.allclose(result["law"], [0.0, 0.25, 10.0, 10.25, 10.5], rtol=0.0, atol=1e-12)
 
 
 def test_a_state_port_gives_the_value_before_a_reset_at_the_same_instant() -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from armblocks.integration import system_functions
 from armblocks.integration.evaluation import Evaluation
 from armblocks.integration.frame import SAME_ABOVE, Frame
-from armblocks.integration.workspace import Count, Scalar, Status
+from armblocks.integration.workspace import Count, Scalar, Stage, Status
 from armblocks.routines.arithmetic import select
 from armblocks.routines.memory import RealVariable
 from armblocks.routines.values import Boolean, Real
@@ -71,7 +71,10 @@ class Clocks:
         f.copy(workspace.new_z, workspace.z, f.sizes.discrete)
 
     def pause_before_ticks(self, time: Real) -> None:
-        """Return before the ticks at ``time`` if the caller requested a pause at this time or earlier."""
+        """Return before the ticks at ``time`` if the caller requested a pause at this time or earlier.
+
+        The next call continues with the ticks.
+        """
         if not self.count:
             return
         f = self.frame
@@ -79,4 +82,5 @@ class Clocks:
             self.point.value = time
             self.evaluation.solve(self.point.memory, f.vector(f.workspace.x))
             self.evaluation.accept_unknowns()
+            f.count[Count.STAGE].value = Stage.TICKS
             f.leave(Status.PAUSED)

@@ -6,7 +6,8 @@ At an instant (a tick, an event, a breakpoint, the start) the loop does the foll
 
 1. the flow is integrated up to the instant with the old values, and a step ends exactly there; if states
 store left limits, ``update`` is called without a marked clock;
-2. all clocks that tick now are marked and ``update`` gives ``z``;
+2. events on which no sampled signal acts are processed as in step 3, if sampled blocks read them; all clocks
+   that tick now are marked and ``update`` gives ``z``;
 3. mode iteration: following modes are made consistent; then ``reset`` gives ``x`` and ``z`` for the guards
    that fire, because the jump changed their sign or their zero was located here; if none fires, inconsistent
    stateful modes take their consistent values; this is repeated until nothing changes;
@@ -29,7 +30,7 @@ from armblocks.integration.events import Events
 from armblocks.integration.frame import SAME_ABOVE, SAME_BELOW, Frame
 from armblocks.integration.method import Method
 from armblocks.integration.records import Records
-from armblocks.integration.schedule import INSTANT, START, STEP, Schedule, Trial
+from armblocks.integration.schedule import INSTANT, START, STEP, TICKS, Schedule, Trial
 from armblocks.integration.segments import choose_first_step
 from armblocks.integration.workspace import Count, Scalar, Stage, Status
 from armblocks.routines.arithmetic import fma, maximum, minimum, select
@@ -71,8 +72,12 @@ class Instants(Schedule):
             stages.go(STEP)
         with r.when(started == Stage.START):
             stages.go(START)
+        with r.when(started == Stage.TICKS):
+            stages.go(TICKS)
         stages.begin(INSTANT)
-        self.instant()
+        self.before_ticks()
+        stages.begin(TICKS)
+        self.ticks_and_events()
 
     def begin_piece(self) -> None:
         """Set the end of the next piece: the next tick, the next jump of a delayed signal, or the segment's
@@ -95,7 +100,18 @@ class Instants(Schedule):
             earliest = select((time < shortest) & (time < earliest), time, earliest)
         f.end.value = earliest
 
-    def instant(self) -> None:
+    def before_ticks(self) -> None:
+        """Store the left limits at the present time, and process the events that come before the ticks."""
+        time = self.frame.time.value
+        self.record_left_limits(time)
+        self.clocks.capture(time)
+        if self.delays:
+            self.delays.pass_jumps(time)
+        if self.events:
+            self.events.process_before_ticks(time)
+        self.clocks.pause_before_ticks(time)
+
+    def ticks_and_events(self) -> None:
         """Process ticks and events at the present time, record the instant, and start the next piece."""
         f = self.frame
         time = f.time.value
@@ -104,12 +120,6 @@ class Instants(Schedule):
         # the last place: a later sample time is not recorded with it, even if it is close.
         known = time >= f.end.value * SAME_BELOW
         recorded = select(known, until, time)
-        self.record_left_limits(time)
-        self.clocks.capture(time)
-        if self.delays:
-            self.delays.pass_jumps(time)
-        if self.events:
-            self.events.process_before_ticks(time)
         self.clocks.tick(time, until)
         if self.events:
             self.events.make_modes_consistent(time)
@@ -249,5 +259,4 @@ class Instants(Schedule):
         f.count[Count.STAGE].value = Stage.INSTANT
         # The left limits are recorded before the caller changes variables.
         self.record_left_limits(new_time)
-        self.clocks.pause_before_ticks(new_time)
         stages.go(INSTANT)

@@ -29,7 +29,7 @@ from armblocks.integration.method import Method
 from armblocks.integration.records import Records
 from armblocks.integration.rosenbrock_method import RosenbrockMethod
 from armblocks.integration.rosenbrock_tableau import Tableau
-from armblocks.integration.schedule import INSTANT, START, STEP, Schedule
+from armblocks.integration.schedule import INSTANT, START, STEP, TICKS, Schedule
 from armblocks.integration.segments import Segments
 from armblocks.integration.step_control import Steps
 from armblocks.integration.workspace import Count, LoopSizes, Stage, Status, Workspace
@@ -127,7 +127,7 @@ class _Loop:
     def write(self) -> None:
         """Emit the body of the loop. At its end, the variables are stored in the arrays."""
         f, r = self.frame, self.frame.r
-        with r.part() as f.body, r.stages(INSTANT, START, STEP) as stages:
+        with r.part() as f.body, r.stages(INSTANT, TICKS, START, STEP) as stages:
             self.schedule.enter(stages)
             stages.begin(START)
             self.start()

@@ -291,7 +291,7 @@ class Integration:
     @property
     def instant_pending(self) -> bool:
         """Whether the ticks and events at the present time are pending."""
-        return bool(self.counts[Count.STAGE] == Stage.INSTANT)
+        return self.counts[Count.STAGE] in (Stage.INSTANT, Stage.TICKS)
 
     def next_tick(self, clock: int) -> float:
         """The time of the next tick, s; this may be now while the run is :attr:`instant_pending`."""

@@ -5,13 +5,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 
-from armblocks.integration.workspace import Stage
 from armblocks.routines.routine import Part, Stages
 from armblocks.routines.values import Boolean, Real
 
-INSTANT, START, STEP = "instant", "start", "step"
-"""Stages of the loop: ticks and events at the present time, the first derivative, a step."""
-STAGE = {Stage.INSTANT: INSTANT, Stage.START: START, Stage.RUNNING: STEP}
+INSTANT, TICKS, START, STEP = "instant", "ticks", "start", "step"
+"""Stages of the loop: the events before the ticks at the present time, the ticks and all other events, the
+first derivative, a step."""
 
 Trial = Callable[[Real, Real], Real]
 """Emits the stages of a step between two times; returns its length."""

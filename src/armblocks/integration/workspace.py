@@ -128,6 +128,8 @@ class Stage(IntEnum):
     """The first derivative."""
     RUNNING = 2
     """A step; its first derivative is in place."""
+    TICKS = 3
+    """Ticks at the present time, after the events that come before them."""
 
 
 @dataclass(frozen=True, kw_only=True)
