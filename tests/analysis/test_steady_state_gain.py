@@ -96,6 +96,7 @@ def test_gain_of_a_companion_matrix_with_large_coefficients() -> None:
     assert gain == pytest.approx(1.0 / coefficients[-1], rel=1e-12)
 
 
-def test_gain_zero_has_no_sign() -> None:
+def test_zeros_have_no_sign() -> None:
     system = -LinearSystem(-np.eye(1), np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)))
-    assert math.copysign(1.0, system.dcgain()[0, 0]) == 1.0
+    for value in (system.dcgain(), system.C, system.D):
+        assert math.copysign(1.0, value[0, 0]) == 1.0

@@ -65,6 +65,20 @@ def test_values_that_are_zero_to_their_accuracy_are_shown_as_zero(seed: int) -> 
     shown = trimmed.shown(name, value)
     assert shown.tolist() == [value[0], 0.0, value[2]]
     assert np.array2string(shown, precision=8) in repr(trimmed)
+    assert np.array2string(shown, precision=6) in repr(trimmed.point)
+
+
+def test_joint_angles_that_gravity_compensation_makes_zero_are_shown_as_zero() -> None:
+    """The gravity torques of a few N m cancel; their roundings move the joints by about 1e-17 rad."""
+    trimmed = ab.trim("puma560_computed_torque")
+    assert trimmed.accuracies["arm/q"].max() < 1e-14
+    for text in (repr(trimmed), repr(trimmed.point)):
+        assert text.count("[0. 0. 0. 0. 0. 0.]") == 2
+
+
+def test_small_values_of_an_operating_point_are_shown() -> None:
+    trimmed = ab.trim("puma560_computed_torque", states={"arm/q": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]})
+    assert trimmed.shown("arm/q", np.full(6, 1e-30)).tolist() == [1e-30] * 6
 
 
 def test_a_free_torque_holds_a_given_angle() -> None:

@@ -1,6 +1,9 @@
-"""Scaling of the rows and columns of a matrix, such that its entries have similar magnitudes."""
+"""Scaling of the rows and columns of a matrix, and of equations, to similar magnitudes."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,3 +34,30 @@ def _largest(logarithms: Array) -> Array:
     largest = np.array([float(row.max(initial=-np.inf)) for row in logarithms])
     largest[~np.isfinite(largest)] = 0.0
     return largest
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ResidualScales:
+    """Factors of the equations (``rows``) and of the unknowns (``columns``).
+
+    ``rounding``: residuals that can be rounding errors.
+    """
+
+    rows: Array
+    columns: Array
+    rounding: Array
+
+    @classmethod
+    def of(cls, derivatives: Array, residuals: Array, rounding: Array) -> Self:
+        """The scales for derivatives of these magnitudes."""
+        rows, columns = equilibrating_factors(derivatives)
+        # An equation that depends on no unknown has no scale but its residual.
+        constant = ~derivatives.any(axis=1) & (residuals != 0.0)
+        rows = np.where(constant, 1.0 / np.where(constant, np.abs(residuals), 1.0), rows)
+        return cls(rows=rows, columns=columns, rounding=rounding)
+
+    def excess(self, residuals: Array) -> float:
+        """The scaled size of the residuals beyond their rounding errors; infinite if one is not finite."""
+        if not np.isfinite(residuals).all():
+            return np.inf
+        return float(np.linalg.norm(self.rows * np.maximum(np.abs(residuals) - self.rounding, 0.0)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ class OperatingPoint(metaclass=ArgumentErrors):
     """The values of all variables of a system at ``time`` (s), each by its path and in its shape.
 
     They are states, discrete variables with modes, unknowns of implicit equations, tunable parameters and
-    signals.
+    signals. ``accuracies``: bounds of the rounding errors of computed values, by name and in their shape.
     """
 
     name: str
@@ -34,12 +34,21 @@ class OperatingPoint(metaclass=ArgumentErrors):
     algebraic: Mapping[str, Array]
     parameters: Mapping[str, Array]
     signals: Mapping[str, Array]
+    accuracies: Mapping[str, Array] = field(default_factory=dict[str, Array])
+
+    def shown(self, name: str, value: Array) -> Array:
+        """A value of this point, with 0 for every number that is 0 within its accuracy."""
+        accuracy = self.accuracies.get(name)
+        return value + 0.0 if accuracy is None else np.where(np.abs(value) <= accuracy, 0.0, value)
 
     def __repr__(self) -> str:
         head = f"<OperatingPoint of {self.name} at {self.time:g} s>"
         parts = (*self.states.items(), *self.discrete.items())
         width = max((len(name) for name, _ in parts), default=0)
-        lines = [f"  {name:<{width}}  {np.array2string(value + 0.0, precision=6)}" for name, value in parts]
+        lines = [
+            f"  {name:<{width}}  {np.array2string(self.shown(name, value), precision=6)}"
+            for name, value in parts
+        ]
         return "\n".join([head, *lines])
 
 

@@ -129,7 +129,7 @@ SystemT = TypeVar("SystemT", bound=StateSpaceModel)
 def _checked_matrices(system: StateSpaceModel) -> tuple[int, int, int]:
     """Replace the matrices by read-only copies, and return the numbers of states, inputs and outputs."""
     for letter in "ABCD":
-        matrix = np.array(getattr(system, letter), dtype=np.float64)
+        matrix = np.array(getattr(system, letter), dtype=np.float64) + 0.0  # 0 instead of -0
         if matrix.ndim != 2:
             raise InputError(
                 f"{letter} has {counted(matrix.ndim, 'axis', 'axes')}",

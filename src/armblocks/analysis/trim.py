@@ -17,12 +17,11 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.analysis.equilibration import equilibrating_factors
+from armblocks.analysis.equilibration import ResidualScales, equilibrating_factors
 from armblocks.analysis.operating_point import OperatingPoint, operating_point, solved
 from armblocks.equations import HybridSystem, Signature
 from armblocks.equations.evaluation import EvaluatedSystem, Jacobians, Point
@@ -39,6 +38,10 @@ ROUNDING_ERROR = 4.0 * float(np.finfo(np.float64).eps)
 """Relative rounding error of a term of an equation."""
 SOLVED = 16.0 * ROUNDING_ERROR
 """Residual of a solved equation, relative to the sum of the magnitudes of its terms."""
+NEARBY, NEARBY_POINTS = 1e-12, 4
+"""Distance, relative to the largest values, and number of the points at which roundings are measured."""
+SAFETY = 4.0
+"""Ratio of the bound of a rounding error and the largest measured one."""
 START_DAMPING = 1e-3
 """Damping of the first step; without failed steps it decreases."""
 MAX_NAMED_EQUATIONS = 6
@@ -70,14 +73,12 @@ class TrimProblem:
 class TrimResult:
     """An operating point with its residuals.
 
-    ``free``: the parameters that were found, in the form for ``simulate(parameters=…)``. ``accuracies``:
-    bounds of the rounding errors of all unknowns, by name and in their shape. ``residuals``: the residual of
-    every equation, by name. ``at_bounds``: unknowns that are at a bound of their range.
+    ``free``: the parameters that were found, in the form for ``simulate(parameters=…)``. ``residuals``: the
+    residual of every equation, by name. ``at_bounds``: unknowns that are at a bound of their range.
     """
 
     point: OperatingPoint
     free: Mapping[str, Array]
-    accuracies: Mapping[str, Array]
     residuals: Mapping[str, float]
     at_bounds: tuple[str, ...]
     iterations: int
@@ -87,10 +88,14 @@ class TrimResult:
         """The largest magnitude of a residual."""
         return max((abs(value) for value in self.residuals.values()), default=0.0)
 
+    @property
+    def accuracies(self) -> Mapping[str, Array]:
+        """Bounds of the rounding errors of all unknowns, by name and in their shape."""
+        return self.point.accuracies
+
     def shown(self, name: str, value: Array) -> Array:
         """A value of the point or of ``free``, with 0 for every number that is 0 within its accuracy."""
-        accuracy = self.accuracies.get(name)
-        return value + 0.0 if accuracy is None else np.where(np.abs(value) <= accuracy, 0.0, value)
+        return self.point.shown(name, value)
 
     def __repr__(self) -> str:
         head = (
@@ -155,33 +160,6 @@ def _elements(layout: Signature) -> list[str]:
     return [name for slot in layout for name in slot.elements]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Scales:
-    """Factors of the equations (``rows``) and of the unknowns (``columns``).
-
-    ``rounding``: residuals that can be rounding errors.
-    """
-
-    rows: Array
-    columns: Array
-    rounding: Array
-
-    @classmethod
-    def of(cls, derivatives: Array, residuals: Array, rounding: Array) -> Self:
-        """The scales for derivatives of these magnitudes."""
-        rows, columns = equilibrating_factors(derivatives)
-        # An equation that depends on no unknown has no scale but its residual.
-        constant = ~derivatives.any(axis=1) & (residuals != 0.0)
-        rows = np.where(constant, 1.0 / np.where(constant, np.abs(residuals), 1.0), rows)
-        return cls(rows=rows, columns=columns, rounding=rounding)
-
-    def excess(self, residuals: Array) -> float:
-        """The scaled size of the residuals beyond their rounding errors; infinite if one is not finite."""
-        if not np.isfinite(residuals).all():
-            return np.inf
-        return float(np.linalg.norm(self.rows * np.maximum(np.abs(residuals) - self.rounding, 0.0)))
-
-
 class _Search:
     """Equations, derivatives and steps of one problem."""
 
@@ -218,6 +196,7 @@ class _Search:
         bounds = [problem.bounds.get(name, (-np.inf, np.inf)) for name in self.unknowns]
         self.lower = np.array([low for low, _ in bounds], dtype=np.float64)
         self.upper = np.array([high for _, high in bounds], dtype=np.float64)
+        self.largest_values = np.zeros(len(self.unknowns))
 
     def values(self, point: Point) -> Array:
         """The unknowns of a point in one vector."""
@@ -297,14 +276,32 @@ class _Search:
 
         The terms of an equation have a few roundings each. The error of the equation and its residual,
         multiplied by the inverse Jacobian, bound the error of the unknowns (Golub and Van Loan, Matrix
-        Computations, 4th ed., 2.6).
+        Computations, 4th ed., 2.6). Terms that cancel without an unknown, such as a weight and its
+        compensation, are not in the Jacobian. Their roundings are measured.
         """
         matrix, sizes = self.jacobian_and_sizes(point)
         if not np.isfinite(matrix).all():  # the search has failed
             return np.zeros(len(self.unknowns))
         rows, columns = equilibrating_factors(matrix)
         inverse = np.abs(np.linalg.pinv(matrix * rows[:, None] * columns))
-        return columns * (inverse @ (rows * (ROUNDING_ERROR * sizes + np.abs(self.residuals(point)))))
+        residuals = np.abs(self.residuals(point)) + self._measured_roundings(point, matrix)
+        return columns * (inverse @ (rows * (ROUNDING_ERROR * sizes + residuals)))
+
+    def _measured_roundings(self, point: Point, jacobian: Array) -> Array:
+        """Differences of the residuals at close points from the linear equations.
+
+        The points differ by a small part of the largest values in the search, such that terms of second
+        order are smaller than the roundings.
+        """
+        values, before = self.values(point), self.residuals(point)
+        found = np.zeros(before.size)
+        for k in range(NEARBY_POINTS):
+            signs = np.where(np.arange(values.size) & (1 << k), -1.0, 1.0) * (1.0 - k / (2.0 * NEARBY_POINTS))
+            nearby = values + NEARBY * signs * self.largest_values
+            change = self.residuals(self.point_with(nearby, point)) - before
+            difference = np.abs(change - jacobian @ (nearby - values))
+            found = np.maximum(found, np.where(np.isfinite(difference), difference, 0.0))
+        return SAFETY * found
 
     def rounding(self, point: Point, residuals: Array, jacobian: Array, sizes: Array) -> Array:
         """Residuals that can be rounding errors.
@@ -359,7 +356,7 @@ class _Search:
                 return point, iteration
             derivatives = np.maximum(derivatives, np.abs(jacobian))
             rounding = self.rounding(point, residuals, jacobian, sizes)
-            scales = _Scales.of(derivatives, residuals, rounding)
+            scales = ResidualScales.of(derivatives, residuals, rounding)
             size = scales.excess(residuals)
             if size == 0.0:
                 return point, iteration
@@ -381,10 +378,11 @@ class _Search:
             if is_last:
                 return point, iteration + 1
             values = np.maximum(values, np.abs(self.values(point)))
+            self.largest_values = np.maximum(self.largest_values, values)
         return point, MAX_ITERATIONS
 
     def _step(
-        self, point: Point, jacobian: Array, residuals: Array, damping: float, scales: _Scales
+        self, point: Point, jacobian: Array, residuals: Array, damping: float, scales: ResidualScales
     ) -> Array:
         """One step of the damped normal equations. Unknowns that would leave their bounds stay at them."""
         values = self.values(point)
@@ -421,15 +419,18 @@ class _Search:
         }
         zero_point = Point(t=0.0, **{part: np.zeros_like(getattr(point, part)) for part in "xzwp"})
         accuracies = self.point_with(self.errors(point), zero_point)
-        return TrimResult(
-            point=known,
-            free=free,
+        known = dataclasses.replace(
+            known,
             accuracies={
                 **system.states.unpack(accuracies.x),
                 **system.discrete.unpack(accuracies.z),
                 **system.algebraic.unpack(accuracies.w),
                 **{name: system.parameters.unpack(accuracies.p)[name] for name in free},
             },
+        )
+        return TrimResult(
+            point=known,
+            free=free,
             residuals=dict(zip(self.equations, self.residuals(point).tolist())),
             at_bounds=tuple(self.unknowns[k] for k in np.flatnonzero(bounded).tolist()),
             iterations=iterations,

@@ -49,7 +49,7 @@ def trim(
     ``block/state``, or by its block if that has one state only.
 
     Sampled blocks are in equilibrium if a tick changes no state. Every equation holds to ``tolerance``, in
-    its own unit.
+    its own unit, or to the rounding errors of its terms if these are larger.
 
     Raises ``SimulationError``, with the equations that are not satisfied, the reason, and the best point
     found as ``partial``; ``UnknownNameError`` and ``InputError`` for invalid names and values.
