@@ -99,6 +99,8 @@ def all_equations(block: Block, shapes: Shapes) -> Function:
     x, u, e, p = (dict(named_values(slots, symbol)) for slots, symbol in zip(arguments, symbols))
     if block.sampled:
         p["T"] = SX(0.1)
+        if block.reads_next_period:
+            p["T_next"] = SX(0.1)
     results = [
         equation(Arguments(t, x, u, p, e))
         for kind, equation in features.equations.items()

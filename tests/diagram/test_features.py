@@ -45,8 +45,9 @@ def arguments(block: Block, features: Features, hidden: Mapping[str, float]) -> 
 
     states = random_values(iter((*(entry.name for entry in held), *before)))
     parameters = {rule.name: SX(block.parameter_value(rule.name)) for rule in block.inputs_of_the_run()}
+    periods = {"T": SX(0.1), "T_next": SX(0.2)}
     guards = {guard.name: SX(0.0) for guard in features.guards}
-    return Arguments(SX(0.37), states, random_values(iter(inputs)), {**parameters, "T": SX(0.1)}, guards)
+    return Arguments(SX(0.37), states, random_values(iter(inputs)), parameters | periods, guards)
 
 
 def number(value: SX) -> float:

@@ -62,7 +62,12 @@ class BlockNumbers:
     """One block: an array for every quantity, and its equations as functions between the arrays."""
 
     def __init__(
-        self, name: str, block: Block, shapes: Mapping[str, Shape], outputs: Mapping[str, Shape]
+        self,
+        name: str,
+        block: Block,
+        shapes: Mapping[str, Shape],
+        outputs: Mapping[str, Shape],
+        triggered: bool = False,
     ) -> None:
         if block.called:
             raise UnsupportedError(f"'{name}' calls Python at its ticks")
@@ -106,7 +111,31 @@ class BlockNumbers:
                 natural[letter][key] = unflatten(symbol, shape)
         for rule in block.inputs_of_the_run():
             self.arrays[f"p:{rule.name}"][:] = np.ravel(block.parameter_value(rule.name))
+        self._last: dict[str, tuple[SX, SX]] = {}
+        if block.reads_next_period:
+            natural["p"]["T_next"] = natural["p"]["T"]
+            if triggered:
+                natural["x"] |= self._states_after_last_trigger(natural)
         self._build(natural["x"], natural["u"], natural["p"], natural["e"])
+
+    def _states_after_last_trigger(self, natural: Mapping[str, dict[str, SX]]) -> dict[str, SX]:
+        """Return the discrete states after the update of the previous trigger event.
+
+        That update is a function of the time to this event, the present value of T. The states, the inputs
+        and T at the previous event are stored; ``last:done`` is 0 before the first event.
+        """
+        for key, symbol in [(key, symbol) for key, symbol in self.symbols.items() if key[0] == "u"]:
+            self._last[key] = (SX.sym(f"last {key}", symbol.numel()), symbol)
+        self._last["p:T"] = (SX.sym("last T"), natural["p"]["T"])
+        self._last["done"] = (SX.sym("done"), SX(1.0))
+        for key, (symbol, _) in self._last.items():
+            self.symbols[f"x:last:{key}"] = symbol
+            self.arrays[f"x:last:{key}"] = np.zeros(symbol.numel())
+        x, u = natural["x"], natural["u"]
+        p = natural["p"] | {"T": self._last["p:T"][0]}
+        then = {key: unflatten(self._last[f"u:{key}"][0], shape) for key, shape in self.shapes.items()}
+        updates = self.block.updates(self.symbols["t"], x, u | then, p)
+        return {key: if_else(self._last["done"][0], value, x[key]) for key, value in updates.items()}
 
     def _build(self, x: dict[str, SX], u: dict[str, SX], p: dict[str, SX], e: dict[str, SX]) -> None:
         """Collect all equations as flat columns by kind and name."""
@@ -124,7 +153,14 @@ class BlockNumbers:
         out_shapes |= dict(block.output_shapes(self.shapes))
         add("out", outputs, out_shapes)
         add("xdot", block.derivatives(t, x, u, p), {s.name: s.shape for s in self.states})
-        add("update", block.updates(t, x, u, p), {s.name: s.shape for s in self.discrete})
+        if self._last:
+            # At a trigger event the states become those after the previous event.
+            add("update", x, {s.name: s.shape for s in self.discrete})
+            last = {f"last:{key}": value for key, (_, value) in self._last.items()}
+            add("update", last, {key: (value.numel(),) for key, value in last.items()})
+            add("start", {"last:done": SX(0.0)}, {"last:done": ()})
+        else:
+            add("update", block.updates(t, x, u, p), {s.name: s.shape for s in self.discrete})
         add("guard", block.guard_values(t, x, u, p), {g.name: g.shape for g in self.guards})
         earlier = x | {mode.name: x[mode.before] for mode in self.remembered}
         mode_values = dict(block.mode_values(t, earlier, u, p)) | own_modes(block, x, u, p)

@@ -31,7 +31,8 @@ class Network:
         self.time = np.zeros(1)
         for name, block in flat.blocks.items():
             kind = CONTROLS.get(type(block), BlockNumbers)
-            self.blocks[name] = kind(name, block, shapes.inputs[name], shapes.outputs[name])
+            triggered = {"triggered": True} if "?elapsed" in flat.gates.get(name, {}) else {}
+            self.blocks[name] = kind(name, block, shapes.inputs[name], shapes.outputs[name], **triggered)
             self.blocks[name].arrays["t"] = self.time
         self.drivers: dict[tuple[str, str], PortRef] = {
             (name, port.name): flat.drivers[PortRef(name, port.name)]

@@ -122,6 +122,22 @@ def test_a_signal_that_passes_through_zero_is_zero_for_one_instant_on_request() 
         assert rounded["hold/y/y"][-1] in (-1.0, at_zero["hold/y/y"][-1])
 
 
+@pytest.mark.parametrize("method", ["forward_euler", "backward_euler", "trapezoidal"])
+def test_an_integral_at_irregular_triggers_agrees_with_its_formula(method: str) -> None:
+    inside, builder = DiagramBuilder("inside"), DiagramBuilder("triggered")
+    inside.output("y", inside.add("integral", bl.DiscreteIntegrator(method=method), inside.input("u")))
+    edges = bl.FromTable(times=[0.0, 0.1, 0.5, 0.9, 0.95, 1.0], values=[-1, 1, -1, 1, -1, 1], method="flat")
+    subsystem = bl.TriggeredSubsystem(diagram=inside.build())
+    builder.add("sub", subsystem, builder.add("u", bl.Clock()), trigger=builder.add("trigger", edges))
+    integral = run_reference(builder.build(), np.array([0.0, 0.1, 0.9, 1.0]))["sub/y/y"][1:]
+    expected = {
+        "forward_euler": [0.0, 0.08, 0.17],
+        "backward_euler": [0.01, 0.73, 0.83],
+        "trapezoidal": [0.005, 0.405, 0.5],
+    }
+    assert np.ravel(integral) == pytest.approx(expected[method], abs=1e-12)
+
+
 def test_too_many_events_raise_an_error() -> None:
     with pytest.raises(EndlessEventsError, match="more than 20 events"):
         run_reference(chain(bl.SineWave(frequency=1e3), bl.Sign()), TIMES, max_events=20)

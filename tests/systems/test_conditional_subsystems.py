@@ -267,7 +267,7 @@ def test_a_triggered_subsystem_samples_and_holds(edge: str, settings: dict[str, 
 
 @SETTINGS
 def test_sampled_blocks_are_updated_once_at_each_trigger(settings: dict[str, object]) -> None:
-    """y = x(k), x(k+1) = x(k) + elapsed u: the rectangle rule with irregular steps, u = t."""
+    """y(k) = y(k-1) + elapsed u(k-1): the rectangle rule with irregular steps, u = t."""
 
     def inside(inner: DiagramBuilder) -> None:
         delayed = inner.add("delay", UnitDelay(initial=-3.0), inner.input("u"))
@@ -281,12 +281,12 @@ def test_sampled_blocks_are_updated_once_at_each_trigger(settings: dict[str, obj
     )
     result = ab.simulate(diagram, stop_time=2.05, sample_time=0.01, **settings)
     fires = [math.sqrt(k + 0.5) for k in range(4)]
-    y, before, x, last, memory = 0.0, 0.0, 0.0, 0.0, -3.0
+    y, last, memory = 0.0, fires[0], -3.0
     values = []
     for fire in fires:
-        y, before = x, memory
-        x, memory, last = x + (fire - last) * fire, fire, fire
-        values.append((y, before))
+        y += (fire - last) * last
+        values.append((y, memory))
+        last = memory = fire
     for (y, before), start, end in zip(values, fires, [*fires[1:], 2.05]):
         inside_interval = (result.time > start + 1e-6) & (result.time < end - 1e-6)
         np.testing.assert_allclose(result["sub/y"][inside_interval], y, atol=1e-9)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 from casadi import SX, fmax, fmin, if_else, logic_and, logic_or
 
+from armblocks.blocks.integration_rules import included_fraction, interval_of_update
 from armblocks.blocks.switching import THRESHOLD_OFFSET, zone, zone_after
 from armblocks.diagram import Guard, Signals, State
 from armblocks.equations import Shape
@@ -164,7 +165,7 @@ class ContinuousPid:
 
 @dataclass(frozen=True, kw_only=True)
 class SampledPid:
-    """The PID law at the ticks of a clock with the period T.
+    """The PID law at the ticks of a clock with the period T, or at trigger events.
 
     Sums are forward Euler T / (z - 1), backward Euler T z / (z - 1), or trapezoidal T (z + 1) / (2 (z - 1)).
     With the last two rules, the output contains the newest increment of the integral. The increment of
@@ -207,13 +208,14 @@ class SampledPid:
             outwards = (unlimited - limited) * rate > 0.0
             rate = if_else(outwards, SX(0.0), rate)
         elif self.anti_windup == "back_calculation":
-            fraction = _included_fraction(self.integrator_method) * p["T"] * p["Kb"]
+            fraction = included_fraction(self.integrator_method) * p["T"] * p["Kb"]
             rate = rate + p["Kb"] * (limited - unlimited) / (1.0 + fraction)
         if tracked is not None:
             rate = rate + p["Kt"] * (tracked - limited)
         after = {
-            "integral": states["integral"] + p["T"] * rate,
-            "filter": states["filter"] + p["T"] * self._derivative(states, D * e.derivative, p),
+            "integral": states["integral"] + interval_of_update(self.integrator_method, p) * rate,
+            "filter": states["filter"]
+            + interval_of_update(self.filter_method, p) * self._derivative(states, D * e.derivative, p),
         }
         if trigger is not None:
             after["trigger"] = if_else(trigger > 0.0, 1.0, -1.0)
@@ -223,12 +225,12 @@ class SampledPid:
         """The controller output before it is limited."""
         P, I, D = _gains(self.form, p)  # noqa: E741
         unlimited = P * e.proportional + states["integral"] + self._derivative(states, D * e.derivative, p)
-        fraction = _included_fraction(self.integrator_method)
+        fraction = included_fraction(self.integrator_method)
         return unlimited + fraction * p["T"] * I * e.integral if fraction else unlimited
 
     def _derivative(self, states: Signals, weighted: SX, p: Signals) -> SX:
         """The filtered derivative d = N (D e - f), where f is the sum of d."""
-        rate, fraction = p["N"] * (weighted - states["filter"]), _included_fraction(self.filter_method)
+        rate, fraction = p["N"] * (weighted - states["filter"]), included_fraction(self.filter_method)
         return rate / (1.0 + fraction * p["T"] * p["N"]) if fraction else rate
 
     def _at_tick(self, x: Signals, p: Signals, trigger: SX | None) -> Signals:
@@ -242,8 +244,3 @@ class SampledPid:
 
     def _limited(self, value: SX, p: Signals) -> SX:
         return fmin(fmax(value, p["lower"]), p["upper"])
-
-
-def _included_fraction(method: str) -> float:
-    """The fraction of the present increment that a sum includes at the same tick."""
-    return {"forward_euler": 0.0, "backward_euler": 1.0, "trapezoidal": 0.5}[method]

@@ -41,7 +41,8 @@ class Block(ABC, metaclass=ArgumentErrors):
 
     A *sampled* block (``sampled = True``, parameter ``sample_time``) is active at the ticks of its clock
     only. At a tick its outputs are computed from the previous discrete states and then held; ``updates``
-    gives the next discrete states. Its equations read the period (s) as ``p["T"]``.
+    gives the next discrete states. Its equations read the time since the previous tick (s) as ``p["T"]``.
+    In a triggered subsystem this time changes; see ``reads_next_period``.
 
     A block with *modes* switches between equations at *events*. A mode is constant between events, so that
     the continuous equations are smooth. ``guards`` gives the functions whose zeros are events and ``resets``
@@ -78,6 +79,11 @@ class Block(ABC, metaclass=ArgumentErrors):
     that makes it zero. Newton's method starts from ``initial_guesses``."""
     sampled: ClassVar[bool] = False
     """Whether the block is sampled: active at the ticks of a clock, with the parameter ``sample_time``."""
+    reads_next_period: ClassVar[bool] = False
+    """Whether the updates of a sampled block read ``p["T_next"]``, the time (s) from this tick to the next.
+
+    In a triggered subsystem the updates are then computed at the next trigger event, from the states and
+    inputs of this one. Outputs do not read ``p["T_next"]``."""
     called: ClassVar[bool] = False
     """Whether a sampled block calls Python before each of its ticks. :meth:`call` takes the discrete states
     ``port?`` of the inputs at the tick and returns those of the outputs."""

@@ -198,6 +198,8 @@ def _trace(structure: _Structure) -> BlockEquations:
     x, z, u, e, p = (dict(named_values(slots, symbols[letter])) for letter, slots in layout.items())
     if structure.clocked:
         p["T"] = SX(structure.period)
+        if own.reads_next_period:
+            p["T_next"] = p["T"]
     at = Arguments(t, {**x, **z}, u, p, e)
     at = at.with_states(evaluated_conditions(own, requested, at))
     at_consistent_modes = (

@@ -26,6 +26,9 @@ _TICK_RESET, _INSTANT_RESET = "?done", "?restarted"
 """Hidden states: whether the present tick has reset the block, and whether the present instant has."""
 _MODES_CONSISTENT = "?running"
 """Hidden mode: whether the control is on and the modes of the block are consistent."""
+_PENDING, _PREVIOUS_PERIOD, _PREVIOUS = "?pending", "?period", "?previous "
+"""Hidden states of a triggered block whose updates read the time to the next trigger event: whether the
+update of an earlier trigger event is pending; the period T at that event, s; with this prefix, the inputs."""
 _CONTROL_GUARD = "?turned"
 """Hidden guard: the control crosses 0.5."""
 
@@ -38,6 +41,8 @@ def conditional(features: Features, gate: Collection[str], *, clocked: bool, tic
     after the control has changed. The hidden state ``?done`` prevents a second restart after that of a tick.
     """
     own = with_hidden_inputs(features, gate)
+    if ELAPSED in gate and features.reads_next_period:
+        own = updated_at_the_next_trigger(own)
     if ON in gate and clocked:
         # Before the restart: a state that a tick resets while the control is off keeps its initial value.
         own = while_on(own, AT_TICKS)
@@ -67,6 +72,42 @@ def with_hidden_inputs(features: Features, gate: Collection[str]) -> Features:
 
     return dataclasses.replace(
         features.at_arguments(own), inputs={**features.inputs, **dict.fromkeys(gate, ())}
+    )
+
+
+def updated_at_the_next_trigger(features: Features) -> Features:
+    """Compute the updates of a triggered block at the next trigger event, when the time to it is known.
+
+    The states are those before the pending update. All equations are evaluated at the states after it.
+    """
+    updates = features.equations[SlotKind.UPDATE]
+    names = {name: shape for name, shape in features.inputs.items() if not name.startswith("?")}
+
+    def present(at: Arguments) -> dict[str, SX]:
+        previous = {name: at.x[_PREVIOUS + name] for name in names}
+        u = {**at.u, **previous, ELAPSED: at.x[_PREVIOUS_PERIOD]}
+        then = dataclasses.replace(at, u=u, p={**at.p, "T_next": at.u[ELAPSED]})
+        return {
+            name: if_else(at.x[_PENDING] != 0.0, value, at.x[name]) for name, value in updates(then).items()
+        }
+
+    def update(at: Arguments) -> Signals:
+        inputs = {_PREVIOUS + name: at.u[name] for name in names}
+        return {**present(at), **inputs, _PREVIOUS_PERIOD: at.u[ELAPSED], _PENDING: SX(1.0)}
+
+    def initial_states(p: Signals) -> Signals:
+        return {**features.initial_states(p), _PENDING: SX(0.0)}
+
+    added = (
+        *(State(_PREVIOUS + name, shape, "an input") for name, shape in names.items()),
+        State(_PREVIOUS_PERIOD, (), "the period at the previous trigger event", "s"),
+        State(_PENDING, (), "whether the update of an earlier trigger event is pending"),
+    )
+    changed = features.at_arguments(lambda at: at.with_states(present(at)))
+    return dataclasses.replace(
+        changed.with_equations({SlotKind.UPDATE: update}),
+        discrete=(*features.discrete, *added),
+        initial_states=initial_states,
     )
 
 

@@ -106,6 +106,7 @@ class Features:
     delays: tuple[DelayLine, ...]
     equations: Mapping[SlotKind, Equation]
     sampled: bool
+    reads_next_period: bool
     initial_states: Callable[[Signals], Signals]
     initial_history: Callable[[Signals], Signals]
     initial_outputs: Callable[[Signals], Signals]
@@ -146,6 +147,7 @@ def features_of(block: Block, inputs: Shapes) -> Features:
         conditions=block.conditions(inputs),
         delays=lines,
         sampled=block.sampled,
+        reads_next_period=block.reads_next_period,
         equations={
             SlotKind.OUTPUT: lambda at: block.outputs(at.t, at.x, at.u, at.p),
             SlotKind.DERIVATIVE: lambda at: block.derivatives(at.t, at.x, at.u, at.p),

@@ -21,6 +21,7 @@ from armblocks.blocks.external_resets import (
     reset_ports,
     trigger_state,
 )
+from armblocks.blocks.integration_rules import included_fraction, interval_of_update
 from armblocks.blocks.switching import limits_in_order
 from armblocks.diagram import (
     Block,
@@ -50,7 +51,9 @@ class DiscreteIntegrator(Block):
     """A discrete-time integrator: x(k+1) = x(k) + gain T u(k), within two limits, x(0) = initial.
 
     It corresponds to Simulink's Discrete-Time Integrator. Forward Euler: y(k) = x(k). Backward Euler: y(k) =
-    x(k) + gain T u(k). Trapezoidal: y(k) = x(k) + gain T u(k) / 2 and x(k+1) = y(k) + gain T u(k) / 2. An
+    x(k) + gain T u(k). Trapezoidal: y(k) = x(k) + gain T u(k) / 2 and x(k+1) = y(k) + gain T u(k) / 2. In a
+    triggered subsystem the interval is T(k) = t(k) - t(k-1). Forward Euler is then y(k) = y(k-1) + gain T(k)
+    u(k-1), and the trapezoidal rule is y(k) = y(k-1) + gain T(k) (u(k-1) + u(k)) / 2. An
     external reset sets x(k) to the initial value before the output of that tick is computed. The
     ``state_port`` outputs x(k) before the reset, so that a loop through this port is not algebraic.
     """
@@ -61,6 +64,7 @@ class DiscreteIntegrator(Block):
         shows="The integral of a sine by the forward Euler method: one rectangle for each tick.",
     )
     sampled: ClassVar[bool] = True
+    reads_next_period: ClassVar[bool] = True
 
     method: str = parameter("forward_euler", choices=tuple(_METHODS), doc="integration method")
     gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the gain")
@@ -107,7 +111,7 @@ class DiscreteIntegrator(Block):
         return (x, PREVIOUS_SIGN) if self._has_resets else (x,)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        share = {"forward_euler": 0.0, "backward_euler": 1.0, "trapezoidal": 0.5}[self.method]
+        share = included_fraction(self.method)
         unlimited = self._state_after_reset(x, u, p)
         if share:
             unlimited = unlimited + share * p["gain"] * p["T"] * u["u"]
@@ -118,7 +122,8 @@ class DiscreteIntegrator(Block):
         return values | ({"state": x["x"]} if self.state_port else {})
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        after = {"x": self._limited(self._state_after_reset(x, u, p) + p["gain"] * p["T"] * u["u"], p)}
+        interval = interval_of_update(self.method, p)
+        after = {"x": self._limited(self._state_after_reset(x, u, p) + p["gain"] * interval * u["u"], p)}
         if self._has_resets:
             untriggered = self.external_reset == "none"
             after["previous"] = SX(0.0) if untriggered else trigger_state(self.external_reset, u["reset"])

@@ -47,6 +47,8 @@ from armblocks.diagram.signs import FaceSign, Lines, Words
 class SampledPidBlock(Block):
     """Base class of the sampled PID controllers; subclasses define the errors of the three actions."""
 
+    reads_next_period: ClassVar[bool] = True
+
     P: ArrayLike = gain_parameter(1.0, "proportional gain")
     I: ArrayLike = gain_parameter(1.0, "integral gain", "1/s")  # noqa: E741
     D: ArrayLike = gain_parameter(0.0, "derivative gain", "s")
@@ -114,7 +116,7 @@ class DiscretePID(SampledPidBlock):
     ``backward_euler`` or ``trapezoidal`` instead. While the output is limited, ``clamping`` stops the
     integral if it drives the output further beyond the limit. ``back_calculation`` adds T Kb (y - unlimited
     y) to the integral. ``tracking`` adds T Kt (tracking - y) to the integral. A reset happens at the first
-    tick after the trigger has crossed zero.
+    tick after the trigger has crossed zero. In a triggered subsystem the T of k+1 is t(k+1) - t(k).
     """
 
     title: ClassVar[str] = "Discrete PID Controller"

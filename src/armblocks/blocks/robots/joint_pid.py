@@ -152,11 +152,12 @@ class SampledJointPID(JointPidBlock):
     """PID of joints at ticks: tau(k) = limit(Kp e + Kd (qdr - qd) + i(k)), i(k+1) = i(k) + T Ki e.
 
     e = qr - q. Each joint has its own controller. Clamping: the integral stops while the torque is at a limit
-    and e drives it further beyond the limit.
+    and e drives it further beyond the limit. In a triggered subsystem T is t(k+1) - t(k).
     """
 
     title: ClassVar[str] = "Sampled PID Joint Controller"
     sampled: ClassVar[bool] = True
+    reads_next_period: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="An inertia of 1 kg m^2 moves to 1 rad with a torque of at most 0.5 N m, sampled every 0.1 s.",
         parameters={
@@ -187,7 +188,7 @@ class SampledJointPID(JointPidBlock):
         excess = unlimited - fmin(fmax(unlimited, p["lower"]), p["upper"])
         rate = p["Ki"] * (u["qr"] - u["q"])
         outwards = logic_and(excess != 0.0, excess * rate > 0.0)
-        return {"integral": x["integral"] + p["T"] * if_else(outwards, 0.0, rate)}
+        return {"integral": x["integral"] + p["T_next"] * if_else(outwards, 0.0, rate)}
 
 
 def _unlimited_torque(x: Signals, u: Signals, p: Signals) -> SX:
