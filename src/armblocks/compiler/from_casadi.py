@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import casadi
 from casadi import SX, Function
 
+from armblocks import interrupts
 from armblocks.compiler.matrix_products import with_matrix_products
 from armblocks.compiler.opcodes import Opcode
 from armblocks.compiler.tape import Tape
@@ -79,6 +80,7 @@ def tape_from(traced: TracedFunction) -> Tape:
 
     Raises :class:`CompileError` with its name if the graph has an unsupported operation.
     """
+    interrupts.check()
     function = Function("f", list(traced.arguments), [*traced.results, traced.rounded], {"cse": True})
     builder = TapeBuilder([slot.size for slot in traced.inputs])
     inputs = [[builder.input(k, index) for index in range(slot.size)] for k, slot in enumerate(traced.inputs)]

@@ -17,6 +17,7 @@ from casadi import (
 )
 from numpy.typing import NDArray
 
+from armblocks import interrupts
 from armblocks.diagram.block import Signals
 from armblocks.diagram.conditional_equations import ON
 from armblocks.diagram.features import SlotKind
@@ -99,6 +100,7 @@ class Tracing:
         """Evaluate the equations of one node with the values of the nodes on which it depends."""
         if node.group == HELD:
             return
+        interrupts.check()
         group = self.network.equations[node.block].groups[node.group]
         symbols = self.symbols
         columns: list[SX] = []

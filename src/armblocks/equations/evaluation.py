@@ -13,6 +13,7 @@ import numpy as np
 from casadi import SX, Function, densify, jacobian, jacobian_sparsity, vec, vertcat
 from numpy.typing import NDArray
 
+from armblocks import interrupts
 from armblocks.equations.hybrid_system import Delays, HybridSystem
 from armblocks.equations.table_reading import evaluate_with_reads, reads_tables
 from armblocks.equations.traced_function import TracedFunction
@@ -197,4 +198,5 @@ def _numbers(function: Function, arguments: Sequence[Array]) -> Array:
         flat = [np.asarray(argument, dtype=np.float64).reshape(-1) for argument in arguments]
         return np.asarray(evaluate_with_reads(function, flat)[0], dtype=np.float64)
     (value,) = function.call(list(arguments))
+    interrupts.check()
     return np.asarray(value.full(), dtype=np.float64)

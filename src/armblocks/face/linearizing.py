@@ -10,6 +10,7 @@ from typing import Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armblocks import interrupts
 from armblocks.analysis.linear_system import LinearSystem
 from armblocks.analysis.linearisation import exact_response, input_scalars, linearise, output_scalars
 from armblocks.analysis.operating_point import (
@@ -63,6 +64,7 @@ def linearize(
 
 
 @takes_settings
+@interrupts.kept()
 def linearize(
     diagram: Diagram | CompiledDiagram | str | PathLike[str],
     inputs: str | Sequence[str] = (),
@@ -139,6 +141,7 @@ def _linearized(
 
 
 @takes_settings
+@interrupts.kept()
 def frequency_response(
     diagram: Diagram | CompiledDiagram | str | PathLike[str],
     inputs: str | Sequence[str],
@@ -248,6 +251,8 @@ def operating_points_at(
             continue
         run: RunSettings = {**settings, "stop_time": time}
         result = simulate(compiled, initial_state=state, **run)
+        if not result.run.complete:
+            raise KeyboardInterrupt  # Ctrl-C ended the run early
         state = result.final_state
         assert state is not None  # a failed run has raised an error
         points[time] = _point_from_state(evaluated, state)

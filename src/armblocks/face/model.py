@@ -13,6 +13,7 @@ from typing import Unpack, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks import interrupts
 from armblocks.analysis.operating_point import OperatingPoint
 from armblocks.argument_errors import ArgumentErrors
 from armblocks.diagram import Diagram, content_key, trace_diagram, with_parameters
@@ -45,13 +46,15 @@ class CompiledDiagram(metaclass=ArgumentErrors):
     @cached_property
     def system(self) -> HybridSystem:
         """The diagram as equations."""
-        return trace_diagram(self.diagram)
+        with interrupts.kept():
+            return trace_diagram(self.diagram)
 
     @cached_property
     def compiled(self) -> CompiledSystem:
         """The equations as native code; with a cache entry there is no tracing."""
         key = content_key(self.diagram)
-        return compile_system(self.system) if key is None else cached_system(key, lambda: self.system)
+        with interrupts.kept():
+            return compile_system(self.system) if key is None else cached_system(key, lambda: self.system)
 
     @cached_property
     def _signals_layout(self) -> Signature:

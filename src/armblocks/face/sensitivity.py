@@ -10,6 +10,7 @@ from typing import Unpack
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks import interrupts
 from armblocks.argument_errors import ArgumentErrors
 from armblocks.diagram import Diagram
 from armblocks.diagram.mask_tuning import mask_parameters, with_mask_parameters
@@ -69,6 +70,7 @@ class SensitivityResult(metaclass=ArgumentErrors):
 
 
 @takes_settings
+@interrupts.kept()
 def sensitivity(
     diagram: Diagram | CompiledDiagram | str | PathLike[str],
     parameters: str | Sequence[str],

@@ -9,6 +9,7 @@ from typing import Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armblocks import interrupts
 from armblocks.analysis.trim import TrimProblem, TrimResult, trim_system
 from armblocks.diagram import Diagram
 from armblocks.equations import HybridSystem, Signature
@@ -24,6 +25,7 @@ Values = Mapping[str, ArrayLike]
 
 
 @takes_settings
+@interrupts.kept()
 def trim(
     diagram: Diagram | CompiledDiagram | str | PathLike[str],
     *,

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 from numpy.typing import ArrayLike
 
+from armblocks import interrupts
 from armblocks.equations import SimulationOptions
 from armblocks.integration.system import CompiledSystem
 from armblocks.simulation.plan import LogRequest
@@ -66,6 +67,7 @@ def run_to_the_end(run: Simulation, progress: Progress | None = None) -> Simulat
             if progress is not None and not run.finished:
                 _report_progress(progress, run)
     except KeyboardInterrupt:
+        interrupts.answered()
         run.stop(f"stopped by Ctrl-C at {run.time:g} s of {run.stop_time:g} s")
     result = run.result()
     if progress is not None and result.run.complete:
