@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from scipy.io import loadmat
 
 from armblocks.analysis.linear_system import LinearSystem
-from armblocks.analysis.reduction import staircase
 from armblocks.errors import InputError, UnknownNameError
 from unordered import matched
 
@@ -282,14 +281,6 @@ def test_uncontrollable_states_are_removed_from_the_minimal_system() -> None:
     assert reduced.order == 3
     assert matched(reduced.poles(), small.poles(), 1e-7)
     assert reduced.at(1.0 + 2.0j)[0, 0] == pytest.approx(small.at(1.0 + 2.0j)[0, 0], rel=1e-9)
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_a_staircase_basis_is_orthogonal_and_spans_the_controllable_subspace(seed: int) -> None:
-    system = random_system(seed, 6, 1, 1)
-    basis, dimension = staircase(system.A, system.B)
-    assert dimension == 6
-    assert np.allclose(basis.T @ basis, np.eye(6), atol=1e-13)
 
 
 def test_states_outside_the_path_are_removed_and_the_others_keep_their_names() -> None:

@@ -14,6 +14,13 @@ from armblocks.extras import from_extra
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+MAX_UNREFINED = 1e-5
+"""Eigenvalues of a smaller magnitude, in norms of the matrix, are refined."""
+MAX_REFINEMENTS = 8
+"""Maximum number of Newton steps for an eigenvalue."""
+CONVERGED = 1e-10
+"""Relative size of the last Newton step; the error is its square because of the quadratic convergence."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Mode:
@@ -36,13 +43,53 @@ def poles(system: StateSpaceModel) -> Complex:
     They are computed for each irreducible diagonal block of A. The eigenvalue of a state that is in no loop
     is then exact, and a fast part of a system does not reduce the accuracy of a slow part.
     """
-    with from_extra("analysis", "poles of a linear system"):
-        from scipy.linalg import eigvals
-
     if not system.order:
         return np.empty(0, dtype=np.complex128)
-    parts = [eigvals(system.A[np.ix_(part, part)]) for part in irreducible_parts(system.A)]
+    parts = [eigenvalues(system.A[np.ix_(part, part)]) for part in irreducible_parts(system.A)]
     return in_order(np.concatenate(parts), discrete=system.is_discrete)
+
+
+def eigenvalues(matrix: Array) -> Complex:
+    """The eigenvalues of a matrix; simple small ones are refined.
+
+    The error of the usual algorithm is proportional to the norm of the matrix, which can be much larger
+    than an eigenvalue. Such eigenvalues are improved by Newton's method with deflation of the others
+    (Aberth, Math. Comp. 27, 1973, 339-344) for ``det(s I - A)``, whose logarithmic derivative is the trace of
+    ``(s I - A)^-1``.
+    """
+    with from_extra("analysis", "poles and zeros of a linear system"):
+        from scipy.linalg import eigvals, matrix_balance
+
+    if matrix.shape[0] == 1:
+        return matrix[0].astype(np.complex128)
+    scaled: Array = matrix_balance(matrix, permute=False)[0]
+    roots: Complex = eigvals(scaled)
+    small = np.abs(roots) < MAX_UNREFINED * float(np.linalg.norm(scaled))
+    for k in np.flatnonzero(small & (roots.imag >= 0.0)).tolist():
+        refined = _refined(scaled, roots, k)
+        roots[roots == roots[k].conjugate()] = refined.conjugate()
+        roots[k] = refined
+    return roots
+
+
+def _refined(matrix: Array, roots: Complex, k: int) -> complex:
+    """An improved eigenvalue; the same one if Newton's method does not converge near it."""
+    start = root = complex(roots[k])
+    others = np.delete(roots, k)
+    gap = float(np.abs(others - root).min())
+    for _ in range(MAX_REFINEMENTS):
+        try:
+            inverse = np.linalg.inv(root * np.eye(matrix.shape[0]) - matrix)
+        except np.linalg.LinAlgError:
+            return root
+        with np.errstate(all="ignore"):
+            step = complex(1.0 / (np.trace(inverse) - np.sum(1.0 / (root - others))))
+        if not abs(step) <= gap / 4.0:
+            return start
+        root -= step
+        if abs(step) <= CONVERGED * abs(root):
+            return root if start.imag else complex(root.real, 0.0)
+    return start
 
 
 def irreducible_parts(A: Array) -> list[list[int]]:

@@ -7,59 +7,66 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.analysis.scaling import balanced
+from armblocks.analysis.elimination import SystemMatrix
+from armblocks.analysis.scaling import scaled
 from armblocks.analysis.state_space import SystemT
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 
-def staircase(A: Array, B: Array) -> tuple[Array, int]:
-    """An orthogonal basis (n, n) whose first ``k`` columns span the controllable subspace, and ``k``.
+def _controllable(matrix: SystemMatrix, states: Indices) -> Indices:
+    """Transform the states such that some of them are controllable and do not depend on the others.
 
-    The staircase algorithm (Van Dooren, IEEE Trans. Automatic Control 26, 1981, 111-129) determines
-    ranks of blocks, not of powers of A as the controllability matrix.
+    Returns the indices of the controllable states. The staircase algorithm (Van Dooren, IEEE Trans. Automatic
+    Control 26, 1981, 111-129) determines ranks of blocks, not of powers of A as the controllability matrix.
+    ``matrix`` is changed.
     """
-    n = A.shape[0]
-    basis = np.eye(n)
-    if not n or not B.size:
-        return basis, 0
-    scale = float(np.linalg.norm(A)) + float(np.linalg.norm(B))
-    tolerance = 10.0 * n * np.finfo(np.float64).eps * scale
-    dimension, block = 0, B
-    while True:
-        left, singular_values, _ = np.linalg.svd(block)
-        rank = int((singular_values > tolerance).sum())
-        if not rank:
-            return basis, dimension
-        basis[:, dimension:] = basis[:, dimension:] @ left
-        rotated = basis.T @ A @ basis
-        before, dimension = dimension, dimension + rank
-        if dimension == n:
-            return basis, n
-        block = rotated[dimension:, before:dimension]
+    rest = states
+    reached: list[int] = []
+    front: Indices = np.arange(matrix.order, matrix.values.shape[1], dtype=np.intp)
+    while rest.size and front.size:
+        next_front: list[int] = []
+        while (pivot := matrix.largest(rest, front)) is not None:
+            column = pivot[1]
+            matrix.concentrate(rest, column)
+            state = int(rest[np.argmax(np.abs(matrix.values[rest, column]))])
+            rest, front = rest[rest != state], front[front != column]
+            factors, variances = matrix.ratios((rest, column), (state, column))
+            # The new states are x_k - factor_k x_state, so that x_state alone depends on this column.
+            matrix.subtract_row(state, rest, factors, variances)
+            matrix.values[rest, column] = matrix.variances[rest, column] = 0.0
+            matrix.add_columns(rest, state, factors, variances)
+            next_front.append(state)
+        reached += next_front
+        front = np.array(next_front, dtype=np.intp)
+    return np.array(sorted(reached), dtype=np.intp)
 
 
 def reachable_dimensions(A: Array, B: Array) -> int:
     """Dimension of the controllable subspace; with ``A.T`` and ``C.T``, of the observable subspace."""
-    a, b, _ = balanced(A, B, np.zeros((0, A.shape[0])))
-    return staircase(a, b)[1]
+    n = A.shape[0]
+    matrix = SystemMatrix(scaled(A, B, np.zeros((0, n)), np.zeros((0, B.shape[1]))))
+    return _controllable(matrix, np.arange(n, dtype=np.intp)).size
 
 
 def minimal(system: SystemT) -> SystemT:
     """The system without uncontrollable and unobservable states; the same object if there are none."""
-    a, b, c = balanced(system.A, system.B, system.C)
-    basis, controllable = staircase(a, b)
-    basis = basis[:, :controllable]
-    a, b, c = basis.T @ a @ basis, basis.T @ b, c @ basis
-    basis, observable = staircase(a.T, c.T)
-    if observable == system.order:
+    on_paths = on_path(system)
+    n = on_paths.order
+    parts = scaled(on_paths.A, on_paths.B, on_paths.C, on_paths.D)
+    matrix = SystemMatrix(parts)
+    kept = _controllable(matrix, np.arange(n, dtype=np.intp))
+    kept = _controllable(matrix.transposed(), kept)
+    if kept.size == system.order:
         return system
-    basis = basis[:, :observable]
+    if kept.size == n:
+        return dataclasses.replace(on_paths, states=(), state_units=())
     return dataclasses.replace(
         system,
-        A=basis.T @ a @ basis,
-        B=basis.T @ b,
-        C=c @ basis,
+        A=matrix.values[np.ix_(kept, kept)],
+        B=matrix.values[kept, n:] / parts.inputs,
+        C=matrix.values[n:, kept] / parts.outputs[:, None],
         states=(),
         state_units=(),
     )

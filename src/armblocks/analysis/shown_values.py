@@ -23,11 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.analysis.frequency import dcgain
-from armblocks.analysis.modes import Mode, in_order, irreducible_parts, mode_of
+from armblocks.analysis.modes import Mode, eigenvalues, in_order, irreducible_parts, mode_of
 from armblocks.analysis.reduction import minimal
-from armblocks.analysis.scaling import balanced
+from armblocks.analysis.scaling import balanced, scaled
 from armblocks.analysis.state_space import StateSpaceModel
-from armblocks.analysis.zeros import zero_pencil, zeros
+from armblocks.analysis.zeros import zero_pencils
 from armblocks.extras import from_extra
 
 Array = NDArray[np.float64]
@@ -86,9 +86,6 @@ def _candidates(root: complex, discrete: bool) -> tuple[complex, ...]:
 
 def shown_poles(system: StateSpaceModel) -> Complex:
     """:meth:`LinearSystem.poles` (nx,), without rounding errors about 0, 1, the axes and the unit circle."""
-    with from_extra("analysis", "poles of a linear system"):
-        from scipy.linalg import eigvals
-
     roots_shown: list[complex] = []
     for part in irreducible_parts(system.A):
         block = system.A[np.ix_(part, part)]
@@ -99,19 +96,20 @@ def shown_poles(system: StateSpaceModel) -> Complex:
         matrix, _, _ = balanced(block, no_ports.T, no_ports)
         norm = float(np.linalg.norm(matrix))
         pencil = _Pencil(matrix, np.eye(len(part)), ROUNDOFFS * len(part) * EPSILON * norm)
-        roots = eigvals(block).tolist()
+        roots = eigenvalues(block).tolist()
         roots_shown += [pencil.shown(root, _candidates(root, system.is_discrete)) for root in roots]
     return in_order(np.array(roots_shown, dtype=np.complex128), discrete=system.is_discrete)
 
 
 def shown_zeros(system: StateSpaceModel) -> Complex:
     """:meth:`LinearSystem.zeros`, without rounding errors about 0, 1, the axes and the unit circle."""
-    matrices = zero_pencil(system.A, system.B, system.C, system.D)
-    if matrices is None:
-        return np.empty(0, dtype=np.complex128)
-    pencil = _Pencil(*matrices)
-    roots = zeros(system).tolist()
-    return in_order(np.array([pencil.shown(root, _candidates(root, system.is_discrete)) for root in roots]))
+    roots: list[complex] = []
+    for matrices in zero_pencils(system):
+        pencil = _Pencil(matrices.M, matrices.N, matrices.tolerance)
+        roots += [
+            pencil.shown(root, _candidates(root, system.is_discrete)) for root in matrices.roots().tolist()
+        ]
+    return in_order(np.array(roots, dtype=np.complex128))
 
 
 def shown_modes(system: StateSpaceModel) -> tuple[Mode, ...]:
@@ -189,17 +187,10 @@ def shown_matrices(system: StateSpaceModel) -> tuple[Array, Array, Array, Array]
     therefore not depend on the units of the system.
     """
     n = system.order
-    a, b, c, d = system.A, system.B, system.C, system.D
-    for _ in range(2):
-        a, b, c = balanced(a, b, c)
-        size = float(np.linalg.norm(a)) or 1.0
-        lengths, heights = np.linalg.norm(b, axis=0), np.linalg.norm(c, axis=1, keepdims=True)
-        columns = size / np.where(lengths > 0.0, lengths, size)
-        rows = size / np.where(heights > 0.0, heights, size)
-        b, c, d = b * columns, c * rows, d * columns * rows / size
-    scaled = np.block([[a, b], [c, d]])
-    rows = np.linalg.norm(scaled, axis=1, keepdims=True)
-    columns = np.linalg.norm(scaled, axis=0, keepdims=True)
+    parts = scaled(system.A, system.B, system.C, system.D)
+    matrix = np.block([[parts.A, parts.B], [parts.C, parts.D]])
+    rows = np.linalg.norm(matrix, axis=1, keepdims=True)
+    columns = np.linalg.norm(matrix, axis=0, keepdims=True)
     unscaled = np.block([[system.A, system.B], [system.C, system.D]])
-    shown = np.where(np.abs(scaled) <= EPSILON * np.minimum(rows, columns), 0.0, unscaled)
+    shown = np.where(np.abs(matrix) <= EPSILON * np.minimum(rows, columns), 0.0, unscaled)
     return shown[:n, :n], shown[:n, n:], shown[n:, :n], shown[n:, n:]

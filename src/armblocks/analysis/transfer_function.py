@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.analysis.frequency import evaluate
 from armblocks.analysis.modes import poles
 from armblocks.analysis.reduction import minimal
+from armblocks.analysis.shown_values import shown_poles, shown_zeros
 from armblocks.analysis.state_space import StateSpaceModel
-from armblocks.analysis.zeros import zeros
+from armblocks.analysis.zeros import zeros_and_gain
 from armblocks.errors import InputError, counted
 
 Array = NDArray[np.float64]
@@ -30,6 +29,7 @@ class TransferFunction:
     poles: Complex
     gain: float
     dt: float = 0.0
+    _system: StateSpaceModel | None = None
 
     @property
     def numerator(self) -> Array:
@@ -47,8 +47,9 @@ class TransferFunction:
 
     def __repr__(self) -> str:
         letter = "z" if self.dt else "s"
-        numerator_text = polynomial(self.numerator, letter, self.zeros)
-        denominator_text = polynomial(self.denominator, letter, self.poles)
+        system = self._system
+        numerator_text = polynomial(shown_zeros(system) if system else self.zeros, letter, self.gain)
+        denominator_text = polynomial(shown_poles(system) if system else self.poles, letter)
         width = max(len(numerator_text), len(denominator_text))
         lines = (numerator_text.center(width).rstrip(), "-" * width, denominator_text.center(width).rstrip())
         return "\n".join(lines)
@@ -68,19 +69,8 @@ def transfer_function(system: StateSpaceModel) -> TransferFunction:
             fix="choose with system.select(output, input)",
         )
     reduced = minimal(system)
-    found_zeros, found_poles = zeros(reduced), poles(reduced)
-    # The gain is computed from the value at a point far from all roots, where no factor is small.
-    point = (
-        2.0 * max(1e-300, float(np.abs(np.concatenate([found_zeros, found_poles])).max(initial=0.0))) or 1.0
-    )
-    point = point if len(found_zeros) + len(found_poles) else 1.0
-    value = complex(evaluate(reduced, np.array([point], dtype=np.complex128))[0, 0, 0])
-    # The factors are divided in pairs, so that no intermediate result overflows.
-    gain = value
-    for k in range(max(len(found_zeros), len(found_poles))):
-        gain *= (point - found_poles[k]) if k < len(found_poles) else 1.0
-        gain /= (point - found_zeros[k]) if k < len(found_zeros) else 1.0
-    return TransferFunction(zeros=found_zeros, poles=found_poles, gain=float(np.real(gain)), dt=system.dt)
+    found_zeros, gain = zeros_and_gain(reduced)
+    return TransferFunction(zeros=found_zeros, poles=poles(reduced), gain=gain, dt=system.dt, _system=reduced)
 
 
 def _multiplied_out(roots: Complex) -> Array:
@@ -88,20 +78,20 @@ def _multiplied_out(roots: Complex) -> Array:
     return np.atleast_1d(np.poly(roots)).real.astype(np.float64)
 
 
-def polynomial(coefficients: Array, letter: str, roots: Complex) -> str:
-    """A polynomial as text with six digits, such as ``3 s^2 + s - 2``.
+def polynomial(roots: Complex, letter: str, factor: float = 1.0) -> str:
+    """The polynomial ``factor prod(s - roots)`` as text with six digits, such as ``3 s^2 + s - 2``.
 
     Coefficients that are only rounding errors of the roots are omitted. The k-th coefficient is the
-    sum of all products of k roots. If ``r`` is the largest magnitude of a root
-    and each root has an error of at most ``e r``, the coefficient changes by at most ``e k r^k`` times the
-    number of products.
+    sum of all products of k roots. If each root has a relative error of at most ``e``, the coefficient
+    changes by at most ``e k`` times the sum of the magnitudes of these products, which is the coefficient of
+    the polynomial whose roots are the negative magnitudes.
     """
-    largest = float(np.abs(roots).max(initial=0.0))
+    coefficients = _multiplied_out(roots)
+    magnitudes = _multiplied_out(-np.abs(roots).astype(np.complex128))
     parts: list[str] = []
-    for k, value in enumerate(coefficients.tolist()):
+    for k, value in enumerate((factor * coefficients).tolist()):
         power = len(coefficients) - 1 - k
-        rounding = 4e-15 * k * math.comb(len(coefficients) - 1, k) * largest**k
-        if abs(value) <= rounding * abs(float(coefficients[0])):
+        if abs(coefficients[k]) <= 4e-15 * k * magnitudes[k] or value == 0.0:
             continue
         number = f"{abs(value):.6g}"
         unit = "" if power == 0 else letter if power == 1 else f"{letter}^{power}"
