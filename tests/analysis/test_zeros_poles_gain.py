@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 
 import numpy as np
@@ -212,3 +213,36 @@ def test_small_coefficients_are_kept(
     assert (text[0].strip(), text[2].strip()) == (above, below)
     if D:
         assert repr(system).split("  D\n")[1].split("\n")[1].split() == ["y1", f"{D:g}"]
+
+
+@pytest.mark.parametrize("fast", [1.0, 1e2, 1e6, 1e8])
+def test_bandwidth_and_step_response_follow_the_slow_pole(fast: float) -> None:
+    slow = 1e-6
+    system = LinearSystem([[-fast, 1.0], [0.0, -slow]], [[0.0], [slow]], [[fast, 0.0]], [[0.0]])
+    assert system.bandwidth() == pytest.approx(slow * math.sqrt(10.0**0.3 - 1.0), rel=1e-9)
+    measures = system.step_response().measures()
+    assert measures.rise_time == pytest.approx(math.log(9.0) / slow, rel=1e-3)
+    assert measures.settling_time == pytest.approx(math.log(50.0) / slow, rel=1e-3)
+
+
+@pytest.mark.parametrize("time", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("gain", [1e-6, 1e-2, 1.0, 10.0, 1e5])
+@pytest.mark.parametrize("fast", [1e2, 1e7])
+def test_margins_agree_with_their_definition_for_any_gain(fast: float, gain: float, time: float) -> None:
+    """L = gain / (s (s + 1) (s / fast + 1)) reaches -180 degrees at sqrt(fast)."""
+    A = np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, -fast]])
+    loop = LinearSystem(time * A, [[0.0], [0.0], [time * gain * fast]], [[1.0, 0.0, 0.0]], [[0.0]])
+    margins = loop.margins()
+    assert margins.gain == pytest.approx((1.0 + fast) / gain, rel=1e-8)
+    w = margins.phase_frequency / time
+    assert abs(gain / (1j * w * (1j * w + 1.0) * (1j * w / fast + 1.0))) == pytest.approx(1.0, rel=1e-9)
+    assert margins.phase == pytest.approx(90.0 - math.degrees(math.atan(w) + math.atan(w / fast)), abs=1e-6)
+
+
+@pytest.mark.parametrize("dt", [0.1, 1e-3, 1e-8])
+def test_margins_of_a_sampled_integrator_agree_with_closed_forms(dt: float) -> None:
+    margins = LinearSystem([[1.0]], [[10.0 * dt]], [[1.0]], [[0.0]], dt=dt).margins()
+    w = 2.0 / dt * math.asin(5.0 * dt)
+    assert margins.phase_frequency == pytest.approx(w, rel=1e-6)
+    assert margins.phase == pytest.approx(90.0 - math.degrees(w * dt / 2.0), abs=1e-5)
+    assert margins.gain == pytest.approx(0.2 / dt, rel=1e-9)

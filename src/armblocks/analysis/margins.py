@@ -12,14 +12,21 @@ from numpy.typing import NDArray
 
 from armblocks.analysis.connections import feedback
 from armblocks.analysis.frequency import (
+    as_continuous,
     boundary_points,
     evaluate,
     frequency_grid,
-    frequency_range,
     frequency_response,
 )
 from armblocks.analysis.reduction import minimal
-from armblocks.analysis.shown_values import EPSILON, is_stable, response_errors, shown_dcgain
+from armblocks.analysis.shown_values import (
+    EPSILON,
+    is_stable,
+    response_errors,
+    shown_dcgain,
+    shown_poles,
+    shown_zeros,
+)
 from armblocks.analysis.state_space import StateSpaceModel
 from armblocks.errors import InputError, counted
 
@@ -95,9 +102,7 @@ def margins(system: StateSpaceModel) -> Margins:
             fix="choose with system.select(output, input)",
         )
     loop = minimal(system)
-    low, high = frequency_range(loop)
-    top = high if loop.is_discrete else 1e3 * high
-    grid = frequency_grid(loop, 1e-3 * low, top, 2000)
+    grid = _search_grid(loop, 1.0)
     response = frequency_response(loop, grid)[:, 0, 0]
     phase_crossings: list[tuple[float, float]] = []
     gain_crossings: list[tuple[float, float]] = []
@@ -124,6 +129,31 @@ def margins(system: StateSpaceModel) -> Margins:
         if math.isfinite(value.real) and value.real < 0.0:
             gain_crossings.append((frequency, -1.0 / value.real))
     return _collected_margins(loop, grid, response, gain_crossings, phase_crossings)
+
+
+def _search_grid(system: StateSpaceModel, level: float) -> Array:
+    """Frequencies (rad/s) between which the gain crosses ``level`` and the phase crosses -180 degrees.
+
+    They contain all corner frequencies that are not 0 and the frequencies at which the asymptotes below and
+    above the corners have this gain. ``system`` is minimal and has one input and one output.
+    """
+    poles, zeros = (as_continuous(system, roots(system)) for roots in (shown_poles, shown_zeros))
+    corners = np.abs(np.concatenate([poles, zeros]))
+    corners = corners[corners > 0.0]
+    nyquist = math.pi / system.dt if system.is_discrete else math.inf
+    middle = min(1.0, nyquist / 10.0)
+    low = 1e-4 * float(corners.min(initial=middle))
+    high = 1e4 * float(corners.max(initial=middle))
+    slopes = [(low, int((zeros == 0.0).sum()) - int((poles == 0.0).sum()))]
+    slopes += [(high, len(zeros) - len(poles))] * (not system.is_discrete)
+    for frequency, slope in slopes:
+        gain = abs(_response_at(system, min(frequency, nyquist)))
+        if slope and gain > 0.0 and math.isfinite(gain):
+            decades = math.log10(level / gain) / slope
+            crossing = frequency * 10.0 ** min(max(decades, -60.0), 60.0)
+            low, high = min(low, crossing / 10.0), max(high, crossing * 10.0)
+    high = min(high, nyquist)
+    return frequency_grid(system, low, high, max(2000, int(150.0 * math.log10(high / low))))
 
 
 def _collected_margins(
@@ -190,8 +220,7 @@ def bandwidth(system: StateSpaceModel, drop: float) -> float:
             fix="compute the bandwidth of the closed loop",
         )
     level = steady_state_gain * 10.0 ** (-drop / 20.0)
-    low, high = frequency_range(system)
-    grid = frequency_grid(system, 1e-3 * low, high if system.is_discrete else 1e3 * high, 2000)
+    grid = _search_grid(minimal(system), level)
     below = np.abs(frequency_response(system, grid)[:, 0, 0]) < level
     if not below.any():
         return math.inf

@@ -10,9 +10,8 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armblocks.analysis.modes import poles
 from armblocks.analysis.reduction import minimal
-from armblocks.analysis.shown_values import EPSILON, ROUNDOFFS, is_stable, shown_dcgain
+from armblocks.analysis.shown_values import EPSILON, ROUNDOFFS, is_stable, shown_dcgain, shown_poles
 from armblocks.analysis.state_space import StateSpaceModel, SystemT
 from armblocks.errors import InputError
 from armblocks.extras import from_extra
@@ -69,12 +68,12 @@ def natural_times(system: StateSpaceModel) -> tuple[float, float]:
     The duration is the time in which the slowest mode decays or visibly grows.
     """
     reduced = minimal(system)
-    roots = poles(reduced)
+    roots = shown_poles(reduced)
     if reduced.is_discrete:
         roots = np.log(roots[np.abs(roots) > 1e-6]) / reduced.dt
     magnitudes = np.abs(roots)
     largest = float(magnitudes.max(initial=0.0))
-    moving = roots[magnitudes > 1e-9 * largest] if largest > 0.0 else roots[:0]
+    moving = roots[magnitudes > 0.0]
     if not moving.size:
         return (100.0 * system.dt if system.is_discrete else 1.0), 1.0
     fastest = 1.0 / largest
