@@ -116,8 +116,9 @@ def margins(system: StateSpaceModel) -> Margins:
     above = np.abs(response) > 1.0
     for k in np.flatnonzero(above[1:] != above[:-1]).tolist():
         frequency = _bisected(gain_excess, float(grid[k]), float(grid[k + 1]))
-        angle = math.degrees(math.atan2(*(lambda v: (v.imag, v.real))(-_response_at(loop, frequency))))
-        phase_crossings.append((frequency, angle))
+        value = -_response_at(loop, frequency)
+        angle = math.degrees(math.atan2(value.imag, value.real))
+        phase_crossings.append((frequency, angle + 0.0))  # 0 instead of -0
     upper = response.imag > 0.0
     for k in np.flatnonzero((upper[1:] != upper[:-1]) & (response.real[1:] < 0.0)).tolist():
         frequency = _bisected(imaginary_part, float(grid[k]), float(grid[k + 1]))
