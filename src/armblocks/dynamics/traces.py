@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-from casadi import SX, jacobian, mtimes, vertcat
+from casadi import SX, jacobian, mtimes, substitute, vertcat
 
 from armblocks.dynamics.actuation import motor_forces, of_motors
 from armblocks.dynamics.ball_joints import (
@@ -228,14 +228,16 @@ def trace_coriolis(robot: Robot) -> TracedFunction:
     def equations(q: SX, qd: SX) -> SX:
         zero_gravity = (0.0, 0.0, 0.0)
         no_acceleration = [0.0] * tree.n
-        joints, rates = joint_motions(tree, q), entries(qd)
-        c = _sum(rnea(tree, joints, rates, no_acceleration, zero_gravity))
+        # The speeds of the tree are expressions if couplings determine them, and symbols otherwise.
+        speeds = SX.sym("speeds", tree.n) if robot.couplings else qd
+        joints, rates = joint_motions(tree, q), entries(speeds)
+        twice = jacobian(_sum(rnea(tree, joints, rates, no_acceleration, zero_gravity)), speeds)
         W = structure_matrix(tree, rates)
-        if W is None:
-            return 0.5 * jacobian(c, qd)
-        M = crba(tree, joints)
-        ordered = _matrix([[M[i][j] for j in body_of_speed] for i in body_of_speed])
-        return 0.5 * (jacobian(c, qd) + mtimes(ordered, W))
+        if W is not None:
+            M = crba(tree, joints)
+            twice = twice + mtimes(_matrix([[M[i][j] for j in body_of_speed] for i in body_of_speed]), W)
+        C = SX(0.5 * twice)
+        return SX(substitute(C, speeds, qd)) if robot.couplings else C
 
     return _trace("coriolis", robot, ("q", "qd"), ("C", (robot.n, robot.n), "N m s"), equations)
 
