@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armblocks.errors import warn
+from armblocks.robot.coupled_limits import common_range
+from armblocks.robot.joints import JointLimits
 from armblocks.robot.link import Link
 from armblocks.robot.robot import Robot
 
@@ -44,7 +46,8 @@ def plausibility_findings(robot: Robot) -> tuple[PlausibilityFinding, ...]:
     """Values that probably have a wrong unit or sign; they are warnings, not errors.
 
     Findings are: limits of revolute joints beyond a full turn (degrees?), a reach beyond 20 m and inertias
-    that are far too large for the robot's size (millimetres?), gravity that points upwards.
+    that are far too large for the robot's size (millimetres?), gravity that points upwards, limits of coupled
+    joints that :attr:`Robot.limits` cannot include.
     """
     return tuple(_findings(robot))
 
@@ -78,6 +81,7 @@ def _findings(robot: Robot) -> Iterator[PlausibilityFinding]:
                     what=f"the joint turns from {low:g} to {high:g} rad, more than a full turn",
                     question="Is this in degrees? It is used as given.",
                 )
+    yield from _limits_left_out(robot)
     reach = max(_reaches(robot).values())
     if reach > MAX_REACH:
         yield PlausibilityFinding(
@@ -102,6 +106,34 @@ def _findings(robot: Robot) -> Iterator[PlausibilityFinding]:
             question="Does it have the sign of the Robotics Toolbox? Here gravity is the acceleration of a "
             "falling body, [0, 0, -9.81].",
         )
+
+
+def _limits_left_out(robot: Robot) -> Iterator[PlausibilityFinding]:
+    """Limits of joints that couplings determine and that are no limits of one coordinate."""
+    names = [entry.name for entry in robot.speeds]
+    for joint in robot.coupled_joints:
+        if joint.limits == JointLimits(torque=joint.limits.torque):
+            continue
+        if len(joint.factors) > 1:
+            yield PlausibilityFinding(
+                robot=robot.name,
+                link=joint.link.name,
+                what="the limits of the joint are not checked, because it depends on several coordinates: "
+                + ", ".join(names[k] for k in joint.factors),
+                question="Do their limits keep it in its range?",
+            )
+        elif joint.factors and joint.limits.position is not None:
+            (k,) = joint.factors
+            if common_range(robot.limits[k].position, joint) is not None:
+                continue
+            low, high = joint.limits.position
+            yield PlausibilityFinding(
+                robot=robot.name,
+                link=joint.link.name,
+                what=f"its range from {low:g} to {high:g} has no common value with the range of joint "
+                f"'{names[k]}', on which it depends",
+                question="Is a sign of the coupling or of the range wrong? The range is not checked.",
+            )
 
 
 def _reaches(robot: Robot) -> dict[str | None, float]:

@@ -15,6 +15,7 @@ from armblocks.robot.checks import check_robot
 from armblocks.robot.constraint_checks import check_constraints
 from armblocks.robot.constraints import Closure, Constraint, Coupling
 from armblocks.robot.coordinate_map import CoordinateMap, coordinate_map, dependent_joints
+from armblocks.robot.coupled_limits import DependentJoint, dependent_joints_of, limits_with_couplings
 from armblocks.robot.fields import pose
 from armblocks.robot.friction_model import FrictionModel
 from armblocks.robot.joints import Coordinate, Joint, JointLimits
@@ -176,14 +177,26 @@ class Robot(metaclass=ArgumentErrors):
                 position += len(motion.positions)
         return tuple(indices)
 
-    @property
+    @cached_property
     def limits(self) -> tuple[JointLimits, ...]:
-        """The limits of each entry of qd."""
-        return tuple(limits for joint in self.joints for limits in joint.coordinate_limits)
+        """The limits of each entry of qd, with those of joints that a coupling makes depend on it alone.
+
+        Limits of joints that depend on several entries are not included; a finding of
+        :func:`armblocks.robot.plausibility_findings` names these joints. A torque limit is that of the
+        entry's own joint; if this has neither motor nor torque limit, that of the only dependent joint with
+        a motor, at the entry of qd.
+        """
+        own = tuple(limits for joint in self.joints for limits in joint.coordinate_limits)
+        return limits_with_couplings(own, self.motors, self.coupled_joints) if self.couplings else own
+
+    @property
+    def coupled_joints(self) -> tuple[DependentJoint, ...]:
+        """The joints that couplings determine, as functions of the coordinates."""
+        return tuple(dependent_joints_of(self.tree_links, self.coordinate_map)) if self.couplings else ()
 
     @property
     def motors(self) -> tuple[Motor | None, ...]:
-        """The motor of each entry of qd."""
+        """The motor of each entry of qd, at its own joint; motors of dependent joints are not included."""
         return tuple(link.motor for link in self.moving_links for _ in link.joint.speeds)
 
     @property
@@ -196,10 +209,13 @@ class Robot(metaclass=ArgumentErrors):
 
     @property
     def qlim(self) -> NDArray[np.float64]:
-        """Lowest and highest coordinates, a new (nq, 2) array, rad or m; infinite without a limit."""
+        """Lowest and highest coordinates, a new (nq, 2) array, rad or m; infinite without a limit.
+
+        Limits of joints that couplings make depend on a coordinate are included; see :attr:`limits`.
+        """
         rows: list[tuple[float, float]] = []
+        limits = iter(self.limits)
         for joint in self.joints:
-            limits = iter(joint.coordinate_limits)
             for motion in joint.motions:
                 positions = [next(limits).position for _ in motion.speeds]
                 # A quaternion has more coordinates than speeds, and no limits.
@@ -209,17 +225,17 @@ class Robot(metaclass=ArgumentErrors):
 
     @property
     def speed_limits(self) -> NDArray[np.float64]:
-        """Maximum joint speeds, a new (nv,) array, rad/s or m/s; infinite without a limit."""
+        """Maximum joint speeds, a new (nv,) array, rad/s or m/s; infinite if unknown; see :attr:`limits`."""
         return _or_infinite([limits.speed for limits in self.limits])
 
     @property
     def torque_limits(self) -> NDArray[np.float64]:
-        """Maximum joint torques, a new (nv,) array, N m or N; infinite without a limit."""
+        """Maximum joint torques, a new (nv,) array, N m or N; infinite if unknown; see :attr:`limits`."""
         return _or_infinite([limits.torque for limits in self.limits])
 
     @property
     def gear_ratios(self) -> NDArray[np.float64]:
-        """G of each entry of qd, a new (nv,) array; 1 without a motor."""
+        """G of each entry of qd, a new (nv,) array; 1 without a motor at its own joint."""
         return np.array([motor.gear_ratio if motor else 1.0 for motor in self.motors])
 
     def link(self, name: str) -> Link:

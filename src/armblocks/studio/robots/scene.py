@@ -21,6 +21,7 @@ def scene_of(robot: Robot) -> RobotScene:
     rows: dict[str | None, int] = {link.name: row for row, link in enumerate(robot.links, start=1)}
     rows[None] = 0
     radii = drum_radii(robot)
+    ranges = {entry.name: limits.position for entry, limits in zip(robot.speeds, robot.limits)}
     bodies = robot_bodies(robot)
     lowest_points = [float(body.mesh.corners[..., 2].min()) for body in bodies if body.row == 0]
     return RobotScene(
@@ -42,7 +43,7 @@ def scene_of(robot: Robot) -> RobotScene:
                 name=link.name,
                 row=rows[link.name],
                 turns=link.joint.rotates,
-                limits=link.joint.coordinate_limits[0].position,
+                limits=ranges[link.name],
                 carrier=rows[link.parent],
                 frame=(link.before @ _z_along_axis(link)).matrix.ravel().tolist(),
                 moving=(link.after.inverse() @ _z_along_axis(link)).matrix.ravel().tolist(),
