@@ -183,12 +183,13 @@ def trace_joint_wrenches_loaded(robot: Robot, near: Array | None = None) -> Trac
 def _joint_wrenches(robot: Robot, inputs: Sequence[str], near: Array | None) -> TracedFunction:
     tree, coordinates = KinematicTree.of(robot), robot.coordinate_map
     without_loops = replace(robot, constraints=robot.couplings)
-    free_torques = (trace_rne if len(inputs) == 3 else trace_rne_loaded)(without_loops).casadi_function()
+    trace_of_tree = trace_rne if len(inputs) == 3 else trace_rne_loaded
 
     def equations(q: SX, qd: SX, qdd: SX, *loads: SX) -> SX:
         multipliers: list[SX] = []
         validity = SX(0.0)
         if robot.closures:
+            free_torques = trace_of_tree(without_loops).casadi_function()
             (free,) = free_torques.call([q, qd, qdd, *loads], True, False)
             _, multipliers, validity = motor_forces(robot, q, free, qd, qdd, near)
         motion = [entries(tree_speeds(coordinates, value)) for value in (qd, qdd)]
