@@ -49,6 +49,13 @@ EQUALITIES = {
     "connect by sites": "<connect site1='as' site2='bs'/>",
     "weld by bodies": "<weld body1='ab' body2='bb'/>",
     "weld with a pose": "<weld body1='ac' body2='bc' relpose='0.4 0.05 0.1 1 0.1 0.1 0.2'/>",
+    "weld with a pose and an anchor": (
+        "<weld body1='ac' body2='bc' relpose='0.4 0.05 0.1 1 0.1 0.1 0.2' anchor='0.1 0.05 0.1'/>"
+    ),
+    "weld with an anchor": "<weld body1='ab' body2='bb' anchor='0.1 0.2 0.4'/>",
+    "weld without moments": (
+        "<weld body1='ab' body2='bb' relpose='0.4 0 0 1 0 0 0' anchor='0 0 0.1' torquescale='0'/>"
+    ),
     "weld by sites": "<weld site1='as' site2='bs'/>",
     "joint": "<joint joint1='a1' joint2='b1' polycoef='0.1 -2 0 0 0'/>",
     "fixed joint": "<joint joint1='b2' polycoef='0.2 0 0 0 0'/>",

@@ -103,8 +103,12 @@ def _coupling(element: Element, parts: Parts) -> Coupling | str:
 
 
 def _closure(element: Element, parts: Parts, poses: Mapping[str | None, Transform]) -> Closure | str:
-    """A weld, or the coincidence of two points."""
-    kind = WeldClosure if element.tag == "weld" else SphericalClosure
+    """A weld, or the coincidence of two points: also of a weld whose ``torquescale`` is 0.
+
+    A weld holds ``p1 + R1 relpos = p2 + R2 anchor`` and ``R1 relrot = R2``.
+    """
+    is_rigid = element.tag == "weld" and element.number("torquescale", 1.0) != 0.0
+    kind = WeldClosure if is_rigid else SphericalClosure
     sites = [element.attributes.get(key, "").strip() for key in ("site1", "site2")]
     bodies = [element.attributes.get(key, "").strip() for key in ("body1", "body2")]
     name = element.attributes.get("name", "").strip()
@@ -120,13 +124,13 @@ def _closure(element: Element, parts: Parts, poses: Mapping[str | None, Transfor
         if any(link not in poses for link in links):
             return "a body does not exist"
         between = poses[links[0]].inverse() @ poses[links[1]]  # pose of the second body in the first one
+        anchor = transl(*element.vector("anchor", (0.0, 0.0, 0.0)))
         if element.tag == "weld":
             ends = [
-                Attachment(link=links[0], pose=_given_pose(element) or between),
-                Attachment(link=links[1]),
+                Attachment(link=links[0], pose=_given_pose(element) or between @ anchor),
+                Attachment(link=links[1], pose=anchor),
             ]
         else:
-            anchor = transl(*element.vector("anchor", (0.0, 0.0, 0.0)))
             ends = [
                 Attachment(link=links[0], pose=anchor),
                 Attachment(link=links[1], pose=between.inverse() @ anchor),
