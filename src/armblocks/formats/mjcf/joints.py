@@ -92,6 +92,8 @@ def _motor_of(element: Element, context: FileContext) -> Motor | None:
     """The motor with the armature as rotor inertia, and with the friction of the joint."""
     damping, friction = _first(element, "damping"), element.number("frictionloss", 0.0)
     armature = element.number("armature", 0.0)
+    if "damping" in element.attributes and any(element.numbers("damping", range(1, 9))[1:]):
+        note(context, FRICTION, element, "damping of higher degree than the speed itself is left out")
     if min(damping, friction, armature) < 0.0:
         text = f"damping {damping:g}, frictionloss {friction:g}, armature {armature:g}"
         what = f"{text}: negative values are left out"

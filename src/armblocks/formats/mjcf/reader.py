@@ -309,6 +309,9 @@ class _Model:
             element = self.defaults.applied(tendon)
             if any(element.number(name, 0.0) for name in ("stiffness", "damping", "frictionloss")):
                 note(self.context, TENDON, tendon, "the forces of the tendon are left out")
+        for body in _bodies(self.root):
+            if body.number("gravcomp", 0.0):
+                note(self.context, STIFFNESS, body, "the gravity compensation of the body is left out")
         for option in self.root.all("option"):
             if option.number("density", 0.0) or option.number("viscosity", 0.0):
                 note(self.context, STIFFNESS, option, "the forces of the surrounding medium are left out")

@@ -26,7 +26,7 @@ LIMIT = Rule(
 )
 FRICTION = Rule(
     code="mjcf-friction",
-    allowed="damping, frictionloss and armature of zero or more",
+    allowed="damping proportional to the speed, frictionloss and armature, all of zero or more",
     remedy="correct the number",
 )
 INERTIA = Rule(
