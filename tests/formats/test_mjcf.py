@@ -230,6 +230,7 @@ def test_actuators_give_the_torque_limits_of_their_joints() -> None:
         (body("<joint/><geom type='sdf' mass='0'/>"), "mjcf-shape"),
         (body(HINGE + "<replicate count='3'><geom size='1'/></replicate>"), "mjcf-not-read"),
         (body(HINGE, "<option density='1.2'/>"), "mjcf-stiffness"),
+        (body(HINGE, "<option><flag equality='disable' limit='enable'/></option>"), "mjcf-not-read"),
         (body("<joint damping='3 1 2'/><geom size='0.1'/>"), "mjcf-friction"),
         (body(HINGE + "<body gravcomp='1'><geom size='0.1'/></body>"), "mjcf-stiffness"),
     ],

@@ -45,6 +45,8 @@ from armblocks.robot.shapes import Material, Shape
 from armblocks.spatial import Transform, transl
 
 _NOT_READ = ("replicate", "attach", "composite", "flexcomp", "plugin")
+_FLAGS = ("constraint", "equality", "frictionloss", "limit", "damper")
+"""Flags that switch off parts of a model that a robot has nevertheless."""
 MAX_NAME = 200
 """Maximum number of characters of the name of a link."""
 
@@ -313,6 +315,11 @@ class _Model:
             if body.number("gravcomp", 0.0):
                 note(self.context, STIFFNESS, body, "the gravity compensation of the body is left out")
         for option in self.root.all("option"):
+            for flag in option.all("flag"):
+                off = [name for name in _FLAGS if flag.attributes.get(name, "").strip() == "disable"]
+                if off:
+                    what = f"the disabling of {', '.join(off)} is not read"
+                    note(self.context, UNREAD, flag, what)
             if option.number("density", 0.0) or option.number("viscosity", 0.0):
                 note(self.context, STIFFNESS, option, "the forces of the surrounding medium are left out")
 

@@ -46,8 +46,8 @@ SHAPE = Rule(
 )
 UNREAD = Rule(
     code="mjcf-not-read",
-    allowed="a tree of bodies",
-    remedy="describe the part by bodies",
+    allowed="a tree of bodies, with all constraints and friction enabled",
+    remedy="describe the part by bodies, or remove it where it is disabled",
 )
 NAME = Rule(
     code="mjcf-name",
