@@ -21,7 +21,7 @@ from armblocks.formats.robot_json import read_robot, robot_to_json, write_robot
 from armblocks.formats.sdf.reader import read_sdf
 from armblocks.formats.sdf.writer import write_sdf
 from armblocks.formats.urdf.writer import write_urdf
-from armblocks.robot import DhConvention, NamedFrame
+from armblocks.robot import DhConvention, Link, NamedFrame
 from armblocks.robot.dh_conversion import converted
 from armblocks.spatial import Transform, rotation_about, transl
 
@@ -154,6 +154,31 @@ def test_sites_of_mjcf_are_those_of_mujoco() -> None:
         J = np.zeros((6, 2))
         mujoco.mj_jacSite(model, data, J[:3], J[3:], site)
         assert arm.jacob0(q, frame=name) == pytest.approx(J, abs=1e-12)
+
+
+@pytest.mark.parametrize("suffix", ["xml", "sdf"])
+def test_frames_keep_their_names_beside_the_names_that_a_writer_adds(tmp_path: Path, suffix: str) -> None:
+    names = ("tool", "l1_joint", "tool_joint")
+    links = (
+        Link(name="l0", mass=1.0, inertia=(0.1, 0.1, 0.1)),
+        Link(name="l1", parent="l0", before=transl(0.3, 0.1, 0.2), mass=1.0, inertia=(0.1, 0.1, 0.1)),
+    )
+    frames = tuple(NamedFrame(name=name, link="l1", pose=transl(0.7, k, 0.9)) for k, name in enumerate(names))
+    robot = ab.Robot(name="named", links=links, tool=transl(0.2, 0.0, 0.4), frames=frames)
+    ab.save_robot(robot, tmp_path / f"robot.{suffix}")
+    arm, again = ab.Arm(robot), ab.load_robot(tmp_path / f"robot.{suffix}")
+    q = [0.4, -0.7]
+    for name in (None, *names):
+        np.testing.assert_allclose(again.fkine(q, frame=name), arm.fkine(q, frame=name), atol=1e-12)
+
+
+def test_a_frame_with_a_reserved_name_is_renamed_with_a_warning(tmp_path: Path) -> None:
+    frame = NamedFrame(name="world", link="l0", pose=transl(0.7, 0.0, 0.0))
+    link = Link(name="l0", mass=1.0, inertia=(0.1, 0.1, 0.1))
+    robot = ab.Robot(name="named", links=(link,), frames=(frame,))
+    with pytest.warns(ab.errors.ArmblocksWarning, match="the name of frame 'world' becomes 'world_', as SDF"):
+        ab.save_robot(robot, tmp_path / "robot.sdf")
+    assert ab.load_robot(tmp_path / "robot.sdf").robot.frames[0].name == "world_"
 
 
 def test_frames_of_sdf_follow_their_links() -> None:

@@ -134,15 +134,33 @@ def file_names(robot: Robot, is_reserved: Callable[[str], bool], format: str) ->
     used = {link.name for link in robot.links}
     names: dict[str | None, str] = {}
     for link in robot.links:
-        names[link.name] = link.name
-        if is_reserved(link.name):
-            new = free_name(link.name.strip()[:100].replace("::", "_").strip("_") + "_", used)
-            names[link.name] = new
-            warn_of_loss(
-                f"robot '{robot.name}'",
-                f"the name of link '{link.name[:60]}' becomes '{new[:60]}', as {format} requires",
-            )
+        names[link.name] = _allowed_name(
+            robot, f"link '{link.name[:60]}'", link.name, is_reserved, format, used
+        )
     return names
+
+
+def frame_names(
+    robot: Robot, is_reserved: Callable[[str], bool], format: str, used: set[str]
+) -> dict[str, str]:
+    """The names of the named frames in the file, from now on used; a warning names frames whose names the
+    format reserves. Names that a writer adds come after them, so that no frame loses its name."""
+    used |= {frame.name for frame in robot.frames}
+    return {
+        frame.name: _allowed_name(robot, f"frame '{frame.name[:60]}'", frame.name, is_reserved, format, used)
+        for frame in robot.frames
+    }
+
+
+def _allowed_name(
+    robot: Robot, subject: str, name: str, is_reserved: Callable[[str], bool], format: str, used: set[str]
+) -> str:
+    """The name, or a similar one with a warning if the format reserves it."""
+    if not is_reserved(name):
+        return name
+    new = free_name(name.strip()[:100].replace("::", "_").strip("_") + "_", used)
+    warn_of_loss(f"robot '{robot.name}'", f"the name of {subject} becomes '{new[:60]}', as {format} requires")
+    return new
 
 
 def free_name(name: str, used: set[str]) -> str:

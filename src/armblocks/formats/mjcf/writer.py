@@ -138,7 +138,8 @@ def _check_quaternions(robot: Robot, link: Link) -> None:
 
 
 def _tool_name(robot: Robot, names: Mapping[str | None, str]) -> str:
-    return free_name("tool", {*names.values(), *(link.name for link in robot.links)})
+    used = {*names.values(), *(link.name for link in robot.links), *(frame.name for frame in robot.frames)}
+    return free_name("tool", used)
 
 
 def _sites(robot: Robot) -> dict[str | None, list[str]]:

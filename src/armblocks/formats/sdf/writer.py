@@ -22,6 +22,7 @@ from armblocks.formats.robot_writing import (
     Mimic,
     check_joint,
     file_names,
+    frame_names,
     free_name,
     inertial_in,
     joint_friction,
@@ -88,6 +89,7 @@ def write_sdf(robot: Robot) -> bytes:
     warn_of_shapes(robot, (Box, Cylinder, Sphere), "SDF")
     names = file_names(robot, _is_reserved, "SDF")
     used = set(names.values()) | {link.name for link in robot.links}
+    frames = frame_names(robot, _is_reserved, "SDF", used)
     lines = [f"<model name={quoted(robot.name or 'robot', robot)}>"]
     if not robot.base.is_identity:
         lines.append(f"  {_pose(robot.base)}")
@@ -106,7 +108,7 @@ def write_sdf(robot: Robot) -> bytes:
             where = f"robot '{robot.name}', frame '{frame.name}'"
             warn_of_loss(where, "frames on the base are not part of the SDF file")
         else:
-            name = quoted(free_name(frame.name, used), robot)
+            name = quoted(frames[frame.name], robot)
             at = quoted(names[frame.link], robot)
             lines.append(f"  <frame name={name} attached_to={at}>{_pose(frame.pose)}</frame>")
     lines.append("</model>")
