@@ -64,7 +64,7 @@ class Network:
             port, order = rate, order - 1
         if self.diagram.clocked(ref.block) and (order or not self.ticking):
             return Value(Node(ref.block, HELD, order), SlotKind.OUTPUT, port)
-        return self._slot(ref.block, SlotKind.OUTPUT, port, order)
+        return self.slot(ref.block, SlotKind.OUTPUT, port, order)
 
     def input(self, block: str, port: str, order: int = 0) -> Value:
         """The location of an input port's value; ``u'`` is the derivative of the input ``u``."""
@@ -74,7 +74,7 @@ class Network:
 
     def state_rate(self, block: str, state: str, order: int) -> Value:
         """The location of the ``order``-th (at least first) derivative of a state."""
-        return self._slot(block, SlotKind.DERIVATIVE, state, order - 1)
+        return self.slot(block, SlotKind.DERIVATIVE, state, order - 1)
 
     def needs(self, node: Node) -> Iterator[tuple[Node, tuple[str, ...]]]:
         """The nodes on which a node depends, each with the paths of the signals to it."""
@@ -106,7 +106,8 @@ class Network:
             for port in block.time_derivatives:
                 yield self.output(PortRef(name, port)).node
 
-    def _slot(self, block: str, kind: SlotKind, name: str, order: int) -> Value:
+    def slot(self, block: str, kind: SlotKind, name: str, order: int = 0) -> Value:
+        """The location of the value of a slot of a block, or of its ``order``-th time derivative."""
         return Value(Node(block, self.equations[block].group_of[kind, name], order), kind, name)
 
 

@@ -22,16 +22,23 @@ from casadi import (
 
 from armblocks.diagram.block_equations import BlockSlot
 from armblocks.diagram.conditional_equations import FIRE, ON
-from armblocks.diagram.controls import EnableControl, TriggerControl
 from armblocks.diagram.diagram import Diagram
-from armblocks.diagram.event_order import event_order
 from armblocks.diagram.features import SlotKind
 from armblocks.diagram.flat_values import broadcast_column
+from armblocks.diagram.guards_and_modes import (
+    event_ranks,
+    guards_of,
+    hysteresis_modes,
+    mode_contradictions,
+    momentary_states,
+    recaptured_states,
+    silenced_guards,
+)
 from armblocks.diagram.hierarchy import FlatForm, flatten_hierarchy
 from armblocks.diagram.implicit import solve_affine
 from armblocks.diagram.model import Model, diagram_model
 from armblocks.diagram.ordering import HELD, Network, Node, Value
-from armblocks.diagram.port import Guard, PortRef
+from armblocks.diagram.port import PortRef
 from armblocks.diagram.shapes import DiagramShapes
 from armblocks.diagram.signal_names import named_signals
 from armblocks.diagram.structure import Outport
@@ -39,7 +46,6 @@ from armblocks.diagram.tracing import Implicit, Symbols, Tracing
 from armblocks.diagram.units import infer_units
 from armblocks.equations import (
     Delays,
-    EventRanks,
     HybridSystem,
     LinearLoops,
     Signature,
@@ -77,10 +83,10 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
     values = parameters.pack(_parameter_values(diagram))
 
     loops = Implicit(model, symbols, flow, values)
-    guards = _guards(model, flow)
+    guards = guards_of(model, flow)
     entries = [(name, guard) for name, guard, value in guards for _ in range(value.numel())]
-    modes, followers, contradictions = _contradictions(model, symbols, flow)
-    momentary = _momentary_states(model, symbols)
+    modes, followers, contradictions = mode_contradictions(model, symbols, flow)
+    momentary = momentary_states(model, symbols)
     point = {"t": symbols.t, "x": symbols.x, "z": symbols.z, "w": loops.w, "p": symbols.p}
     m, e, p = {"m": symbols.m}, {"e": symbols.e}, {"p": symbols.p}
 
@@ -116,11 +122,11 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
         guard_actions=tuple(guard.action for _, guard in entries),
         modes=modes,
         followers=followers,
-        hysteresis_modes=_hysteresis_modes(model, symbols),
-        recaptured_states=_recaptured_states(model, symbols),
+        hysteresis_modes=hysteresis_modes(model, symbols),
+        recaptured_states=recaptured_states(model, symbols),
         momentary_states=tuple(momentary.values()),
-        silenced_guards=_silenced_guards(entries, momentary),
-        ranks=_ranks(model, symbols, entries),
+        silenced_guards=silenced_guards(entries, momentary),
+        ranks=event_ranks(model, symbols, entries),
         locating_guards=tuple(number for number, (_, guard) in enumerate(entries) if guard.locates),
         contradictions=function("contradictions", point, c=contradictions) if modes else None,
         reset=function("reset", point | e, **_reset(model, symbols, flow)),
@@ -196,7 +202,7 @@ def _captured(model: Model, symbols: Symbols, flow: Tracing, after_tick: Mapping
     return {
         f"{name}/{slot}": if_else(
             ticking == 0.0,
-            flow.value(_value(model.flow, name, kind, slot)),
+            flow.value(model.flow.slot(name, kind, slot)),
             after_tick[f"{name}/{slot}"],
         )
         for name, equations in model.flow.equations.items()
@@ -249,108 +255,6 @@ def _derivatives(model: Model, flow: Tracing) -> list[SX]:
     ]
 
 
-def _guards(model: Model, flow: Tracing) -> list[tuple[str, Guard, SX]]:
-    return [
-        (name, guard, flow.value(_value(model.flow, name, SlotKind.GUARD, guard.name)))
-        for name, equations in model.flow.equations.items()
-        for guard in equations.guards
-    ]
-
-
-def _contradictions(
-    model: Model, symbols: Symbols, flow: Tracing
-) -> tuple[tuple[int, ...], tuple[bool, ...], list[SX]]:
-    """The indices of all modes in ``z``; whether each is a following mode; whether each is inconsistent."""
-    ranges = signature(*symbols.discrete_slots).ranges
-    indices: list[int] = []
-    follows: list[bool] = []
-    contradictions: list[SX] = []
-    for name, equations in model.flow.equations.items():
-        for mode in equations.modes:
-            entries = ranges[f"{name}/{mode.name}"]
-            indices += range(entries.start, entries.stop)
-            follows += [mode.follows] * (entries.stop - entries.start)
-            contradictions.append(flow.value(_value(model.flow, name, SlotKind.CONTRADICTION, mode.name)))
-    return tuple(indices), tuple(follows), contradictions
-
-
-def _hysteresis_modes(model: Model, symbols: Symbols) -> tuple[tuple[int, int, int], ...]:
-    """Indices in ``z`` of each hysteresis mode, its previous value, and its ``stored_while`` mode (or -1)."""
-    ranges = signature(*symbols.discrete_slots).ranges
-    return tuple(
-        (own, before, ranges[f"{name}/{mode.stored_while}"].start if mode.stored_while else -1)
-        for name, equations in model.flow.equations.items()
-        for mode in equations.modes
-        if mode.hysteresis
-        for own, before in zip(
-            _indices(ranges[f"{name}/{mode.name}"]), _indices(ranges[f"{name}/{mode.before}"])
-        )
-    )
-
-
-def _recaptured_states(model: Model, symbols: Symbols) -> tuple[int, ...]:
-    """The indices in ``z`` of discrete states that are captured together with modes with hysteresis."""
-    ranges = signature(*symbols.discrete_slots).ranges
-    return tuple(
-        index
-        for name, equations in model.flow.equations.items()
-        for state in equations.discrete
-        if state.hysteresis and (SlotKind.CAPTURE, state.name) in equations.group_of
-        for index in _indices(ranges[f"{name}/{state.name}"])
-    )
-
-
-def _ranks(model: Model, symbols: Symbols, guards: Sequence[tuple[str, Guard]]) -> EventRanks | None:
-    """The ranks of all events; ``None`` if all events are processed together."""
-    order = event_order(model.flow)
-    if order is None:
-        return None
-    rank_of = order.rank_of
-    names = [name for slot in symbols.discrete_slots for name in [slot.name.rpartition("/")[0]] * slot.size]
-    ranges = signature(*symbols.discrete_slots).ranges
-    return EventRanks(
-        before_ticks=order.before_ticks,
-        guards=tuple(rank_of[name] for name, _ in guards),
-        hysteresis_modes=tuple(rank_of[names[mode]] for mode, _, _ in _hysteresis_modes(model, symbols)),
-        recaptured_states=tuple(rank_of[names[index]] for index in _recaptured_states(model, symbols)),
-        controls=tuple(
-            (ranges[f"{name}/side"].start, ranges[f"{name}/previous"].start, rank_of[name])
-            for name, block in model.flow.diagram.blocks.items()
-            if isinstance(block, EnableControl | TriggerControl)
-        ),
-    )
-
-
-def _momentary_states(model: Model, symbols: Symbols) -> dict[tuple[str, str], int]:
-    """The indices in ``z`` of the discrete states that become 0 at the end of an instant."""
-    ranges = signature(*symbols.discrete_slots).ranges
-    return {
-        (name, state.name): ranges[f"{name}/{state.name}"].start
-        for name, equations in model.flow.equations.items()
-        for state in equations.discrete
-        if state.momentary
-    }
-
-
-def _silenced_guards(
-    guards: Sequence[tuple[str, Guard]], momentary: Mapping[tuple[str, str], int]
-) -> tuple[tuple[int, int], ...]:
-    """The guards that a momentary state disables, each with the index of this state in ``z``."""
-    return tuple(
-        (number, momentary[name, guard.silenced_by])
-        for number, (name, guard) in enumerate(guards)
-        if guard.silenced_by
-    )
-
-
-def _indices(entries: slice) -> range:
-    return range(entries.start, entries.stop)
-
-
-def _value(network: Network, block: str, kind: SlotKind, name: str) -> Value:
-    return Value(Node(block, network.equations[block].group_of[kind, name], 0), kind, name)
-
-
 def _delays(
     model: Model, symbols: Symbols, flow: Tracing, loops: Implicit, point: Mapping[str, SX], products: SX
 ) -> Delays | None:
@@ -367,7 +271,7 @@ def _delays(
         bounds = equations.features.delay_bounds(symbols.parameters_of(name))
         for line in equations.delays:
             kinds = (SlotKind.DELAYED, SlotKind.DELAYED_RATE, SlotKind.DELAY)
-            u, du, tau = (flow.value(_value(model.flow, name, kind, line.name)) for kind in kinds)
+            u, du, tau = (flow.value(model.flow.slot(name, kind, line.name)) for kind in kinds)
             of_value, of_derivative = ranges[f"{name}/{line.name}"], ranges[f"{name}/{line.name}'"]
             values += range(of_value.start, of_value.stop)
             derivatives += range(of_derivative.start, of_derivative.stop)
@@ -411,14 +315,14 @@ def _reset(model: Model, symbols: Symbols, flow: Tracing) -> dict[str, list[SX]]
         for kind, slot in equations.group_of:
             path = f"{name}/{slot}"
             if kind is SlotKind.RESET:
-                after = flow.value(_value(model.flow, name, kind, slot))
+                after = flow.value(model.flow.slot(name, kind, slot))
                 (states if path in states else discrete)[path] = after
         for mode in equations.modes:
             path = f"{name}/{mode.name}"
-            consistent = flow.value(_value(model.flow, name, SlotKind.MODE, mode.name))
+            consistent = flow.value(model.flow.slot(name, SlotKind.MODE, mode.name))
             requested = no_event
             if mode.follows:  # its value needs no event
-                inconsistent = flow.value(_value(model.flow, name, SlotKind.CONTRADICTION, mode.name))
+                inconsistent = flow.value(model.flow.slot(name, SlotKind.CONTRADICTION, mode.name))
                 requested = logic_or(no_event, inconsistent)
             discrete[path] = if_else(requested, consistent, discrete[path])
     return {"x": list(states.values()), "z": list(discrete.values())}
