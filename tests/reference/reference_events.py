@@ -13,7 +13,7 @@ from typing import Any
 
 from reference_block import BlockNumbers
 from reference_controls import Enable, Trigger
-from reference_order import EvaluationOrder, Node
+from reference_order import EvaluationOrder, Node, reached_from
 
 EVENT_KINDS = ("mode", "quantity", "guard", "reset")
 STATE_PORTS = {("ResettableIntegrator", "state"), ("DiscreteIntegrator", "state")}
@@ -50,9 +50,8 @@ def event_ranks(order: EvaluationOrder) -> tuple[Mapping[str, int], int]:
     counted = {name for name, block in blocks.items() if has_own_events(block)}
     ranks = _ranks(graph, counted)
     sampled = {("out", name, port) for name, b in blocks.items() if b.clock is not None for port in b.outputs}
-    after = {
-        name for name in blocks if sampled & ({("events", name, "")} | _reached(graph, ("events", name, "")))
-    }
+    upstream = {name: reached_from(("events", name, ""), graph) for name in blocks}
+    after = {name for name in blocks if sampled & upstream[name]}
     last = max((ranks[name] for name in counted - after), default=-1)
     return {name: rank + (last + 1) * (name in after) for name, rank in ranks.items()}, last
 
@@ -82,7 +81,7 @@ def _before_events(order: EvaluationOrder, node: Node) -> bool:
 
 def _ranks(graph: Mapping[Node, set[Node]], counted: set[str]) -> dict[str, int]:
     """Longest paths by repeated improvement; nodes of a loop have one rank."""
-    reach = {node: _reached(graph, node) for node in graph}
+    reach = {node: reached_from(node, graph) for node in graph}
     loops = {node: frozenset({m for m in reach[node] if node in reach[m]} | {node}) for node in graph}
     ranks: dict[frozenset[Node], int] = {}
 
@@ -101,14 +100,3 @@ def _ranks(graph: Mapping[Node, set[Node]], counted: set[str]) -> dict[str, int]
             if best != rank(loop):
                 ranks[loop], changed = best, True
     return {node[1]: rank(loop) for node, loop in loops.items() if node[0] == "events"}
-
-
-def _reached(graph: Mapping[Node, set[Node]], start: Node) -> set[Node]:
-    found: set[Node] = set()
-    pending = list(graph[start])
-    while pending:
-        node = pending.pop()
-        if node not in found:
-            found.add(node)
-            pending += graph[node]
-    return found

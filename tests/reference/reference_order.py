@@ -112,7 +112,7 @@ class EvaluationOrder:
             evaluated |= set(loop)
         self.groups = order
         read = self._read_between_instants() | {node for loop in self.loops for node in loop}
-        read |= {node for start in read for node in _closure_of(start, both)}
+        read |= {node for start in read for node in reached_from(start, both)}
         self.flowing = [loop for loop in order if not read.isdisjoint(loop)]
 
     def _read_between_instants(self) -> set[Node]:
@@ -186,10 +186,10 @@ class EvaluationOrder:
 
 def _closure(graph: Mapping[Node, set[Node]]) -> dict[Node, set[Node]]:
     """Return all nodes that are reachable from each node."""
-    return {node: _closure_of(node, graph) for node in graph}
+    return {node: reached_from(node, graph) for node in graph}
 
 
-def _closure_of(node: Node, graph: Mapping[Node, set[Node]]) -> set[Node]:
+def reached_from(node: Node, graph: Mapping[Node, set[Node]]) -> set[Node]:
     """Return all nodes that are reachable from a node."""
     closure: set[Node] = set()
     pending = list(graph[node])

@@ -45,7 +45,7 @@ def event_order(network: Network) -> EventOrder | None:
     if len(eventful) < (1 if clocked else 2):
         return None
     excluded = _outputs_before_events(network)
-    controls = _control_of_each_subsystem(network)
+    read_inside = _read_inside_subsystems(network, excluded)
     vertices: dict[_Vertex, int] = {}
     needs: list[list[int]] = []
     pending: list[_Vertex] = []
@@ -65,16 +65,11 @@ def event_order(network: Network) -> EventOrder | None:
     while pending:
         vertex = pending.pop()
         if isinstance(vertex, str):
-            found: list[_Vertex] = [*_read_by_groups(network, vertex, _EVENT_KINDS, excluded)]
+            own = _read_by_groups(network, vertex, _EVENT_KINDS, excluded)
+            found: list[_Vertex] = [*own, *read_inside.get(vertex, ())]
         else:
             found = [*_needed(network, vertex, excluded), vertex.block]
         needs[vertices[vertex]] += [number(needed) for needed in found]
-    for name in network.equations:
-        for subsystem, control in controls.items():
-            if name.startswith(subsystem):
-                read = _read_by_groups(network, name, {SlotKind.OUTPUT, *_EVENT_KINDS}, excluded)
-                outside = [node for node in read if not node.block.startswith(subsystem)]
-                needs[vertices[control]] += [vertices[node] for node in outside if node in vertices]
     sampled = {
         index for vertex, index in vertices.items() if isinstance(vertex, Node) and vertex.group == HELD
     }
@@ -92,16 +87,23 @@ def event_order(network: Network) -> EventOrder | None:
     return EventOrder(ranks, before_ticks)
 
 
-def _control_of_each_subsystem(network: Network) -> dict[str, str]:
-    """The control blocks of conditional subsystems, by the beginning of the names of the blocks inside.
+def _read_inside_subsystems(network: Network, excluded: set[str]) -> dict[str, list[Node]]:
+    """For each control of a conditional subsystem, the nodes outside that the blocks inside read.
 
     A control acts on all blocks inside. Its events therefore follow those of all blocks that they read.
     """
-    return {
-        name.rpartition("/")[0] + "/": name
-        for name, block in network.diagram.blocks.items()
-        if isinstance(block, EnableControl | TriggerControl)
-    }
+    read_by_control: dict[str, list[Node]] = {}
+    for control, block in network.diagram.blocks.items():
+        if isinstance(block, EnableControl | TriggerControl):
+            subsystem = control.rpartition("/")[0] + "/"
+            read_by_control[control] = [
+                node
+                for name in network.equations
+                if name.startswith(subsystem)
+                for node in _read_by_groups(network, name, {SlotKind.OUTPUT, *_EVENT_KINDS}, excluded)
+                if not node.block.startswith(subsystem)
+            ]
+    return read_by_control
 
 
 def _outputs_before_events(network: Network) -> set[str]:
