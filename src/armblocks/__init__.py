@@ -40,10 +40,13 @@ if TYPE_CHECKING:
     from armblocks.face.linearizing import frequency_response, linearize
     from armblocks.face.model import CompiledDiagram, begin, compile_diagram, simulate
     from armblocks.face.payload import Payload
+    from armblocks.face.planned_trajectories import point_to_point, spline_trajectory
     from armblocks.face.reporting import draw_diagram, write_files, write_report
     from armblocks.face.robots import list_robots, load_robot, save_robot
     from armblocks.face.sensitivity import SensitivityResult, sensitivity
-    from armblocks.face.trajectory import JointTrajectory, jtraj
+    from armblocks.face.toolbox_trajectories import ctraj, jtraj, lspb, mstraj, mtraj, tpoly
+    from armblocks.face.trajectory import JointTrajectory
+    from armblocks.face.trajectory_file import load_trajectory
     from armblocks.face.trimming import trim
     from armblocks.formats import load_table
     from armblocks.robot import (
@@ -132,12 +135,13 @@ else:
             "block_example": "armblocks.face.block_examples",
             "blocks": "armblocks.blocks",
             "compile_diagram": "armblocks.face.model",
+            "ctraj": "armblocks.face.toolbox_trajectories",
             "diagram_difference": "armblocks.diagram",
             "draw_diagram": "armblocks.face.reporting",
             "errors": "armblocks.errors",
             "formula": "armblocks.diagram",
             "frequency_response": "armblocks.face.linearizing",
-            "jtraj": "armblocks.face.trajectory",
+            "jtraj": "armblocks.face.toolbox_trajectories",
             "linearize": "armblocks.face.linearizing",
             "list_blocks": "armblocks.face.diagrams",
             "list_examples": "armblocks.face.diagrams",
@@ -147,7 +151,12 @@ else:
             "load_library": "armblocks.face.diagrams",
             "load_robot": "armblocks.face.robots",
             "load_table": "armblocks.formats",
+            "load_trajectory": "armblocks.face.trajectory_file",
+            "lspb": "armblocks.face.toolbox_trajectories",
             "modified_dh": "armblocks.robot",
+            "mstraj": "armblocks.face.toolbox_trajectories",
+            "mtraj": "armblocks.face.toolbox_trajectories",
+            "point_to_point": "armblocks.face.planned_trajectories",
             "robot_widget": "armblocks.studio.notebook",
             "run_widget": "armblocks.studio.notebook",
             "save_diagram": "armblocks.face.diagrams",
@@ -155,8 +164,10 @@ else:
             "save_robot": "armblocks.face.robots",
             "sensitivity": "armblocks.face.sensitivity",
             "simulate": "armblocks.face.model",
+            "spline_trajectory": "armblocks.face.planned_trajectories",
             "standard_dh": "armblocks.robot",
             "to_python": "armblocks.face.diagrams",
+            "tpoly": "armblocks.face.toolbox_trajectories",
             "trim": "armblocks.face.trimming",
             "with_comments": "armblocks.diagram",
             "with_parameter_set": "armblocks.diagram",
@@ -214,6 +225,7 @@ __all__ = [
     "block_example",
     "blocks",
     "compile_diagram",
+    "ctraj",
     "diagram_difference",
     "draw_diagram",
     "errors",
@@ -229,7 +241,12 @@ __all__ = [
     "load_library",
     "load_robot",
     "load_table",
+    "load_trajectory",
+    "lspb",
     "modified_dh",
+    "mstraj",
+    "mtraj",
+    "point_to_point",
     "robot_widget",
     "run_widget",
     "save_diagram",
@@ -237,8 +254,10 @@ __all__ = [
     "save_robot",
     "sensitivity",
     "simulate",
+    "spline_trajectory",
     "standard_dh",
     "to_python",
+    "tpoly",
     "trim",
     "with_comments",
     "with_parameter_set",

@@ -337,7 +337,8 @@ def test_declared_derivatives_of_outputs_equal_the_computed_derivatives(
         builder.add("derivative", Derivative(), builder.add("block", block, *sources)[port])
         system = trace_diagram(builder.build())
         x = random.uniform(0.1, 0.9, system.states.size)
-        (y,) = system.signals(0.37, x, (), (), system.parameter_values)
+        z = np.zeros(system.discrete.size)  # tables: the row before the time
+        (y,) = system.signals(0.37, x, z, (), system.parameter_values)
         signals = system.signals_layout.unpack(y)
         # the same quantity with another order of operations
         assert signals["derivative/y"] == pytest.approx(signals[f"block/{rate}"], rel=1e-13)

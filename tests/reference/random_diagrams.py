@@ -27,9 +27,10 @@ LIMITS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 PERIODS = (0.0625, 0.125, 0.25, 0.1, 0.3, (0.125, 0.0625), (0.2, 0.1))
 EXCLUDED = (
     # These use files, call Python, end the run, or define the structure, which the generator builds itself.
-    "FromFile ToFile PythonFunction CalledPythonFunction StopSimulation Assertion Spectrum ManualSwitch "
-    "Goto From BusCreator BusSelector BusAssignment Merge Inport Outport Subsystem EnabledSubsystem "
-    "TriggeredSubsystem EnabledTriggeredSubsystem ResettableSubsystem ActionSubsystem If SwitchCase"
+    "FromFile Trajectory ToFile PythonFunction CalledPythonFunction StopSimulation Assertion Spectrum "
+    "ManualSwitch Goto From BusCreator BusSelector BusAssignment Merge Inport Outport Subsystem "
+    "EnabledSubsystem TriggeredSubsystem EnabledTriggeredSubsystem ResettableSubsystem "
+    "ActionSubsystem If SwitchCase"
 )
 SLOW = "ArmPlant ForwardDynamics LoadedRne JointPID SampledJointPID"
 SWITCHING = (

@@ -13,7 +13,7 @@ import numpy as np
 from casadi import SX, Function, densify, fabs, fmax, if_else, jtimes, symvar, vertcat
 from reference_history import History
 
-from armblocks.blocks import FromFile
+from armblocks.blocks import FromFile, Trajectory
 from armblocks.blocks.discontinuities.rate_limits import RateLimiting
 from armblocks.diagram import Block, shape_of
 from armblocks.equations import Shape, flatten, unflatten
@@ -71,7 +71,8 @@ class BlockNumbers:
     ) -> None:
         if block.called:
             raise UnsupportedError(f"'{name}' calls Python at its ticks")
-        if isinstance(block, FromFile) or any(not rule.tunable for rule in block.inputs_of_the_run()):
+        is_table = isinstance(block, FromFile | Trajectory)
+        if is_table or any(not rule.tunable for rule in block.inputs_of_the_run()):
             raise UnsupportedError(f"'{name}' has a long table")
         self.name, self.block, self.shapes = name, block, shapes
         self.clock: int | None = None

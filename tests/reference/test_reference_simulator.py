@@ -154,6 +154,7 @@ NOT_COVERED = {
     "ArmPlant": "sticking_reference covers it, and it is slow here",
     "CalledPythonFunction": "Python is called at ticks",
     "FromFile": "reads a table by index",
+    "Trajectory": "reads a table by index",
 }
 TRIALS = ((0.05, 11), (0.01, 11), (0.0005, 4))
 """Step and number of recorded times. One trial that agrees is sufficient: steps of 0.05 s for slow signals,

@@ -158,6 +158,7 @@ from armblocks.blocks.robots.joint_pid import SampledJointPID as SampledJointPID
 from armblocks.blocks.robots.joint_sensors import Encoder as Encoder
 from armblocks.blocks.robots.joint_sensors import JointSensor as JointSensor
 from armblocks.blocks.robots.joint_sensors import Tachometer as Tachometer
+from armblocks.blocks.robots.trajectory import Trajectory as Trajectory
 from armblocks.blocks.routing.basic import Demux as Demux
 from armblocks.blocks.routing.basic import Mux as Mux
 from armblocks.blocks.routing.selection import Assignment as Assignment

@@ -1,9 +1,12 @@
-"""Joint-space trajectories as arrays: the toolbox's ``jtraj``."""
+"""The class ``JointTrajectory``: samples of a joint motion, and the motion at any time."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
+from os import PathLike, fspath
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,26 +14,137 @@ from numpy.typing import ArrayLike, NDArray
 from armblocks.argument_errors import ArgumentErrors
 from armblocks.equations import Slot
 from armblocks.errors import InputError, counted
-from armblocks.robot.plausibility import warn_of_degrees
+from armblocks.face.trajectory_arguments import positive
+from armblocks.files import write_atomically
+from armblocks.simulation.csv_rows import csv_rows
 from armblocks.simulation.notebook_view import STYLE, panels_html
-from armblocks.trajectories import Quintic
+from armblocks.trajectories import Motion, PiecewisePolynomial
+from armblocks.trajectories.piecewise import extremes, hermite
+
+if TYPE_CHECKING:
+    from armblocks.blocks import Trajectory
+
+Array = NDArray[np.float64]
+
+_JUMP = 1e-9
+"""Rates that differ by less, relative to the greatest one, are continuous between two pieces."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class JointTrajectory(metaclass=ArgumentErrors):
-    """Samples of a joint motion: ``t`` (N,) s, ``q`` (N, n) rad or m, ``qd`` and ``qdd`` (N, n) its rates."""
+    """Samples of a joint motion: ``t`` (N,) s, ``q`` (N, n) rad or m, ``qd`` and ``qdd`` (N, n) its rates.
 
-    t: NDArray[np.float64]
-    q: NDArray[np.float64]
-    qd: NDArray[np.float64]
-    qdd: NDArray[np.float64]
+    ``trajectory(t)`` is the motion at any time. Without a ``curve`` from a function such as ``jtraj``, it is
+    between two samples the quintic that has their positions, speeds and accelerations.
+    """
+
+    t: Array
+    q: Array
+    qd: Array
+    qdd: Array
+    curve: PiecewisePolynomial | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        shapes = [np.shape(self.t), *(np.shape(part) for part in self)]
+        n = shapes[1][-1] if len(shapes[1]) == 2 else 0
+        expected = [shapes[0], *[(*shapes[0], n)] * 3]
+        if len(shapes[0]) != 1 or not shapes[0][0] or not n or shapes != expected:
+            raise InputError(
+                f"t, q, qd, qdd have the shapes {', '.join(map(str, shapes))}",
+                where="JointTrajectory",
+                allowed="(N,) and three times (N, n)",
+                fix="give one row of joint values for each time",
+            )
 
     def __len__(self) -> int:
         return len(self.t)
 
-    def __iter__(self) -> Iterator[NDArray[np.float64]]:
+    def __iter__(self) -> Iterator[Array]:
         """``q``, ``qd``, ``qdd``, in the order of the toolbox: ``q, qd, qdd = jtraj(…)``."""
         return iter((self.q, self.qd, self.qdd))
+
+    def __call__(self, t: ArrayLike) -> Motion[Array]:
+        """The motion at ``t`` (s), a number or (N,): the tuple ``q, qd, qdd`` of arrays (n,) or (N, n).
+
+        Before the start and after the end the joints are at rest. Where an acceleration jumps, it is the
+        value after the jump.
+        """
+        return self._curve.at(t)
+
+    @property
+    def duration(self) -> float:
+        """Time from the start to the end, s."""
+        return self._curve.duration
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self._curve.width
+
+    @cached_property
+    def _curve(self) -> PiecewisePolynomial:
+        return self.curve or curve_through(np.column_stack([self.t, self.q, self.qd, self.qdd]))
+
+    def sampled(self, dt: float | None = None, *, t: ArrayLike | None = None) -> JointTrajectory:
+        """The same motion with samples every ``dt`` (s) and at the end, or at the times ``t`` (N,)."""
+        if t is None:
+            step = positive("dt", 0.01 if dt is None else dt, "s", "JointTrajectory.sampled")
+            return sampled(self._curve, step)
+        times = np.atleast_1d(np.asarray(t, dtype=np.float64))
+        motion = self._curve.at(times)
+        return JointTrajectory(t=times, q=motion.q, qd=motion.qd, qdd=motion.qdd, curve=self._curve)
+
+    def stretched(self, duration: float) -> JointTrajectory:
+        """The same path in another ``duration`` (s): speeds and accelerations scale with it."""
+        new = positive("duration", duration, "s", "JointTrajectory.stretched")
+        factor = new / self.duration if self.duration else 1.0
+        curve = self._curve.stretched(factor)
+        times = curve.times[0] + (self.t - self._curve.times[0]) * factor
+        motion = curve.at(times)
+        return JointTrajectory(t=times, q=motion.q, qd=motion.qd, qdd=motion.qdd, curve=curve)
+
+    def peaks(self) -> Motion[Array]:
+        """Smallest and largest values (2, n) of q, qd and qdd of each joint over all times, exact."""
+        return Motion(*(np.array(extremes(self._curve, order)) for order in range(3)))
+
+    def rows(self) -> Array:
+        """The motion as a table (M, 1 + 3 n) of t, q, qd, qdd, from which quintics reproduce it.
+
+        The rows are the ends of its polynomials; two rows with one time are a jump of a rate. This is the
+        parameter of the block :class:`~armblocks.blocks.Trajectory`. It is exact for all trajectories up to
+        the fifth degree.
+        """
+        starts, ends = self._curve.pieces()
+        times = self._curve.times
+        first, last = np.hstack(starts), np.hstack(ends)
+        scale = np.maximum(np.abs(first).max(axis=0), np.abs(last).max(axis=0))
+        rows = [np.append(times[0], first[0])]
+        for k in range(1, len(first)):
+            rows.append(np.append(times[k], last[k - 1]))
+            if (np.abs(first[k] - last[k - 1]) > _JUMP * scale).any():
+                rows.append(np.append(times[k], first[k]))
+        rows.append(np.append(times[-1], last[-1]))
+        return np.array(rows)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the samples and :meth:`rows` as a CSV file with the columns t, q1 …, qd1 …, qdd1 ….
+
+        :func:`~armblocks.load_trajectory` and the block :class:`~armblocks.blocks.Trajectory` read it.
+        """
+        knots = self.rows()
+        gaps = np.abs(self.t[:, None] - knots[:, 0]).min(axis=1)
+        more = np.column_stack([self.t, *self])[gaps > _JUMP * max(self.duration, 1e-3)]
+        rows = np.vstack([knots, more])
+        rows = rows[np.argsort(rows[:, 0], kind="stable")]
+        names = [f"{name}{k + 1}" for name in ("q", "qd", "qdd") for k in range(self.n)]
+        text = f"{','.join(['t', *names])}\n{csv_rows(list(rows.T))}"
+        write_atomically(fspath(path), text.encode())
+
+    def block(self) -> Trajectory:
+        """The block that plays this motion in a diagram: outputs q, qd, qdd."""
+        from armblocks.blocks import Trajectory
+
+        return Trajectory(data=self.rows())
 
     def _repr_html_(self) -> str:
         """The notebook view: q, qd and qdd over time, in their units."""
@@ -43,70 +157,31 @@ class JointTrajectory(metaclass=ArgumentErrors):
         )
 
 
-def jtraj(
-    q0: ArrayLike,
-    qf: ArrayLike,
-    t: ArrayLike | int,
-    qd0: ArrayLike | None = None,
-    qd1: ArrayLike | None = None,
-) -> JointTrajectory:
-    """Quintic motion from ``q0`` to ``qf`` (n,), zero acceleration at both ends.
-
-    ``t`` is either the times (N,) in s, from 0 to the end of the motion, or a number of samples N: then the
-    time is normalised as in the toolbox, ``linspace(0, 1, N)``, and rates are per unit of this time. ``qd0``,
-    ``qd1`` (n,): speeds at the ends, zero by default. Same polynomial as the toolbox's ``jtraj``. ``q, qd,
-    qdd = jtraj(…)`` unpacks the motion. Warns of angles that look like degrees.
-    """
-    start, goal = _joint_vector("q0", q0), _joint_vector("qf", qf)
-    first = None if qd0 is None else _joint_vector("qd0", qd0)
-    last = None if qd1 is None else _joint_vector("qd1", qd1)
-    for name, vector in (("qf", goal), ("qd0", first), ("qd1", last)):
-        if vector is not None and vector.shape != start.shape:
-            raise InputError(
-                f"{name} has {counted(vector.size, 'joint')}",
-                where="jtraj",
-                allowed=f"{start.size}, as q0",
-                fix=f"give {name} as many numbers as q0",
-            )
-    for name, angles in (("q0", start), ("qf", goal)):
-        warn_of_degrees(angles, f"jtraj, {name}")
-    times = _times(t)
-    motion = Quintic(q0=start, qf=goal, tmax=times[-1:], qd0=first, qd1=last).at(times)
-    return JointTrajectory(t=times, q=motion.q, qd=motion.qd, qdd=motion.qdd)
+def sampled(curve: PiecewisePolynomial, dt: float) -> JointTrajectory:
+    """A trajectory with samples every ``dt`` and at the end."""
+    count = max(int(np.ceil(curve.duration / dt - 1e-9)), 1)
+    times = curve.times[0] + np.append(dt * np.arange(count), curve.duration)
+    motion = curve.at(times)
+    return JointTrajectory(t=times, q=motion.q, qd=motion.qd, qdd=motion.qdd, curve=curve)
 
 
-def _joint_vector(name: str, value: ArrayLike) -> NDArray[np.float64]:
-    try:
-        vector = np.atleast_1d(np.asarray(value, dtype=np.float64))
-    except (TypeError, ValueError):
-        vector = np.empty((0, 0))
-    if vector.ndim != 1 or not np.isfinite(vector).all():
+def curve_through(rows: Array) -> PiecewisePolynomial:
+    """Quintic pieces through rows (M, 1 + 3 n) of t, q, qd, qdd; two rows with one time are a jump."""
+    times, (q, qd, qdd) = rows[:, 0], np.split(rows[:, 1:], 3, axis=1)
+    invalid = not np.isfinite(rows).all() or (np.diff(times) < 0.0).any()
+    # The first time of a jump may be the next smaller number, as in a TimeTable.
+    begins = np.flatnonzero(np.diff(times) > 4.0 * np.spacing(np.abs(times[1:])))
+    if invalid or (not begins.size and len(times) > 1):
         raise InputError(
-            f"{name} = {value!r}",
-            where="jtraj",
-            allowed="a vector of finite joint values, one per joint",
-            fix="give one finite number for each joint",
+            "the times of the samples do not ascend, or a sample is not finite",
+            where="JointTrajectory",
+            allowed="finite samples at ascending times; a time twice for a jump of an acceleration",
+            fix="sort the samples by time and remove those without values",
         )
-    return vector
-
-
-def _times(t: ArrayLike | int) -> NDArray[np.float64]:
-    if isinstance(t, int):
-        if t < 2:
-            raise InputError(
-                f"t = {counted(t, 'sample')}",
-                where="jtraj",
-                allowed="2 or more, or a vector of times",
-                fix="use np.linspace(0, T, N) for times in s",
-            )
-        return np.linspace(0.0, 1.0, t)
-    times = np.asarray(t, dtype=np.float64)
-    is_ascending = times.ndim == 1 and times.size >= 2 and bool((np.diff(times) > 0).all())
-    if not (is_ascending and np.isfinite(times).all() and times[0] == 0.0):
-        raise InputError(
-            f"t of shape {times.shape}",
-            where="jtraj",
-            allowed="finite ascending times that start at 0, or a number of samples",
-            fix="use np.linspace(0, T, N)",
-        )
-    return times
+    end = np.array([q[-1], qd[-1], qdd[-1]])
+    if len(times) == 1:
+        return PiecewisePolynomial(times=times[[0, 0]], coefficients=q[None], end=end)
+    ends = begins + 1
+    knots = np.append(times[begins], times[-1])
+    knots[1:] = times[ends]
+    return hermite(knots, (q[begins], qd[begins], qdd[begins]), (q[ends], qd[ends], qdd[ends]), end=end)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from casadi import SX, fmax, fmin, if_else, logic_and, logic_or, vertcat
+from casadi import SX, if_else, vertcat
 
-from armblocks.blocks.switching import edge_count, since
+from armblocks.blocks.table_rows import ROW_GUARDS, ROW_MODES, TableRows
 from armblocks.diagram import (
     Block,
     Guard,
@@ -22,7 +22,6 @@ from armblocks.diagram import (
     parameter,
 )
 from armblocks.diagram.signs import FaceSign, graph
-from armblocks.equations import last_at_or_below, read_entry
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,44 +70,33 @@ class FromFile(Block):
         )
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("row", (), "index of the last row at or before t, from 0; -1 before the first row"),)
+        return ROW_MODES
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return (Guard("next", (), "t - the time of the next row", 1),)
+        return ROW_GUARDS
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        count, width = self._size
-        row = fmin(fmax(x["row"], 0.0), count - 1.0)
-        between = logic_and(x["row"] >= 0.0, x["row"] < count - 1.0)
-        values = vertcat(*(self._entry(p, row, k) for k in range(1, width)))
+        table, width = self._rows(p), self._size[1]
+        row, between = table.present(x["row"]), table.is_between(x["row"])
+        values = vertcat(*(table.entry(row, k) for k in range(1, width)))
         if self.method == "linear":
-            next_row = fmin(row + 1.0, count - 1.0)
-            begin, end = self._entry(p, row, 0), self._entry(p, next_row, 0)
+            next_row = table.present(row + 1.0)
+            begin, end = table.entry(row, 0), table.entry(next_row, 0)
             fraction = if_else(between, (t - begin) / if_else(between, end - begin, 1.0), 0.0)
-            next_values = vertcat(*(self._entry(p, next_row, k) for k in range(1, width)))
+            next_values = vertcat(*(table.entry(next_row, k) for k in range(1, width)))
             values = (1.0 - fraction) * values + fraction * next_values
         if self.outside == "zero":
             values = if_else(between, values, 0.0)
         return {"y": values}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        last = self._size[0] - 1.0
-        next_row = since(t, self._entry(p, fmin(x["row"] + 1.0, last), 0))
-        return {"next": if_else(x["row"] < last, next_row, -1.0)}
+        return {"next": self._rows(p).guard(t, x["row"])}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        count, width = self._size
-        row = last_at_or_below(p["data"].T, t, count=count, stride=width)
-        passed = self.guard_values(t, x, u, p)["next"] > 0.0
-        return {"row": edge_count(row, if_else(self._is_before_table(t, x, p), -1.0, x["row"]), passed)}
+        return {"row": self._rows(p).consistent(t, x["row"])}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        passed = self.guard_values(t, x, u, p)["next"] > 0.0
-        return {"row": logic_or(passed, self._is_before_table(t, x, p))}
-
-    def _is_before_table(self, t: SX, x: Signals, p: Signals) -> SX:
-        """Whether t is before row 0, while the first row is held."""
-        return logic_and(x["row"] == 0.0, since(t, self._entry(p, SX(0.0), 0)) < 0.0)
+        return {"row": self._rows(p).contradicts(t, x["row"])}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         return {"row": x["row"] + (e["next"] > 0.0)}
@@ -118,6 +106,5 @@ class FromFile(Block):
         rows, width = np.shape(self.data)
         return rows, width
 
-    def _entry(self, p: Signals, row: SX, column: int) -> SX:
-        # The parameter vector is row-major, which is the column-major order of the transpose.
-        return read_entry(p["data"].T, self._size[1] * row + float(column))
+    def _rows(self, p: Signals) -> TableRows:
+        return TableRows(*self._size, p["data"])

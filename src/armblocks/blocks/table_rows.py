@@ -1,0 +1,60 @@
+"""The row of a table of times at the present time, for blocks that play back tables of any length.
+
+The row is a mode, which an event at the time of each row increases: no step passes over a row, and the cost
+does not depend on the length of the table.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from casadi import SX, fmax, fmin, if_else, logic_and, logic_or
+
+from armblocks.blocks.switching import edge_count, since
+from armblocks.diagram import Guard, State
+from armblocks.equations import last_at_or_below, read_entry
+
+ROW_MODES = (State("row", (), "index of the last row at or before t, from 0; -1 before the first row"),)
+ROW_GUARDS = (Guard("next", (), "t - the time of the next row", 1),)
+
+
+@dataclass(frozen=True)
+class TableRows:
+    """A table with ``count`` rows of ``width`` entries, of which the first is the time (s)."""
+
+    count: int
+    width: int
+    table: SX
+
+    def entry(self, row: SX, column: int) -> SX:
+        """An entry of the table; the row is limited to the table."""
+        # The parameter vector is row-major, which is the column-major order of the transpose.
+        return read_entry(self.table.T, self.width * row + float(column))
+
+    def present(self, row: SX) -> SX:
+        """The mode ``row`` limited to the table."""
+        return fmin(fmax(row, 0.0), self.count - 1.0)
+
+    def is_between(self, row: SX) -> SX:
+        """Whether the present time is between two rows."""
+        return logic_and(row >= 0.0, row < self.count - 1.0)
+
+    def guard(self, t: SX, row: SX) -> SX:
+        """The value that becomes positive at the time of the next row."""
+        last = self.count - 1.0
+        next_row = since(t, self.entry(fmin(row + 1.0, last), 0))
+        return if_else(row < last, next_row, -1.0)
+
+    def consistent(self, t: SX, row: SX) -> SX:
+        """The row at ``t``, found by a binary search if the mode contradicts the time."""
+        found = last_at_or_below(self.table.T, t, count=self.count, stride=self.width)
+        passed = self.guard(t, row) > 0.0
+        return edge_count(found, if_else(self._is_before(t, row), -1.0, row), passed)
+
+    def contradicts(self, t: SX, row: SX) -> SX:
+        """Whether the mode contradicts the time."""
+        return logic_or(self.guard(t, row) > 0.0, self._is_before(t, row))
+
+    def _is_before(self, t: SX, row: SX) -> SX:
+        """Whether t is before row 0, while the first row is held."""
+        return logic_and(row == 0.0, since(t, self.entry(SX(0.0), 0)) < 0.0)

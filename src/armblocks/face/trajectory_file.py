@@ -1,0 +1,62 @@
+"""Trajectories from files of measured or planned joint motions."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from os import PathLike, fspath
+
+import numpy as np
+
+from armblocks.errors import InputError, shortened_list
+from armblocks.face.trajectory import JointTrajectory, curve_through, sampled
+from armblocks.formats import load_table
+from armblocks.trajectories.splines import cubic_spline
+
+_COLUMN = re.compile(r"(qdd|qd|q)_?(\d+)(?:\s*[\[(].*)?")
+
+
+def load_trajectory(path: str | PathLike[str], *, dt: float | None = None) -> JointTrajectory:
+    """The joint motion in a table file (``.csv``, ``.npz``, ``.mat``, ``.parquet``).
+
+    Columns: the times ``t`` or ``time`` in s, the positions ``q1`` … ``qn`` in rad or m, and optionally the
+    speeds ``qd1`` … and accelerations ``qdd1`` …, as :meth:`JointTrajectory.save` writes them. Between rows
+    the motion is the quintic with the values of both rows. Without speeds and accelerations it is the cubic
+    spline through the positions, at rest at both ends. ``dt``: time between samples, s; ``None``: the rows of
+    the file.
+
+    Raises ``FormatError`` and ``UnknownNameError`` as :func:`~armblocks.load_table`, and InputError for
+    missing columns.
+    """
+    table = load_table(path)
+    rows = np.asarray(table)
+    found: dict[str, dict[int, int]] = {"q": {}, "qd": {}, "qdd": {}}
+    for column, name in enumerate(table.names, 1):
+        match = _COLUMN.fullmatch(name.strip())
+        if match:
+            found[match[1]][int(match[2])] = column
+    n = len(found["q"])
+    complete = [sorted(columns) == list(range(1, n + 1)) for columns in found.values()]
+    if not n or not complete[0] or complete[1] != complete[2] or (not complete[1] and found["qd"]):
+        raise InputError(
+            f"the columns are {_listed(table.names)}",
+            where=fspath(path),
+            allowed="q1 to qn, and for all or no joints qd1 to qdn and qdd1 to qddn",
+            fix="rename the columns of the table",
+        )
+    columns = [found[name][k] for name in ("q", "qd", "qdd")[: 1 + 2 * complete[1]] for k in range(1, n + 1)]
+    rows = rows[:, [0, *columns]]
+    if complete[1]:
+        curve = curve_through(rows)
+    else:
+        rest = np.zeros(n)
+        curve = cubic_spline(rows[:, 0], rows[:, 1:], rest, rest)
+    if dt is not None:
+        return sampled(curve, dt)
+    times = np.unique(rows[:, 0])
+    motion = curve.at(times)
+    return JointTrajectory(t=times, q=motion.q, qd=motion.qd, qdd=motion.qdd, curve=curve)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return shortened_list([f"'{name}'" for name in names]) if names else "without names"
