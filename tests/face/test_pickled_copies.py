@@ -70,6 +70,10 @@ def examples() -> Mapping[str, Any]:
         *(
             ab.NamedFrame(name="camera"),
             ab.Attachment(),
+            ab.JointSpring(name="s", joint="a", stiffness=1.0),
+            ab.LineSpring(
+                name="s", first=ab.Attachment(), second=ab.Attachment(link="a"), stiffness=1.0, length=0.2
+            ),
             ab.Coupling(name="c", terms=(("a", 1.0), ("b", 2.0))),
             arm.assemble(),
         ),

@@ -354,7 +354,7 @@ def test_contradicting_couplings_and_limits_of_closing_joints_are_findings() -> 
     (robot,) = read_sdf(text.encode(), "r.sdf", context).values()
     found = {finding.rule.code: finding.what for finding in context.findings}
     assert "the coupling is left out: couplings make joint" in found["sdf-coupling"]
-    assert found["sdf-closure"] == "its limits and its friction are left out"
+    assert found["sdf-closure"] == "its limits, friction and springs are left out"
     assert len(robot.couplings) == 1 and [closure.title for closure in robot.closures] == ["revolute"]
 
 

@@ -215,7 +215,7 @@ def test_actuators_give_the_torque_limits_of_their_joints() -> None:
     ("text", "code"),
     [
         (body("<joint type='ball' range='0 1'/><geom size='0.1'/>"), "mjcf-limit"),
-        (body("<joint stiffness='3'/><geom size='0.1'/>"), "mjcf-stiffness"),
+        (body("<joint stiffness='3 1'/><geom size='0.1'/>"), "mjcf-stiffness"),
         (body(HINGE, "<equality><connect body1='a' body2='z' anchor='0 0 0'/></equality>"), "mjcf-equality"),
         (
             body(HINGE, "<tendon><fixed stiffness='2'><joint joint='j' coef='1'/></fixed></tendon>"),
@@ -280,9 +280,9 @@ def test_files_that_include_each_other_are_refused(tmp_path: Path) -> None:
 
 def test_load_robot_warns_once_for_each_kind_of_finding(tmp_path: Path) -> None:
     file = tmp_path / "floating.xml"
-    spring = "<joint stiffness='2'/><geom size='1'/>"
+    spring = "<joint stiffness='2 1'/><geom size='1'/>"
     file.write_text(body(f"{spring}<body>{spring}</body>"))
-    with pytest.warns(ArmblocksWarning, match="the spring of the joint is left out") as caught:
+    with pytest.warns(ArmblocksWarning, match="stiffness of higher degree") as caught:
         ab.load_robot(file)
     assert len([entry for entry in caught if "mjcf-stiffness" in str(entry.message)]) == 1
 

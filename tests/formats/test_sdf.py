@@ -107,9 +107,9 @@ FOUND = [
         "damping -1 and friction 0 would accelerate the joint; they are left out",
     ),
     (
-        two(axis("", "<spring_stiffness>7</spring_stiffness>")),
+        two(axis("", "<spring_stiffness>-7</spring_stiffness>")),
         "sdf-spring",
-        "the spring with the stiffness 7 is not read",
+        "the spring with the stiffness -7 is left out",
     ),
     (
         two(axis(more="<mimic joint='k'/>")),

@@ -86,6 +86,7 @@ def print_robot(robot: Robot, console: Console) -> None:
         _print_links(robot, console, note, _MOTORS)
     _print_limits(robot, console)
     _print_constraints(robot, console)
+    _print_springs(robot, console)
     _print_named_frames(robot, console)
     _print_frames(robot, console)
 
@@ -151,6 +152,27 @@ def _print_constraints(robot: Robot, console: Console) -> None:
         from armblocks.face.assembly import assemble
 
         console.print(str(assemble(robot, None, None, ())), highlight=False, markup=False)
+
+
+def _print_springs(robot: Robot, console: Console) -> None:
+    """Print the springs with their joints or links and their constants."""
+    if not robot.springs:
+        return
+    from armblocks.robot import JointSpring, LineSpring
+
+    console.print()
+    console.print("Springs", style=STRONG)
+    for spring in robot.springs:
+        text = f"{spring.name}: {spring.title}"
+        if isinstance(spring, JointSpring):
+            unit = robot.link(spring.joint).joint.speeds[0].unit
+            constant = "N m/rad" if unit == "rad" else "N/m"
+            text += f" at {spring.joint}, {spring.stiffness:g} {constant}, rest at {spring.rest:g} {unit}"
+        elif isinstance(spring, LineSpring):
+            first, second = (end.link or "(base)" for end in (spring.first, spring.second))
+            text += f" between {first} and {second}, {spring.stiffness:g} N/m, {spring.preload:g} N"
+            text += f" at {spring.length:g} m"
+        console.print(text, highlight=False, markup=False)
 
 
 def _print_named_frames(robot: Robot, console: Console) -> None:

@@ -32,6 +32,7 @@ from armblocks.dynamics.reduction import (
     tree_speeds,
 )
 from armblocks.dynamics.rnea import Wrench, rnea
+from armblocks.dynamics.springs import spring_torques
 from armblocks.robot.robot import Robot
 from armblocks.robot.tree import KinematicTree
 from armblocks.spatial.vectors import Scalar
@@ -101,6 +102,7 @@ class ConstrainedEquations:
         gravity = self._tree.gravity
         bias = vertcat(*rnea(self._tree, self._joints, entries(rates), at_rest, gravity, on_bodies))
         resistance = vertcat(*joint_friction(self._tree.robot, entries(rates)))
+        resistance += vertcat(*spring_torques(self._tree, tree_coordinates(self._map, self.q)))
         free = vertcat(*solve(entries(tau - generalised_forces(self._map, bias + resistance))))
         q_rates = vertcat(*position_rates(self.robot, entries(self.q), entries(qd)))
         bias_of_relations = jtimes(mtimes(self.J, qd), self.q, q_rates)

@@ -16,7 +16,6 @@ from armblocks.dynamics.joint_motion import entries
 from armblocks.dynamics.kinematics import Pose, body_poses, constant_pose, frame_pose
 from armblocks.robot.constraints import (
     Attachment,
-    Closure,
     Distance,
     NoDisplacement,
     Perpendicular,
@@ -71,7 +70,7 @@ def constraint_equations(tree: KinematicTree, q: SX) -> ConstraintEquations:
     residuals: list[Scalar] = []
     rows: list[tuple[Scalar, ...]] = []
     for closure in tree.robot.closures:
-        frames = _FramePair.of(tree, closure, bodies, ground)
+        frames = FramePair.of(tree, closure.first, closure.second, bodies, ground)
         for relation in closure.relations:
             residual, row = frames.equation(relation)
             names.append(closure.name)
@@ -86,8 +85,8 @@ def attached_frame(tree: KinematicTree, attachment: Attachment) -> Frame:
 
 
 @dataclass(frozen=True, eq=False)
-class _FramePair:
-    """The two frames a and b of a closure in base axes, and the motion of b relative to a.
+class FramePair:
+    """Two frames a and b, such as those of a closure, in base axes, and the motion of b relative to a.
 
     ``displacement``: from the origin of a to that of b. ``point_columns``, ``angular_columns``: by index in
     qd, the velocity of the origin of b relative to frame a, and the angular velocity of b relative to a, per
@@ -102,9 +101,16 @@ class _FramePair:
     angular_columns: dict[int, Vector]
 
     @classmethod
-    def of(cls, tree: KinematicTree, closure: Closure, bodies: Sequence[Pose], ground: Pose) -> _FramePair:
-        """The frames of a closure."""
-        ends = [attached_frame(tree, end) for end in (closure.first, closure.second)]
+    def of(
+        cls,
+        tree: KinematicTree,
+        first: Attachment,
+        second: Attachment,
+        bodies: Sequence[Pose],
+        ground: Pose,
+    ) -> FramePair:
+        """The frames of two attachments."""
+        ends = [attached_frame(tree, end) for end in (first, second)]
         a, b = (frame_pose(end, bodies, ground) for end in ends)
         moved = [set[int]() if end.body == BASE else {end.body, *tree.ancestors(end.body)} for end in ends]
         points: dict[int, Vector] = {}

@@ -19,6 +19,7 @@ from armblocks.dynamics.forward import check_accelerations_exist
 from armblocks.dynamics.joint_motion import entries, joint_motions
 from armblocks.dynamics.loads import tip_wrench, with_payload
 from armblocks.dynamics.rnea import rnea
+from armblocks.dynamics.springs import spring_torques
 from armblocks.robot.robot import Robot
 from armblocks.robot.tree import KinematicTree
 
@@ -71,9 +72,9 @@ def viscous_friction(robot: Robot) -> NDArray[np.float64]:
 class JointEquations:
     """``M(q) qdd + bias(q, qd) = torque`` at one state, where ``torque`` is the total joint torque.
 
-    ``bias`` includes gravity, velocity terms and the ``wrench`` (see :mod:`armblocks.dynamics.traces`); ``M``
-    and ``bias`` include the ``payload``. Raises RobotError that names the joint if the inertia at a joint is
-    zero.
+    ``bias`` includes gravity, springs, velocity terms and the ``wrench`` (see
+    :mod:`armblocks.dynamics.traces`); ``M`` and ``bias`` include the ``payload``. Raises RobotError that
+    names the joint if the inertia at a joint is zero.
     """
 
     def __init__(
@@ -87,7 +88,8 @@ class JointEquations:
         self._tree = tree
         joints = joint_motions(tree, q)
         no_acceleration = [0.0] * tree.n
-        self.bias = SX(vertcat(*rnea(tree, joints, entries(qd), no_acceleration, tree.gravity, on_bodies)))
+        bias = rnea(tree, joints, entries(qd), no_acceleration, tree.gravity, on_bodies)
+        self.bias = SX(vertcat(*(a + b for a, b in zip(bias, spring_torques(tree, q)))))
         self._M: SquareMatrix = crba(tree, joints)
         body_of_joint = sorted(range(tree.n), key=lambda i: tree.bodies[i].speed)
         self.M = SX(vertcat(*(vertcat(*(SX(self._M[i][j]) for j in body_of_joint)).T for i in body_of_joint)))

@@ -15,8 +15,10 @@ from armblocks.dynamics.constraint_equations import attached_frame
 from armblocks.dynamics.joint_motion import joint_motions
 from armblocks.dynamics.kinematics import Pose, body_poses, constant_pose, frame_pose
 from armblocks.dynamics.rnea import NO_WRENCH, Wrench, body_motions, inertial_wrench
+from armblocks.dynamics.springs import spring_forces
 from armblocks.robot.constraints import Closure, Distance, NoDisplacement, Perpendicular
 from armblocks.robot.link import Link
+from armblocks.robot.springs import LineSpring
 from armblocks.robot.tree import BASE, Frame, KinematicTree
 from armblocks.spatial import Transform
 from armblocks.spatial.inertia import RigidInertia
@@ -48,10 +50,9 @@ def reaction_wrenches(
         a, b = (frame_pose(end, bodies, ground) for end in ends)
         wrench = _closure_wrench(closure, own, a, b)  # on the second frame, about its origin, in base axes
         closures.append(_in_frame(wrench, b))
-        at_base = Wrench(wrench.force, add(wrench.moment, cross(b.p, wrench.force)))
-        for link, sign in ((closure.first.link, 1.0), (closure.second.link, -1.0)):
-            if link is not None:
-                carried[link] = _sum(carried[link], _scaled(sign, at_base))
+        _transmit(carried, closure, _about_base(wrench, b.p))
+    for spring, force, at in spring_forces(tree, bodies, ground):
+        _transmit(carried, spring, _about_base(Wrench(force, NO_WRENCH.moment), at))
     rows: dict[str, Wrench] = {}
     for link in _inward(tree.robot.links):
         total = carried[link.name]
@@ -63,6 +64,16 @@ def reaction_wrenches(
         rows[link.name] = _in_frame(about_joint, joint)
     wrenches = [*(rows[link.name] for link in tree.robot.links), *closures]
     return SX(vertcat(*(vertcat(*wrench.force, *wrench.moment).T for wrench in wrenches)))
+
+
+def _transmit(carried: dict[str, Wrench], between: Closure | LineSpring, wrench: Wrench) -> None:
+    """Add a wrench on the second link of a closure or spring, and the opposite one on the first link.
+
+    ``wrench``: about the origin and in the axes of the base.
+    """
+    for link, sign in ((between.first.link, 1.0), (between.second.link, -1.0)):
+        if link is not None:
+            carried[link] = _sum(carried[link], _scaled(sign, wrench))
 
 
 def _inward(links: Sequence[Link]) -> list[Link]:

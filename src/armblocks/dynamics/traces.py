@@ -48,6 +48,7 @@ from armblocks.dynamics.reduction import (
     tree_speeds,
 )
 from armblocks.dynamics.rnea import NO_WRENCH, rnea
+from armblocks.dynamics.springs import spring_energy, spring_torques
 from armblocks.equations import Signature, TracedFunction, signature
 from armblocks.equations.signatures import Slot
 from armblocks.errors import RobotError
@@ -124,13 +125,14 @@ def trace_manipulability(robot: Robot) -> TracedFunction:
 
 @of_motors
 def trace_rne(robot: Robot) -> TracedFunction:
-    """``tau (n,)`` of a motion, with rigid bodies, rotor inertia, friction and the robot's gravity."""
+    """``tau (n,)`` of a motion, with rigid bodies, rotors, friction, springs and the robot's gravity."""
     tree = regrouped(KinematicTree.of(robot))
 
     def equations(q: SX, qd: SX, qdd: SX) -> SX:
         rates, accelerations = entries(qd), entries(qdd)
         rigid = rnea(tree, joint_motions(tree, q), rates, accelerations, tree.gravity)
-        return _sum(rigid, rotor_torques(tree.robot, accelerations), joint_friction(tree.robot, rates))
+        of_motors = rotor_torques(tree.robot, accelerations), joint_friction(tree.robot, rates)
+        return _sum(rigid, *of_motors, spring_torques(tree, q))
 
     return _trace("rne", robot, ("q", "qd", "qdd"), ("tau", (robot.n,), "N m"), equations)
 
@@ -146,7 +148,8 @@ def trace_rne_loaded(robot: Robot) -> TracedFunction:
         rigid = rnea(
             loaded, joint_motions(loaded, q), rates, accelerations, tree.gravity, tip_wrench(tree, wrench)
         )
-        return _sum(rigid, rotor_torques(tree.robot, accelerations), joint_friction(tree.robot, rates))
+        of_motors = rotor_torques(tree.robot, accelerations), joint_friction(tree.robot, rates)
+        return _sum(rigid, *of_motors, spring_torques(tree, q))
 
     inputs = ("q", "qd", "qdd", "wrench", "payload")
     return _trace("rne", robot, inputs, ("tau", (robot.n,), "N m"), equations)
@@ -154,12 +157,13 @@ def trace_rne_loaded(robot: Robot) -> TracedFunction:
 
 @of_motors
 def trace_gravload(robot: Robot) -> TracedFunction:
-    """``tau (n,)`` that holds the arm at rest against gravity."""
+    """``tau (n,)`` that holds the arm at rest against gravity and its springs."""
     tree = regrouped(KinematicTree.of(robot))
 
     def equations(q: SX) -> SX:
         no_motion = [0.0] * tree.n
-        return _sum(rnea(tree, joint_motions(tree, q), no_motion, no_motion, tree.gravity))
+        rigid = rnea(tree, joint_motions(tree, q), no_motion, no_motion, tree.gravity)
+        return _sum(rigid, spring_torques(tree, q))
 
     return _trace("gravload", robot, ("q",), ("tau", (robot.n,), "N m"), equations)
 
@@ -268,7 +272,7 @@ def trace_accel(robot: Robot, near: Array | None = None) -> TracedFunction:
         if robot.constraints:
             return constrained_motion(robot, tree, q, qd, tau, near=near).qdd
         rates = entries(qd)
-        net_torque = _difference(entries(tau), joint_friction(robot, rates))
+        net_torque = _difference(entries(tau), joint_friction(robot, rates), spring_torques(tree, q))
         return _sum(forward_dynamics(tree, q, rates, net_torque))
 
     return _trace("accel", robot, ("q", "qd", "tau"), ("qdd", (robot.n,), "rad/s2"), equations, of_tree=False)
@@ -290,7 +294,7 @@ def trace_accel_loaded(robot: Robot, near: Array | None = None) -> TracedFunctio
             motion = constrained_motion(robot, loaded, q, qd, tau, near=near, on_bodies=wrenches, loads=loads)
             return motion.qdd
         rates = entries(qd)
-        net_torque = _difference(entries(tau), joint_friction(robot, rates))
+        net_torque = _difference(entries(tau), joint_friction(robot, rates), spring_torques(tree, q))
         return _sum(forward_dynamics(loaded, q, rates, net_torque, wrenches))
 
     inputs = ("q", "qd", "tau", "wrench", "payload")
@@ -328,11 +332,14 @@ def trace_kinetic_energy(robot: Robot) -> TracedFunction:
 
 
 def trace_potential_energy(robot: Robot) -> TracedFunction:
-    """``energy ()``, J, potential energy: zero if the centre of mass is at the world's origin."""
+    """``energy ()``, J, potential energy in gravity and of the springs.
+
+    The part of gravity is zero if the centre of mass is at the world's origin.
+    """
     tree = KinematicTree.of(robot)
 
     def equations(q: SX) -> SX:
-        return SX(potential_energy(tree, joint_motions(tree, q)))
+        return SX(potential_energy(tree, joint_motions(tree, q)) + spring_energy(tree, q))
 
     return _trace("potential_energy", robot, ("q",), ("energy", (), "J"), equations)
 
@@ -481,8 +488,8 @@ def _sum(*terms: Sequence[Scalar]) -> SX:
     return SX(vertcat(*(sum(entry, SX(0.0)) for entry in zip(*terms))))
 
 
-def _difference(a: Sequence[Scalar], b: Sequence[Scalar]) -> list[Scalar]:
-    return [x - y for x, y in zip(a, b)]
+def _difference(a: Sequence[Scalar], b: Sequence[Scalar], c: Sequence[Scalar]) -> list[Scalar]:
+    return [x - y - z for x, y, z in zip(a, b, c)]
 
 
 def _matrix(rows: Sequence[Sequence[Scalar]]) -> SX:

@@ -1,30 +1,53 @@
-"""Constraints of robots as JSON: an object with ``type``, ``name`` and the fields of the type.
+"""Constraints and springs of robots as JSON: an object with ``type``, ``name`` and the fields of the type.
 
-The type is the class name in lower case with underscores: ``revolute_closure``, ``rod``, ``coupling``.
+The type is the class name in lower case with underscores: ``revolute_closure``, ``rod``, ``line_spring``.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from dataclasses import fields
-from typing import cast
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, fields
+from typing import TypeVar, cast
 
 from armblocks.errors import RobotError
 from armblocks.formats.json_document import Node, closed_members
 from armblocks.robot.constraints import CONSTRAINT_TYPES, Attachment, Constraint
+from armblocks.robot.springs import SPRING_TYPES, Spring
 from armblocks.spatial import Transform
 
-CONSTRAINT_NAMES = {re.sub(r"(?<!^)(?=[A-Z])", "_", kind.__name__).lower(): kind for kind in CONSTRAINT_TYPES}
+
+def _file_name(kind: type) -> str:
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", kind.__name__).lower()
+
+
+CONSTRAINT_NAMES = {_file_name(kind): kind for kind in CONSTRAINT_TYPES}
 """The types of constraints by their names in files."""
+SPRING_NAMES = {_file_name(kind): kind for kind in SPRING_TYPES}
+"""The types of springs by their names in files."""
 
 
 def constraint_from_json(node: Node, transform_from_json: Callable[[Node], Transform]) -> Constraint:
     """The constraint that a JSON object describes."""
-    known = sorted({field.name for kind in CONSTRAINT_TYPES for field in fields(kind)})
-    kind = CONSTRAINT_NAMES[
-        closed_members(node, ("type", *known), ("type",))["type"].choice(CONSTRAINT_NAMES)
-    ]
+    return _part_from_json(node, transform_from_json, CONSTRAINT_NAMES, "constraint")
+
+
+def spring_from_json(node: Node, transform_from_json: Callable[[Node], Transform]) -> Spring:
+    """The spring that a JSON object describes."""
+    return _part_from_json(node, transform_from_json, SPRING_NAMES, "spring")
+
+
+_Part = TypeVar("_Part", bound=Constraint | Spring)
+
+
+def _part_from_json(
+    node: Node,
+    transform_from_json: Callable[[Node], Transform],
+    kinds: Mapping[str, type[_Part]],
+    subject: str,
+) -> _Part:
+    known = sorted({field.name for kind in kinds.values() for field in fields(kind)})
+    kind = kinds[closed_members(node, ("type", *known), ("type",))["type"].choice(kinds)]
     names = [field.name for field in fields(kind)]
     members = closed_members(node, ("type", *names), ("type", "name"))
     values: dict[str, object] = {}
@@ -41,12 +64,10 @@ def constraint_from_json(node: Node, transform_from_json: Callable[[Node], Trans
                 values[field.name] = member.number()
             case _:
                 values[field.name] = tuple(_term_from_json(entry) for entry in member.elements())
-    missing = [
-        name for name in ("first", "second", "length", "terms") if name in names and name not in values
-    ]
+    missing = [field.name for field in fields(kind) if field.default is MISSING and field.name not in values]
     if missing:
         raise node.error(
-            f"the constraint has no {missing[0]}", allowed=", ".join(names), fix=f"add '{missing[0]}'"
+            f"the {subject} has no {missing[0]}", allowed=", ".join(names), fix=f"add '{missing[0]}'"
         )
     try:
         return kind(**values)  # pyright: ignore[reportArgumentType] - by the fields of the type
@@ -54,14 +75,13 @@ def constraint_from_json(node: Node, transform_from_json: Callable[[Node], Trans
         raise node.error(error.what, allowed=error.allowed, fix=error.fix) from error
 
 
-def constraint_to_json(
-    constraint: Constraint, transform_to_json: Callable[[Transform], dict[str, object]]
+def part_to_json(
+    part: Constraint | Spring, transform_to_json: Callable[[Transform], dict[str, object]]
 ) -> dict[str, object]:
-    """The JSON object that describes a constraint."""
-    kind = next(name for name, kind in CONSTRAINT_NAMES.items() if kind is type(constraint))
-    entry: dict[str, object] = {"type": kind}
-    for field in fields(constraint):
-        value = getattr(constraint, field.name)
+    """The JSON object that describes a constraint or a spring."""
+    entry: dict[str, object] = {"type": _file_name(type(part))}
+    for field in fields(part):
+        value = getattr(part, field.name)
         if isinstance(value, Attachment):
             frame: dict[str, object] = {"link": value.link}
             if not value.pose.is_identity:
@@ -70,7 +90,7 @@ def constraint_to_json(
         elif isinstance(value, tuple):
             terms = cast("tuple[tuple[str, float], ...]", value)
             entry[field.name] = [{"joint": joint, "coefficient": factor} for joint, factor in terms]
-        elif field.name != "constant" or value != 0.0:
+        elif value != field.default:
             entry[field.name] = value
     return entry
 

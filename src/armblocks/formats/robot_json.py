@@ -20,7 +20,7 @@ import numpy as np
 
 from armblocks.errors import ArmblocksError, FormatError, RobotError, UnknownNameError, counted
 from armblocks.formats.canonical_json import canonical_bytes
-from armblocks.formats.constraint_json import constraint_from_json, constraint_to_json
+from armblocks.formats.constraint_json import constraint_from_json, part_to_json, spring_from_json
 from armblocks.formats.json_document import Node, closed_members, read_document
 from armblocks.formats.robot_facts import facts_from_json
 from armblocks.formats.shapes_json import shape_from_json, shape_to_json
@@ -58,6 +58,7 @@ _ROBOT_KEYS = (
     "links",
     "constraints",
     "frames",
+    "springs",
 )
 _MASS_KEYS = ("mass", "centre_of_mass", "inertia")
 _LINK_KEYS = ("name", "parent", "dh", "joint", "before", "after", "limits", *_MASS_KEYS, "motor", "geometry")
@@ -97,6 +98,10 @@ def robot_from_json(node: Node) -> Robot:
     frames = tuple(
         _frame_from_json(member) for member in (members["frames"].elements() if "frames" in members else ())
     )
+    springs = tuple(
+        spring_from_json(member, _transform_from_json)
+        for member in (members["springs"].elements() if "springs" in members else ())
+    )
     try:
         return Robot(
             name=texts["name"],
@@ -109,6 +114,7 @@ def robot_from_json(node: Node) -> Robot:
             friction_model=model,
             constraints=constraints,
             frames=frames,
+            springs=springs,
         )
     except (RobotError, UnknownNameError) as error:
         raise FormatError(
@@ -137,11 +143,11 @@ def robot_to_json(robot: Robot) -> dict[str, object]:
         if not getattr(robot, key).is_identity:
             document[key] = _transform_to_json(getattr(robot, key))
     if robot.constraints:
-        document["constraints"] = [
-            constraint_to_json(constraint, _transform_to_json) for constraint in robot.constraints
-        ]
+        document["constraints"] = [part_to_json(entry, _transform_to_json) for entry in robot.constraints]
     if robot.frames:
         document["frames"] = [_frame_to_json(frame) for frame in robot.frames]
+    if robot.springs:
+        document["springs"] = [part_to_json(spring, _transform_to_json) for spring in robot.springs]
     return {key: _without_signed_zeros(value) for key, value in document.items()}
 
 

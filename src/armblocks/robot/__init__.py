@@ -42,11 +42,13 @@ from armblocks.robot.plausibility import (
     warn_of_implausible_values,
 )
 from armblocks.robot.robot import Robot
+from armblocks.robot.springs import SPRING_TYPES, JointSpring, LineSpring, Spring
 from armblocks.robot.tips import deepest_tip, with_tip
 
 __all__ = [
     "CONSTRAINT_TYPES",
     "JOINT_TYPES",
+    "SPRING_TYPES",
     "Attachment",
     "Closure",
     "Constraint",
@@ -61,6 +63,8 @@ __all__ = [
     "InertiaFinding",
     "Joint",
     "JointLimits",
+    "JointSpring",
+    "LineSpring",
     "Link",
     "Motor",
     "NamedFrame",
@@ -78,6 +82,7 @@ __all__ = [
     "Screw",
     "Spherical",
     "SphericalClosure",
+    "Spring",
     "Universal",
     "UniversalClosure",
     "WeldClosure",

@@ -21,6 +21,7 @@ from armblocks.robot.friction_model import FrictionModel
 from armblocks.robot.joints import Coordinate, Joint, JointLimits
 from armblocks.robot.link import Link, Motor
 from armblocks.robot.named_frame import NamedFrame, check_frames
+from armblocks.robot.springs import Spring, check_springs
 from armblocks.spatial import Transform, Vector3, vector3
 
 STANDARD_GRAVITY: Vector3 = (0.0, 0.0, -9.81)
@@ -35,8 +36,8 @@ class Robot(metaclass=ArgumentErrors):
     of a falling body (toolbox files have the opposite sign); ``friction_model`` see :class:`FrictionModel`.
     ``constraints``: equations in addition to the joints of the tree, such as the closures of loops and the
     couplings of joints. ``frames``: named frames on the links, such as end effectors; each link's own frame
-    has the name of the link. The joint coordinates q (nq,) and speeds qd (nv,) are in the order of the moving
-    links. A joint has the name of its link.
+    has the name of the link. ``springs``: at joints and between two points. The joint coordinates q (nq,) and
+    speeds qd (nv,) are in the order of the moving links. A joint has the name of its link.
 
     Robots are values: two robots are equal and have the same hash if all their numbers and names are equal.
     ``source`` (the origin of the numbers) is not compared.
@@ -58,6 +59,7 @@ class Robot(metaclass=ArgumentErrors):
     friction_model: FrictionModel = FrictionModel.SQUARED_GEAR
     constraints: tuple[Constraint, ...] = ()
     frames: tuple[NamedFrame, ...] = ()
+    springs: tuple[Spring, ...] = ()
     source: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
@@ -76,6 +78,8 @@ class Robot(metaclass=ArgumentErrors):
         check_constraints(self.name, self.links, self.constraints)
         object.__setattr__(self, "frames", tuple(self.frames))
         check_frames(self.name, self.links, self.frames)
+        object.__setattr__(self, "springs", tuple(self.springs))
+        check_springs(self.name, self.links, self.springs)
         if self.couplings:
             _ = self.coordinate_map  # raises RobotError for couplings that contradict each other
 
@@ -117,7 +121,8 @@ class Robot(metaclass=ArgumentErrors):
             else link
             for link in self.links
         )
-        return replace(self, links=links, constraints=self.closures)
+        springs = tuple(spring.with_offsets(offsets) for spring in self.springs)
+        return replace(self, links=links, constraints=self.closures, springs=springs)
 
     @cached_property
     def coordinate_map(self) -> CoordinateMap:

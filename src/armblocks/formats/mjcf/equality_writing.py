@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 
 from armblocks.formats.robot_writing import Mimic, free_name, numbers, quoted
+from armblocks.formats.spring_writing import line_springs, warn_of_springs
 from armblocks.robot import (
     Attachment,
     Closure,
@@ -27,18 +28,21 @@ Sites = dict[str | None, list[str]]
 
 
 def equality_lines(
-    robot: Robot, mimics: Mapping[str, Mimic], names: Mapping[str | None, str], sites: Sites
+    robot: Robot,
+    mimics: Mapping[str, Mimic],
+    names: Mapping[str | None, str],
+    frames: dict[str, NamedFrame],
+    sites: Sites,
 ) -> list[str]:
-    """The elements of ``<equality>``; the sites that they refer to are added to ``sites``.
+    """The elements of ``<equality>``; the sites that they refer to are added to ``frames`` and ``sites``.
 
-    ``names``: the names of the links in the file.
+    ``names``: the names of the links in the file. ``frames``: the frames that are sites, by name.
     """
     lines: list[str] = []
     for follower, mimic in mimics.items():
         joints = f"joint1={quoted(names[follower], robot)} joint2={quoted(names[mimic.leader], robot)}"
         coefficients = numbers((mimic.offset, mimic.multiplier, 0.0, 0.0, 0.0))
         lines.append(f'    <joint {joints} polycoef="{coefficients}"/>')
-    frames = {frame.name: frame for frame in robot.frames}
     for closure in robot.closures:
         name = quoted(closure.name, robot)
         if isinstance(closure, WeldClosure):
@@ -59,6 +63,26 @@ def equality_lines(
             ]
             at = f"site1={quoted(ends[0], robot)} site2={quoted(ends[1], robot)}"
             lines.append(f"    <connect name={named} {at}/>")
+    return lines
+
+
+def tendon_lines(robot: Robot, frames: dict[str, NamedFrame], sites: Sites) -> list[str]:
+    """The springs between two points as the elements of ``<tendon>``, with their sites.
+
+    A tendon has no preload: its rest length is that without force. Warns of forces that MJCF does not have.
+    """
+    lines: list[str] = []
+    others: list[str] = []
+    for spring in line_springs(robot):
+        rest = spring.length - spring.preload / spring.stiffness if spring.stiffness else -1.0
+        if rest < 0.0:
+            others.append(spring.name)
+            continue
+        ends = [_site(robot, spring.name, end, frames, sites) for end in (spring.first, spring.second)]
+        points = "".join(f"<site site={quoted(end, robot)}/>" for end in ends)
+        values = f'stiffness="{spring.stiffness!r}" springlength="{rest!r}"'
+        lines.append(f"    <spatial name={quoted(spring.name, robot)} {values}>{points}</spatial>")
+    warn_of_springs(robot, others, "MJCF")
     return lines
 
 

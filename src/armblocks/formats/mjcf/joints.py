@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from armblocks.formats.file_findings import FileContext
-from armblocks.formats.mjcf.rules import FRICTION, LIMIT, STIFFNESS, TENDON
+from armblocks.formats.mjcf.rules import FRICTION, LIMIT, TENDON
 from armblocks.formats.mjcf.settings import Defaults, Settings, sections
+from armblocks.formats.mjcf.springs import GivenSpring, spring_of
 from armblocks.formats.xml_elements import Element, note, shortened
 from armblocks.robot import Free, Joint, JointLimits, Motor, Prismatic, Revolute, Spherical
 from armblocks.spatial import Vector3
@@ -23,15 +24,27 @@ _TRANSMISSIONS_OF_TENDONS = ("tendon", "cranksite", "slidersite")
 
 
 class PlacedJoint(NamedTuple):
-    """A joint, the ``position`` of its axis in the frame of its body (m), and its motor."""
+    """A joint, the ``position`` of its axis in the frame of its body (m), its motor and its spring."""
 
     joint: Joint
     position: Vector3
     motor: Motor | None
+    spring: GivenSpring | None
+
+
+class Actuation(NamedTuple):
+    """What actuators give a joint, at the joint: the largest torque, rotor inertia and damping (SI units).
+
+    ``torque``: N m or N, None if unknown.
+    """
+
+    torque: float | None = None
+    armature: float = 0.0
+    damping: float = 0.0
 
 
 def joint_of(
-    element: Element, settings: Settings, torques: Mapping[str, float], context: FileContext
+    element: Element, settings: Settings, actuation: Mapping[str, Actuation], context: FileContext
 ) -> PlacedJoint:
     """The joint of an element with its defaults. Raises ``FormatError`` for unknown types.
 
@@ -45,31 +58,33 @@ def joint_of(
             allowed=", ".join(_KINDS),
             fix="correct the type",
         )
-    if _first(element, "stiffness") != 0.0:
-        note(context, STIFFNESS, element, "the spring of the joint is left out")
-    if kind == "free":
-        return PlacedJoint(Free(), (0.0, 0.0, 0.0), _motor_of(element, context))
-    position = element.vector("pos", (0.0, 0.0, 0.0))
-    if kind == "ball":
+    unit = settings.angle_unit if kind == "hinge" else 1.0
+    spring = spring_of(element, kind, unit, context)
+    driven = actuation.get(element.attributes.get("name", "").strip(), Actuation())
+    if kind in ("ball", "free"):
+        if driven.armature or driven.damping:
+            what = f"armature and damping of the actuators of the {kind} joint are left out"
+            note(context, FRICTION, element, what)
+        motor = _motor_of(element, Actuation(), context)
+        if kind == "free":
+            return PlacedJoint(Free(), (0.0, 0.0, 0.0), motor, None)
         if _range(element, 1.0, settings, context) is not None:
             note(context, LIMIT, element, "the range of the ball joint is left out")
-        return PlacedJoint(Spherical(), position, _motor_of(element, context))
+        return PlacedJoint(Spherical(), element.vector("pos", (0.0, 0.0, 0.0)), motor, None)
+    position = element.vector("pos", (0.0, 0.0, 0.0))
     axis = element.vector("axis", (0.0, 0.0, 1.0))
     if not 1e-10 < math.hypot(*axis) < math.inf:
         raise element.error(
             "the axis of the joint is zero", allowed="a direction such as 0 0 1", fix="set the axis"
         )
-    unit = settings.angle_unit if kind == "hinge" else 1.0
-    limits = JointLimits(
-        position=_range(element, unit, settings, context),
-        torque=torques.get(element.attributes.get("name", ""), _force_limit(element, "actuatorfrcrange")),
-    )
+    torque = driven.torque if driven.torque is not None else _force_limit(element, "actuatorfrcrange")
+    limits = JointLimits(position=_range(element, unit, settings, context), torque=torque)
     joint = _KINDS[kind](axis=axis, offset=-unit * element.number("ref", 0.0), limits=limits)
-    return PlacedJoint(joint, position, _motor_of(element, context))
+    return PlacedJoint(joint, position, _motor_of(element, driven, context), spring)
 
 
 def _first(element: Element, attribute: str) -> float:
-    """The first number of an attribute (stiffness and damping may be polynomials); 0 if it is absent."""
+    """The first number of an attribute (damping may be a polynomial); 0 if it is absent."""
     return element.numbers(attribute, range(1, 9))[0] if attribute in element.attributes else 0.0
 
 
@@ -88,8 +103,8 @@ def _range(
     return low, high
 
 
-def _motor_of(element: Element, context: FileContext) -> Motor | None:
-    """The motor with the armature as rotor inertia, and with the friction of the joint."""
+def _motor_of(element: Element, driven: Actuation, context: FileContext) -> Motor | None:
+    """The motor with the armature as rotor inertia, and with the friction of the joint and its actuators."""
     damping, friction = _first(element, "damping"), element.number("frictionloss", 0.0)
     armature = element.number("armature", 0.0)
     if "damping" in element.attributes and any(element.numbers("damping", range(1, 9))[1:]):
@@ -99,6 +114,7 @@ def _motor_of(element: Element, context: FileContext) -> Motor | None:
         what = f"{text}: negative values are left out"
         note(context, FRICTION, element, what)
         damping, friction, armature = (max(value, 0.0) for value in (damping, friction, armature))
+    damping, armature = damping + driven.damping, armature + driven.armature
     if damping == friction == armature == 0.0:
         return None
     return Motor(
@@ -121,22 +137,36 @@ def actuated_joints(root: Element, defaults: Defaults) -> set[str]:
     return {element.attributes.get("joint", "").strip() for element in actuators} - {""}
 
 
-def torque_limits(root: Element, defaults: Defaults, context: FileContext) -> dict[str, float]:
-    """The largest torque (N m or N) of the actuators of each joint, by the joint's name.
+def actuation_of(root: Element, defaults: Defaults, context: FileContext) -> dict[str, Actuation]:
+    """What the actuators of each joint give it, by the joint's name.
 
-    It is the force range of the actuator, or the control range of a motor, times the magnitude of the gear.
+    The largest torque is the force range of an actuator, or the control range of a motor, times the magnitude
+    of the gear. Armature and damping are at the actuator: at the joint they are larger by the squared gear.
     """
-    limits: dict[str, float] = {}
+    found: dict[str, Actuation] = {}
     for element in sections(root, "actuator"):
         actuator = defaults.applied(element)
         if any(name in actuator.attributes for name in _TRANSMISSIONS_OF_TENDONS):
             note(context, TENDON, actuator, "the actuator does not act on a joint; it is left out")
             continue
-        joint = actuator.attributes.get("joint", "").strip()
+        names = [actuator.attributes.get(key, "").strip() for key in ("joint", "jointinparent")]
+        joint = names[0] or names[1]
         gear = actuator.numbers("gear", range(1, 7))[0] if "gear" in actuator.attributes else 1.0
         force = _force_limit(actuator, "forcerange", gear)
         if force is None and actuator.tag == "motor":
             force = _force_limit(actuator, "ctrlrange", gear)
-        if joint and force is not None:
-            limits[joint] = max(force, limits.get(joint, 0.0))
-    return limits
+        armature, damping = actuator.number("armature", 0.0), _first(actuator, "damping")
+        if "damping" in actuator.attributes and any(actuator.numbers("damping", range(1, 9))[1:]):
+            note(context, FRICTION, actuator, "damping of higher degree than the speed itself is left out")
+        if min(armature, damping) < 0.0:
+            what = f"damping {damping:g}, armature {armature:g}: negative values are left out"
+            note(context, FRICTION, actuator, what)
+        if joint:
+            others = found.get(joint, Actuation())
+            torques = [torque for torque in (force, others.torque) if torque is not None]
+            found[joint] = Actuation(
+                max(torques, default=None),
+                others.armature + gear * gear * max(armature, 0.0),
+                others.damping + gear * gear * max(damping, 0.0),
+            )
+    return found

@@ -18,12 +18,18 @@ from armblocks.formats.file_findings import FileContext
 from armblocks.formats.mjcf.equality import Parts, constraints_of
 from armblocks.formats.mjcf.includes import with_includes
 from armblocks.formats.mjcf.inertials import mass_properties
-from armblocks.formats.mjcf.joints import actuated_joints, joint_of, torque_limits
+from armblocks.formats.mjcf.joints import actuated_joints, actuation_of, joint_of
 from armblocks.formats.mjcf.meshes import MeshAssets
 from armblocks.formats.mjcf.poses import pose_of
-from armblocks.formats.mjcf.rules import NAME, STIFFNESS, TENDON, UNREAD
-from armblocks.formats.mjcf.settings import MAIN, Defaults, Settings, sections, settings_of
+from armblocks.formats.mjcf.rules import NAME, STIFFNESS, UNREAD
+from armblocks.formats.mjcf.settings import MAIN, Defaults, Settings, settings_of
 from armblocks.formats.mjcf.shapes import Geom, drawn, geom_of, is_collision_only, site_pose
+from armblocks.formats.mjcf.springs import (
+    GivenSpring,
+    initial_coordinates,
+    line_springs,
+    with_joint_springs,
+)
 from armblocks.formats.robot_writing import free_name
 from armblocks.formats.xml_elements import Element, note, read_elements, shortened
 from armblocks.robot import (
@@ -36,6 +42,7 @@ from armblocks.robot import (
     Motor,
     NamedFrame,
     Robot,
+    Spring,
     deepest_tip,
     with_tip,
 )
@@ -78,12 +85,14 @@ def read_mjcf(data: bytes, file: str, context: FileContext) -> Robot:
         constraints = model.constraints(links)
         if any(isinstance(constraint, Closure) for constraint in constraints):
             links = model.with_motors(links)
+        links, springs = model.with_springs(links)
         robot = Robot(
             name=name,
             links=tuple(links),
             gravity=_gravity(root),
             constraints=constraints,
             frames=model.frames(),
+            springs=springs,
         )
         return with_tip(robot, deepest_tip(links))
     except RobotError as error:
@@ -130,13 +139,14 @@ class _Model:
         self.settings: Settings = settings_of(root)
         self.defaults = Defaults(root)
         self.meshes = MeshAssets(root, self.defaults, self.settings, context)
-        self.torques = torque_limits(root, self.defaults, context)
+        self.actuation = actuation_of(root, self.defaults, context)
         self.body_names = {body.attributes.get("name", "").strip() for body in _bodies(root)}
         self.names: set[str] = set()
         self.read_bodies: set[str] = set()
         self.has_shapes = False
         self.sites: dict[str, Attachment] = {}
         self.joints: dict[str, str] = {}
+        self.given_springs: dict[str, GivenSpring] = {}
         self._note_left_out()
 
     def links(self) -> list[Link]:
@@ -180,7 +190,7 @@ class _Model:
         series: list[Link] = []
         parent, before, offset = place.parent, pose, transl(0.0, 0.0, 0.0)
         for index, (element, around) in enumerate(inside.joints):
-            placed = joint_of(element, self.settings, self.torques, self.context)
+            placed = joint_of(element, self.settings, self.actuation, self.context)
             at = transl(*around.apply(placed.position))
             joint = placed.joint
             if isinstance(joint, Free) and place.parent is not None:
@@ -194,6 +204,8 @@ class _Model:
             is_last = index == len(inside.joints) - 1
             link = name if is_last else self._free_name(element.attributes.get("name", ""), f"{name} joint")
             self.joints[element.attributes.get("name", "").strip()] = link
+            if placed.spring is not None:
+                self.given_springs[link] = placed.spring
             series.append(
                 Link(
                     name=link,
@@ -249,6 +261,17 @@ class _Model:
             ),
         )
         return constraints_of(self.root, self.defaults, parts, self.context)
+
+    def with_springs(self, links: list[Link]) -> tuple[list[Link], tuple[Spring, ...]]:
+        """The links with the damping of their springs, and the springs of joints and tendons."""
+        driven = {name: link for name, link in self.joints.items() if name in self.actuation}
+        damping = {link: self.actuation[name].damping for name, link in driven.items()}
+        links, springs = with_joint_springs(links, self.given_springs, damping)
+        rests = {link.name: initial_coordinates(link)[0] for link in links if link.joint.nv == 1}
+        rests |= {name: spring.rest for name, spring in self.given_springs.items()}
+        lines = line_springs(self.root, self.defaults, links, self.sites, rests, self.context)
+        used = {spring.name for spring in springs}
+        return links, (*springs, *(replace(line, name=free_name(line.name, used)) for line in lines))
 
     def with_motors(self, links: list[Link]) -> list[Link]:
         """The links of a model with closed loops: the joints of actuators have motors.
@@ -307,10 +330,6 @@ class _Model:
 
     def _note_left_out(self) -> None:
         """Findings for the parts of a model that a robot does not have."""
-        for tendon in sections(self.root, "tendon"):
-            element = self.defaults.applied(tendon)
-            if any(element.number(name, 0.0) for name in ("stiffness", "damping", "frictionloss")):
-                note(self.context, TENDON, tendon, "the forces of the tendon are left out")
         for body in _bodies(self.root):
             if body.number("gravcomp", 0.0):
                 note(self.context, STIFFNESS, body, "the gravity compensation of the body is left out")

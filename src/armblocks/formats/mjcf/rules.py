@@ -6,7 +6,7 @@ from armblocks.formats.file_findings import Rule
 
 STIFFNESS = Rule(
     code="mjcf-stiffness",
-    allowed="joints without springs, and no surrounding medium",
+    allowed="springs at hinges and slides, linear in the displacement, and no surrounding medium",
     remedy="add the forces to the joint torques",
 )
 EQUALITY = Rule(

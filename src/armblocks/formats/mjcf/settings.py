@@ -8,6 +8,13 @@ from dataclasses import dataclass, replace
 
 from armblocks.formats.xml_elements import Element, shortened
 
+ACTUATORS = frozenset(
+    (
+        *("general", "motor", "position", "velocity", "intvelocity", "damper", "cylinder", "muscle"),
+        *("adhesion", "plugin", "dcmotor"),
+    )
+)
+"""The elements of actuators. A default class has one set of attributes for all of them."""
 MAIN = "main"
 """The name of the outermost default class."""
 
@@ -102,7 +109,7 @@ class Defaults:
             own.setdefault(tag, {}).update(attributes)
         for child in element.children:
             if child.tag != "default":
-                own.setdefault(child.tag, {}).update(child.attributes)
+                own.setdefault(_default_tag(child.tag), {}).update(child.attributes)
         for child in element.all("default"):
             self._read(child, child.required("class", "the name of the default class"), own)
 
@@ -115,8 +122,13 @@ class Defaults:
                 allowed=", ".join(sorted(self._classes)[:20]),
                 fix="define it in <default>",
             )
-        attributes = {**self._classes[name].get(element.tag, {}), **element.attributes}
+        attributes = {**self._classes[name].get(_default_tag(element.tag), {}), **element.attributes}
         return replace(element, attributes=attributes)
+
+
+def _default_tag(tag: str) -> str:
+    """The element of a default class that has the attributes of elements with a tag."""
+    return "general" if tag in ACTUATORS else tag
 
 
 def sections(root: Element, tag: str) -> Iterator[Element]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from armblocks.errors import FormatError
 from armblocks.formats.file_findings import FileContext
-from armblocks.formats.mjcf.equality_writing import CLOSURES, add_site, equality_lines, placed
+from armblocks.formats.mjcf.equality_writing import CLOSURES, add_site, equality_lines, placed, tendon_lines
 from armblocks.formats.mjcf.reader import MAX_NAME, read_mjcf
 from armblocks.formats.robot_writing import (
     check_joint,
@@ -32,6 +32,7 @@ from armblocks.formats.robot_writing import (
     warn_of_order,
     warn_of_shapes,
 )
+from armblocks.formats.spring_writing import joint_springs, line_springs
 from armblocks.formats.xml_elements import MAX_DEPTH
 from armblocks.robot import Fixed, Free, Joint, Link, Prismatic, Revolute, Robot, Spherical
 from armblocks.robot.shapes import Box, Cylinder, Mesh, Shape, Sphere
@@ -66,10 +67,10 @@ def write_mjcf(robot: Robot) -> bytes:
 
     Raises ``FormatError`` for constraints and joint types that MJCF does not have, and for chains of bodies
     that exceed the maximum depth of XML files. A revolute closure becomes two coincident pairs of points.
-    Warns of data that MJCF does not have: gear ratios (rotor inertia and friction are written at the joint),
-    speed limits, the tip and the order of the coordinates of some trees, Coulomb friction that depends on the
-    direction, friction that accelerates, housings. MuJoCo does not accept moving bodies without mass or with
-    physically impossible inertias; they are written as they are.
+    Warns of data that MJCF does not have: line springs with a constant force, gear ratios (rotor inertia and
+    friction are written at the joint), speed limits, the tip and the order of the coordinates of some trees,
+    Coulomb friction that depends on the direction, friction that accelerates, housings. MuJoCo does not
+    accept moving bodies without mass or with physically impossible inertias; they are written as they are.
     """
     mimics = mimics_of(robot, "MJCF", CLOSURES)
     for link in robot.links:
@@ -81,7 +82,9 @@ def write_mjcf(robot: Robot) -> bytes:
     meshes: list[str] = []
     bodies, roots = _bodies(robot)
     sites = _sites(robot)
-    equality = equality_lines(robot, mimics, names, sites)
+    frames = {frame.name: frame for frame in robot.frames}
+    equality = equality_lines(robot, mimics, names, frames, sites)
+    tendons = tendon_lines(robot, frames, sites)
     lines = _nested(robot, bodies, roots, names, meshes, sites)
     head = [
         f"<mujoco model={quoted(robot.name or 'robot', robot)}>",
@@ -90,8 +93,9 @@ def write_mjcf(robot: Robot) -> bytes:
     ]
     if meshes:
         head += ["  <asset>", *(f"    {mesh}" for mesh in meshes), "  </asset>"]
-    tail = ["  <equality>", *equality, "  </equality>", "</mujoco>"] if equality else ["</mujoco>"]
-    text = "\n".join([*head, "  <worldbody>", *sites[None], *lines, "  </worldbody>", *tail])
+    tail = ["  <tendon>", *tendons, "  </tendon>"] if tendons else []
+    tail += ["  <equality>", *equality, "  </equality>"] if equality else []
+    text = "\n".join([*head, "  <worldbody>", *sites[None], *lines, "  </worldbody>", *tail, "</mujoco>"])
     data = f'<?xml version="1.0"?>\n{text}\n'.encode()
     tip = names[robot.links[-1].name] if robot.tool.is_identity else _tool_name(robot, names)
     warn_of_order(robot, tip, read_mjcf(data, "robot.xml", FileContext()), "MJCF")
@@ -194,6 +198,7 @@ def _only_carries_a_joint(robot: Robot, link: Link, children: Sequence[Link]) ->
         and link is not robot.links[-1]
         and all(frame.link != link.name for frame in robot.frames)
         and all(link.name not in closure.links for closure in robot.closures)
+        and all(link.name not in (spring.first.link, spring.second.link) for spring in line_springs(robot))
     )
 
 
@@ -271,6 +276,9 @@ def _joint(robot: Robot, link: Link, after: Transform, names: Mapping[str | None
     armature = link.motor.reflected_inertia if link.motor is not None else 0.0
     values = {"armature": armature, "damping": damping, "frictionloss": friction}
     words += [f'{key}="{value!r}"' for key, value in values.items() if value]
+    spring = joint_springs(robot).get(link.name)
+    if spring is not None:
+        words.append(f'stiffness="{spring.stiffness!r}" springref="{spring.rest!r}"')
     return " ".join(words) + "/>"
 
 

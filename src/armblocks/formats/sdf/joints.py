@@ -9,7 +9,7 @@ from armblocks.formats.sdf.frames import MODEL_FRAME, Frame, Frames
 from armblocks.formats.sdf.rules import AXIS, DAMPING, LIMIT, SPRING
 from armblocks.formats.sdf.values import flag_in, number_in, unbounded_number_in
 from armblocks.formats.xml_elements import Element, note
-from armblocks.robot import Joint, JointLimits, Motor, Prismatic, Revolute, Screw, Spherical
+from armblocks.robot import Joint, JointLimits, JointSpring, Motor, Prismatic, Revolute, Screw, Spherical
 from armblocks.spatial import Transform, Vector3
 
 AXES: dict[str, tuple[str, ...]] = {
@@ -146,7 +146,7 @@ def motor_of(joint: Frame, axis: Element | None, context: FileContext) -> Motor 
     """The motor that gives a joint the friction of ``<dynamics>``: ``tau = damping qd + friction sign(qd)``.
 
     Rotor and gear are those of Drake's elements ``drake:rotor_inertia`` and ``drake:gear_ratio``. Findings
-    name springs, which are not read.
+    name friction that accelerates.
     """
     if axis is None:
         return None
@@ -165,14 +165,26 @@ def motor_of(joint: Frame, axis: Element | None, context: FileContext) -> Motor 
     return Motor(inertia=rotor, gear_ratio=gear, viscous_friction=B, coulomb_friction=(Tc, -Tc))
 
 
+def spring_of(joint: Frame, tag: str, link: str, context: FileContext) -> JointSpring | None:
+    """The spring of an axis of a joint, at the joint of a link of the robot."""
+    axis = joint.element.first(tag)
+    dynamics = axis.first("dynamics") if axis is not None else None
+    if dynamics is None:
+        return None
+    stiffness = number_in(dynamics, "spring_stiffness", 0.0)
+    if stiffness < 0.0:
+        what = f"the spring with the stiffness {stiffness:g} is left out"
+        note(context, SPRING, dynamics, what, joint.element.label)
+    if stiffness <= 0.0:
+        return None
+    rest = number_in(dynamics, "spring_reference", 0.0)
+    return JointSpring(name=f"{link} spring", joint=link, stiffness=stiffness, rest=rest)
+
+
 def _friction(joint: Frame, dynamics: Element | None, context: FileContext) -> tuple[float, float]:
     """Damping and friction at the joint."""
     if dynamics is None:
         return 0.0, 0.0
-    stiffness = number_in(dynamics, "spring_stiffness", 0.0)
-    if stiffness:
-        what = f"the spring with the stiffness {stiffness:g} is not read"
-        note(context, SPRING, dynamics, what, joint.element.label)
     damping, friction = number_in(dynamics, "damping", 0.0), number_in(dynamics, "friction", 0.0)
     if damping < 0 or friction < 0:
         what = f"damping {damping:g} and friction {friction:g} would accelerate the joint; they are left out"

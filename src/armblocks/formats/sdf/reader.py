@@ -25,7 +25,7 @@ from armblocks.formats.robot_writing import free_name
 from armblocks.formats.sdf.constraints import Coordinate, closure_of, couplings_of
 from armblocks.formats.sdf.frames import WORLD, Frame, Frames, Scope
 from armblocks.formats.sdf.inertials import inertial_of
-from armblocks.formats.sdf.joints import AXES, GEARBOX, joint_type_of, joints_of
+from armblocks.formats.sdf.joints import AXES, GEARBOX, joint_type_of, joints_of, spring_of
 from armblocks.formats.sdf.models import Models, source_of
 from armblocks.formats.sdf.rules import FRAME, FREE_LINK, GRAVITY, UNKNOWN
 from armblocks.formats.sdf.shapes import shapes_of
@@ -145,6 +145,7 @@ def robot_of(model: Frame, world: Scope, context: FileContext) -> Robot:
                 )
                 coordinates.append(at)
     closures = tuple(closure_of(joint, (parent, child), model, frames) for joint, parent, child in closing)
+    springs = [spring_of(at.joint, at.tag, at.link, context) for at in coordinates]
     gearboxes = [joint for joint in joints if joint_type_of(joint) == GEARBOX]
     couplings = couplings_of(described, coordinates, gearboxes, frames)
     if not any(link.element.first("visual") or link.element.first("collision") for link in links):
@@ -159,6 +160,7 @@ def robot_of(model: Frame, world: Scope, context: FileContext) -> Robot:
             base=base,
             frames=named,
             constraints=(*closures, *couplings),
+            springs=tuple(spring for spring in springs if spring is not None),
         )
         robot = robot if gravity is None else replace(robot, gravity=gravity)
         return with_tip(robot, deepest_tip(described))

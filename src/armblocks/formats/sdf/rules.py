@@ -21,8 +21,8 @@ DAMPING = Rule(
 )
 SPRING = Rule(
     code="sdf-spring",
-    allowed="joints without springs",
-    remedy="add the torque of the spring in a diagram",
+    allowed="springs with a stiffness of zero or more",
+    remedy="correct the sign",
 )
 COUPLING = Rule(
     code="sdf-coupling",
@@ -31,7 +31,7 @@ COUPLING = Rule(
 )
 CLOSURE = Rule(
     code="sdf-closure",
-    allowed="joints that close a loop without limits and friction",
+    allowed="joints that close a loop without limits, friction and springs",
     remedy="close the loop at another joint: move this one up in the file",
 )
 NO_INERTIA = Rule(

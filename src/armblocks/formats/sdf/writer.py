@@ -35,6 +35,7 @@ from armblocks.formats.robot_writing import (
     warn_of_shapes,
 )
 from armblocks.formats.sdf.reader import read_sdf
+from armblocks.formats.spring_writing import joint_springs, line_springs, warn_of_springs
 from armblocks.robot import (
     Closure,
     Fixed,
@@ -112,6 +113,7 @@ def write_sdf(robot: Robot) -> bytes:
             at = quoted(names[frame.link], robot)
             lines.append(f"  <frame name={name} attached_to={at}>{_pose(frame.pose)}</frame>")
     lines.append("</model>")
+    warn_of_springs(robot, [spring.name for spring in line_springs(robot)], "SDF")
     if not np.allclose(robot.gravity, STANDARD_GRAVITY, rtol=1e-15, atol=0.0):
         gravity = f"  <gravity>{numbers(robot.gravity)}</gravity>"
         lines = ['<world name="world">', gravity, *(f"  {line}" for line in lines), "</world>"]
@@ -272,9 +274,14 @@ def _limit(link: Link) -> str:
 
 def _dynamics(robot: Robot, link: Link) -> str:
     damping, friction = joint_friction(robot, link, "SDF")
-    if not damping and not friction:
+    spring = joint_springs(robot).get(link.name)
+    if not damping and not friction and spring is None:
         return ""
-    return f"<dynamics><damping>{damping!r}</damping><friction>{friction!r}</friction></dynamics>"
+    inner = f"<damping>{damping!r}</damping><friction>{friction!r}</friction>"
+    if spring is not None:
+        inner += f"<spring_reference>{spring.rest!r}</spring_reference>"
+        inner += f"<spring_stiffness>{spring.stiffness!r}</spring_stiffness>"
+    return f"<dynamics>{inner}</dynamics>"
 
 
 def _pose(pose: Transform, frame: str = "", robot: Robot | None = None) -> str:

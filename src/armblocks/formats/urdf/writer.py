@@ -27,6 +27,7 @@ from armblocks.formats.robot_writing import (
     warn_of_order,
     warn_of_shapes,
 )
+from armblocks.formats.spring_writing import joint_springs, line_springs, warn_of_springs
 from armblocks.formats.urdf.joints import UNLIMITED
 from armblocks.formats.urdf.reader import read_urdf
 from armblocks.robot import Fixed, Free, Joint, Link, Planar, Prismatic, Revolute, Robot
@@ -47,8 +48,8 @@ def write_urdf(robot: Robot) -> bytes:
     """The URDF of a robot. Reading it gives the same kinematics and dynamics up to rounding.
 
     Raises ``FormatError`` for joint types and constraints that URDF does not have. Warns of data that URDF
-    does not have: another gravity, the tip and the order of the coordinates of some trees, Coulomb friction
-    that depends on the direction, friction that accelerates, meshes and housings.
+    does not have: another gravity, springs, the tip and the order of the coordinates of some trees, Coulomb
+    friction that depends on the direction, friction that accelerates, meshes and housings.
     """
     if not np.allclose(robot.gravity, STANDARD_GRAVITY, rtol=1e-15, atol=0.0):
         what = f"gravity {robot.gravity} is not part of a URDF file, which is read with -9.81 along z"
@@ -57,6 +58,8 @@ def write_urdf(robot: Robot) -> bytes:
         what = "named frames are not part of the URDF file; use fixed links for them"
         warn_of_loss(f"robot '{robot.name}'", what)
     warn_of_shapes(robot, (Box, Cylinder, Sphere), "URDF")
+    springs = [*joint_springs(robot), *(spring.name for spring in line_springs(robot))]
+    warn_of_springs(robot, springs, "URDF")
     mimics = mimics_of(robot, "URDF")
     names = {link.name for link in robot.links}
     root = free_name("base_link", names)

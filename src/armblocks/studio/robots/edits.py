@@ -142,7 +142,8 @@ def _rename(edit: RenameLink, robot: Robot) -> Robot:
     )
     constraints = tuple(constraint.with_renamed_link(old, name) for constraint in robot.constraints)
     frames = tuple(frame.with_renamed_link(old, name) for frame in robot.frames)
-    return replace(robot, links=links, constraints=constraints, frames=frames)
+    springs = tuple(spring.with_renamed_link(old, name) for spring in robot.springs)
+    return replace(robot, links=links, constraints=constraints, frames=frames, springs=springs)
 
 
 def _is_chain(robot: Robot) -> bool:
