@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         save_library,
         to_python,
     )
+    from armblocks.face.ikine_result import IkineResult
     from armblocks.face.linearizing import frequency_response, linearize
     from armblocks.face.model import CompiledDiagram, begin, compile_diagram, simulate
     from armblocks.face.payload import Payload
@@ -105,6 +106,7 @@ else:
             "Fixed": "armblocks.robot",
             "Free": "armblocks.robot",
             "FrictionModel": "armblocks.robot",
+            "IkineResult": "armblocks.face.ikine_result",
             "JointLimits": "armblocks.robot",
             "JointSpring": "armblocks.robot",
             "JointTrajectory": "armblocks.face.trajectory",
@@ -197,6 +199,7 @@ __all__ = [
     "Fixed",
     "Free",
     "FrictionModel",
+    "IkineResult",
     "JointLimits",
     "JointSpring",
     "JointTrajectory",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from armblocks.compiler.ir_text import Body, Module
 from armblocks.compiler.lane_memory import Line, load_rows, store_rows
 from armblocks.compiler.layout import BatchLayout, Layout
@@ -14,7 +16,7 @@ from armblocks.routines.memory import Integers, Reals
 from armblocks.routines.routine import Program, Routine, external
 from armblocks.routines.values import Boolean, Integer
 
-__all__ = ["BatchLayout", "Layout", "emit_batch", "emit_shares"]
+__all__ = ["BatchLayout", "Layout", "emit_batch", "emit_shares", "pointer_names"]
 
 
 def emit_batch(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name: str) -> None:
@@ -43,17 +45,18 @@ def emit_batch(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
             r.call(sample, k, columns, *arrays)
 
     program = Program()
-    program.define(batch, name, public=True, distinct=True, rest=_pointers(tape))
+    program.define(batch, name, public=True, distinct=True, rest=pointer_names(tape))
     add_program(module, program)
 
 
-def emit_shares(module: Module, tape: Tape, name: str) -> None:
-    """Add ``void @name.shares(ptr job, i64 hold, i64 patience, ptr in0, …, ptr out0, …)``: work sharing.
+def emit_shares(module: Module, arrays: Sequence[str], name: str) -> None:
+    """Add ``void @name.shares(ptr job, i64 hold, i64 patience, ptr …)``: work sharing.
 
-    Several threads call the function with one ``job`` of four i64: the next sample, the number of active
-    threads, the samples of a share, the samples of the batch. Each thread takes shares until none is left.
-    Then it spins: always ``hold`` iterations, and up to ``patience`` iterations while other threads are
-    active.
+    It calls ``void @name(i64 start, i64 stop, i64 samples, ptr …)``, which evaluates the samples ``start`` to
+    ``stop - 1``, with the pointers that ``arrays`` names. Several threads call the function with one ``job``
+    of four i64: the next sample, the number of active threads, the samples of a share, the samples of the
+    batch. Each thread takes shares until none is left. Then it spins: always ``hold`` iterations, and up to
+    ``patience`` iterations while other threads are active.
     """
     next_sample, active_threads = 0, 1  # indices in the job that threads modify
 
@@ -79,7 +82,7 @@ def emit_shares(module: Module, tape: Tape, name: str) -> None:
             iteration.value = passed + 1
 
     program = Program()
-    program.define(shares, f"{name}.shares", public=True, rest=_pointers(tape))
+    program.define(shares, f"{name}.shares", public=True, rest=arrays)
     add_program(module, program)
 
 
@@ -92,7 +95,8 @@ def _lanes(r: Routine, first: Integer, columns: Integer, *arrays: Reals) -> Bool
     raise NotImplementedError
 
 
-def _pointers(tape: Tape) -> list[str]:
+def pointer_names(tape: Tape) -> list[str]:
+    """Names of the pointers to the inputs and the outputs of a tape."""
     return [f"i{k}" for k in range(len(tape.input_sizes))] + [f"o{k}" for k in range(len(tape.outputs))]
 
 
@@ -120,7 +124,7 @@ def _add_block(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
         store_rows(body, base, size, first, columns)
 
     declared = [("i64", "%sample"), ("i64", "%columns")]
-    declared += [(f"ptr noalias{' readonly' if p[0] == 'i' else ''}", f"%{p}") for p in _pointers(tape)]
+    declared += [(f"ptr noalias{' readonly' if p[0] == 'i' else ''}", f"%{p}") for p in pointer_names(tape)]
     body = Body(module, lanes)
     if is_long(tape):
         undecided = emit_parts(body, tape, name, declared, stores, inputs_of, store)

@@ -31,16 +31,24 @@ Shares = Callable[..., None]
 """Function of :func:`~armblocks.compiler.batch.emit_shares`: job, hold, patience, addresses of the arrays."""
 
 
-def useful_threads(samples: int, threads: int) -> int:
-    """The number of threads for a batch: at most ``threads``, each with the minimum number of samples."""
-    return min(threads, max(1, samples // _MIN_SAMPLES_PER_THREAD))
+def useful_threads(samples: int, threads: int, minimum: int = _MIN_SAMPLES_PER_THREAD) -> int:
+    """The number of threads for a batch: at most ``threads``, each with the ``minimum`` number of samples."""
+    return min(threads, max(1, samples // minimum))
 
 
 def evaluate_in_threads(
-    shares: Shares, samples: int, addresses: Sequence[int], threads: int, code: object
+    shares: Shares,
+    samples: int,
+    addresses: Sequence[int],
+    threads: int,
+    code: object,
+    minimum: int = _MIN_SHARE,
 ) -> None:
-    """Evaluate all samples. ``code`` keeps the machine code alive until the last thread has left it."""
-    share = max(_MIN_SHARE, -(-samples // (threads * _SHARES_PER_THREAD)))
+    """Evaluate all samples, in shares of at least ``minimum`` samples.
+
+    ``code`` keeps the machine code alive until the last thread has left it.
+    """
+    share = max(minimum, -(-samples // (threads * _SHARES_PER_THREAD)))
     share += -share % 64  # whole cache lines
     job = (ctypes.c_int64 * 4)(0, 0, share, samples)
 

@@ -71,6 +71,11 @@ class Kernel:
         return self._make_tape()
 
     @property
+    def digest(self) -> str:
+        """The digest of the tape, which identifies the equations."""
+        return self._digest
+
+    @property
     def count(self) -> OperationCount:
         """The numbers of multiplications, additions, functions and other operations of one evaluation."""
         return self.tape.count
@@ -216,12 +221,12 @@ class Kernel:
             offer_batch(single, [kind == _ROWS for kind in inputs], address)
 
     def _write_batch(self, key: str) -> str:
-        from armblocks.compiler.batch import emit_batch, emit_shares
+        from armblocks.compiler.batch import emit_batch, emit_shares, pointer_names
         from armblocks.compiler.ir_text import Module
 
         module = Module()
         emit_batch(module, self.tape, BatchLayout.of(key), host_target().lanes, "batch")
-        emit_shares(module, self.tape, "batch")
+        emit_shares(module, pointer_names(self.tape), "batch")
         return module.text
 
     def __repr__(self) -> str:

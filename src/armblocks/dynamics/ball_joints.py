@@ -137,6 +137,11 @@ def normalised(robot: Robot, q: Sequence[Scalar]) -> list[Scalar]:
     return result
 
 
+def rotation_vector(quaternion: Sequence[Scalar]) -> Vector:
+    """The rotation vector (rad), of length at most π, of a quaternion w x y z of any length but zero."""
+    return scale(2.0, _logarithm(_four(quaternion)))
+
+
 def _motions(
     robot: Robot, q: Sequence[Scalar], qd: Sequence[Scalar] = ()
 ) -> Iterator[tuple[bool, Sequence[Scalar], Sequence[Scalar]]]:

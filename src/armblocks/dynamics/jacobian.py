@@ -36,7 +36,7 @@ def world_columns(tree: KinematicTree, q: Sequence[Scalar]) -> list[Column]:
     ground = constant_pose(tree.base)
     bodies = body_poses(tree, q, ground)
     tool = frame_pose(tree.tool, bodies, ground)
-    return _columns(tree, bodies, tool.p)
+    return columns_at(tree, bodies, tool.p)
 
 
 def tool_columns(tree: KinematicTree, q: SX) -> list[Column]:
@@ -72,8 +72,10 @@ def _rotated_back(pose: Pose, rotation: RotationZ | Rotation) -> Pose:
     return Pose(x, y, pose.z, pose.p)
 
 
-def _columns(tree: KinematicTree, bodies: Sequence[Pose], tip: Vector) -> list[Column]:
-    """The columns of the joints between base and tool; the columns of other joints are zero.
+def columns_at(tree: KinematicTree, bodies: Sequence[Pose], tip: Vector) -> list[Column]:
+    """The columns for the poses of all bodies and the position ``tip`` of the tool, in the world.
+
+    They are zero for joints that are not between base and tool.
 
     ``v = angular z x (tip - p) + linear z`` and ``w = angular z``. Source: Siciliano, Sciavicco, Villani,
     Oriolo, *Robotics*, 3.1.3.

@@ -41,6 +41,7 @@ from armblocks.dynamics.joint_wrenches import reaction_wrenches
 from armblocks.dynamics.kinematics import body_poses, constant_pose, frame_pose
 from armblocks.dynamics.loads import PAYLOAD_SLOT, WRENCH_SLOT, tip_loads, tip_wrench, with_payload
 from armblocks.dynamics.mechanism import Array
+from armblocks.dynamics.pose_error import trace_pose_error_in_tool, trace_pose_error_in_world
 from armblocks.dynamics.reduction import (
     in_independent_coordinates,
     reduced_columns,
@@ -399,7 +400,7 @@ def trace_normalised(robot: Robot) -> TracedFunction:
     return _trace("normalised", robot, ("q",), ("q", (robot.nq,), ""), equations, of_tree=False)
 
 
-FRAMED = ("fkine", "jacob0", "jacobe")
+FRAMED = ("fkine", "jacob0", "jacobe", "pose_error_in_world", "pose_error_in_tool")
 """The functions that take ``frame``, the name of a frame in the place of the tool."""
 ASSEMBLED = (
     *("rne", "rne_loaded", "gravload", "accel", "accel_loaded"),
@@ -411,6 +412,8 @@ TRACES: Mapping[str, Callable[..., TracedFunction]] = {
     "link_poses": trace_link_poses,
     "jacob0": trace_jacob0,
     "jacobe": trace_jacobe,
+    "pose_error_in_world": trace_pose_error_in_world,
+    "pose_error_in_tool": trace_pose_error_in_tool,
     "manipulability": trace_manipulability,
     "rne": trace_rne,
     "rne_loaded": trace_rne_loaded,

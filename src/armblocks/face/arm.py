@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +15,18 @@ from armblocks.argument_errors import ArgumentErrors
 from armblocks.compiler import Kernel, OperationCount, cached_kernel
 from armblocks.compiler.arguments import check_count, in_order
 from armblocks.errors import InputError, UnknownNameError, counted
+from armblocks.face.arm_functions import (
+    ConfigurationFunction,
+    DifferenceFunction,
+    DrivenStateFunction,
+    FrameFunction,
+    IntegrateFunction,
+    MotionFunction,
+    SpeedFunction,
+    StateFunction,
+)
 from armblocks.face.assembly import Assembly, assemble, coordinates
+from armblocks.face.ikine_result import IkineResult
 from armblocks.face.notebook_views import robot_view
 from armblocks.face.payload import Payload, payload_numbers
 from armblocks.robot import FrictionModel, Robot
@@ -24,84 +35,10 @@ from armblocks.robot.fields import check_kind
 
 if TYPE_CHECKING:
     from armblocks.equations import TracedFunction
+    from armblocks.face.ikine_search import ArmSearch
+    from armblocks.face.ikine_targets import Target
 
 Array = NDArray[np.float64]
-
-
-class ConfigurationFunction(Protocol):
-    """``f(q)``: ``q`` (nq,) or (N, nq); one result, or N of them stacked. ``out`` receives the result."""
-
-    def __call__(self, q: ArrayLike, *, out: Array | None = None, threads: int = 1) -> Array: ...
-
-
-class FrameFunction(Protocol):
-    """``f(q)`` of the tool, or of the frame with the name ``frame``."""
-
-    def __call__(
-        self, q: ArrayLike, *, frame: str | None = None, out: Array | None = None, threads: int = 1
-    ) -> Array: ...
-
-
-class SpeedFunction(Protocol):
-    """``f(qd)``: ``qd`` (n,) or (N, n)."""
-
-    def __call__(self, qd: ArrayLike, *, out: Array | None = None, threads: int = 1) -> Array: ...
-
-
-class StateFunction(Protocol):
-    """``f(q, qd)``: ``q`` (nq,) or (N, nq), ``qd`` (n,) or (N, n)."""
-
-    def __call__(
-        self, q: ArrayLike, qd: ArrayLike, *, out: Array | None = None, threads: int = 1
-    ) -> Array: ...
-
-
-class IntegrateFunction(Protocol):
-    """``f(q, qd, dt)``: ``q`` (nq,) or (N, nq), ``qd`` (n,) or (N, n), ``dt`` a number or (N,)."""
-
-    def __call__(
-        self, q: ArrayLike, qd: ArrayLike, dt: ArrayLike, *, out: Array | None = None, threads: int = 1
-    ) -> Array: ...
-
-
-class DifferenceFunction(Protocol):
-    """``f(q0, q1)``: each (nq,) or (N, nq)."""
-
-    def __call__(
-        self, q0: ArrayLike, q1: ArrayLike, *, out: Array | None = None, threads: int = 1
-    ) -> Array: ...
-
-
-class MotionFunction(Protocol):
-    """``f(q, qd, qdd)``, with an optional wrench (6,) or (N, 6) and payload."""
-
-    def __call__(
-        self,
-        q: ArrayLike,
-        qd: ArrayLike,
-        qdd: ArrayLike,
-        *,
-        wrench: ArrayLike | None = None,
-        payload: Payload | ArrayLike | None = None,
-        out: Array | None = None,
-        threads: int = 1,
-    ) -> Array: ...
-
-
-class DrivenStateFunction(Protocol):
-    """``f(q, qd, tau)``, with an optional wrench (6,) or (N, 6) and payload."""
-
-    def __call__(
-        self,
-        q: ArrayLike,
-        qd: ArrayLike,
-        tau: ArrayLike,
-        *,
-        wrench: ArrayLike | None = None,
-        payload: Payload | ArrayLike | None = None,
-        out: Array | None = None,
-        threads: int = 1,
-    ) -> Array: ...
 
 
 _NO_WRENCH = np.zeros(6)
@@ -138,6 +75,7 @@ class Arm(metaclass=ArgumentErrors):
         self.robot = robot
         self._near = None if near is None else coordinates(robot, "near", near, robot.nq)
         self._kernels: dict[str, Kernel] = {}
+        self._searches: dict[tuple[str | None, str], ArmSearch] = {}
 
     def __reduce__(self) -> tuple[type[Arm], tuple[object, ...]]:
         """Pickle and copy the robot alone; code is compiled again or loaded from the cache."""
@@ -254,6 +192,45 @@ class Arm(metaclass=ArgumentErrors):
         with the largest gap if no configuration near ``q`` satisfies all constraints.
         """
         return assemble(self.robot, q, qd, locked)
+
+    def ikine(
+        self,
+        T: Target,
+        q0: ArrayLike | None = None,
+        *,
+        mask: ArrayLike | None = None,
+        limits: bool = True,
+        frame: str | None = None,
+        axes: str = "tool",
+        tolerance: float = 1e-9,
+        restarts: int = 100,
+        seed: int = 0,
+        threads: int = 1,
+    ) -> IkineResult:
+        """Find coordinates q (nq,) with ``fkine(q) = T`` by iteration, for one pose or for N.
+
+        ``T``: the pose of the tool in the world, m: a :class:`Transform`, (4, 4), (N, 4, 4), a list of
+        Transforms, or an SE3 of spatialmath. ``q0`` (nq,) or (N, nq): the first start; the solution has
+        the whole turns nearest to it. Without ``q0`` and after a failure, the search starts from ``restarts``
+        configurations of a random table, in the order of the distance of their poses from the target.
+        ``seed`` selects the table. Results are the same for a pose alone and in any batch.
+
+        ``mask``: six numbers; 0 for a direction in which the pose may differ: x, y, z, then rotations about
+        x, y, z, in the ``axes`` of the ``"tool"`` at the target, or of the ``"world"``. An arm with fewer
+        than six joints and without a mask reaches only poses that it can reach exactly; the result of other
+        poses is the nearest one. ``limits``: whether solutions satisfy the limits of the joints. ``frame``:
+        as for ``fkine``. ``tolerance``: the largest error of a solution in m and in rad.
+
+        The result says why there is no solution: :class:`IkineResult`. Method: damped least squares, with
+        joints held at their limits (Chan and Lawrence 1988; Sugihara, IEEE T-RO 27, 2011). Raises InputError
+        for targets that are not poses, RobotError for robots with closed loops.
+        """
+        from armblocks.face.ikine import check_axes, checked_options, solve
+
+        where = f"ikine of robot '{self.name}'"
+        options = checked_options(mask, limits, tolerance, restarts, seed, where)
+        axes = check_axes(axes, where) if mask is not None or axes != "tool" else "world"
+        return solve(self._search(frame, axes), T, q0, options, threads)
 
     # ---- dynamics ----------------------------------------------------------------------------------------
     @cached_property
@@ -377,6 +354,19 @@ class Arm(metaclass=ArgumentErrors):
             kernel = cached_kernel(key, lambda: _traces()[method](self.robot, frame))
             self._kernels[name] = kernel
         return kernel
+
+    def _search(self, frame: str | None, axes: str) -> ArmSearch:
+        """The compiled inverse kinematics of the tool or of a frame. Raises UnknownNameError."""
+        search = self._searches.get((frame, axes))
+        if search is None:
+            from armblocks.face.ikine_search import ArmSearch
+
+            name = f"pose_error_in_{axes}"
+            error = self._kernel(name) if frame is None else self._kernel_at(name, frame)
+            fkine = self._kernel("fkine") if frame is None else self._kernel_at("fkine", frame)
+            search = ArmSearch(self.robot, error, fkine, self._kernel("integrate"))
+            self._searches[frame, axes] = search
+        return search
 
     def _loaded_method(self, method: str) -> Callable[..., Array]:
         """A function that calls the kernel of a method, or with a wrench or payload a second kernel.

@@ -6,7 +6,7 @@ and therefore the control flow are common to all lanes. A :class:`Mask` selects 
 
 from __future__ import annotations
 
-from armblocks.routines.memory import NumberArray
+from armblocks.routines.memory import NumberArray, Reals
 from armblocks.routines.tree import Kind, Operation
 from armblocks.routines.values import Boolean, Condition, Number
 
@@ -35,3 +35,8 @@ class LaneArray(NumberArray[Lanes]):
 
     __slots__ = ()
     element, number = Kind.LANES, Lanes
+
+    @property
+    def reals(self) -> Reals:
+        """The same memory as single doubles: the number of lane ``k`` of row ``i`` is ``i lanes + k``."""
+        return self.start.reals

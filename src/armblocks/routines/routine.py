@@ -230,6 +230,14 @@ class Routine(Writer):
         """Memory for contiguous integers during the function call."""
         return Integers(self, Local(Kind.INTEGER, count))
 
+    def local_lanes(self, count: int) -> LaneArray:
+        """Memory for rows of lanes during the function call."""
+        return LaneArray(self, Local(Kind.LANES, count))
+
+    def local_reals(self, count: int) -> Reals:
+        """Memory for contiguous doubles during the function call."""
+        return Reals(self, Local(Kind.REAL, count))
+
     def constant(self, value: float) -> Real:
         """A constant double, for functions that do not accept a Python number."""
         return Real(self, real_operand(value))

@@ -1,0 +1,122 @@
+"""Targets and starts of inverse kinematics: conversion and checks of the arguments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.errors import InputError
+from armblocks.spatial import Transform
+from armblocks.spatial.transform import ORTHONORMALITY
+
+Array = NDArray[np.float64]
+Target = Transform | ArrayLike | Sequence[Transform]
+"""One pose or several: a Transform, a (4, 4) or (N, 4, 4) array, a list of them, or an SE3 of spatialmath."""
+
+_ALLOWED = "a Transform, shape (4, 4), or (N, 4, 4) or a list of Transforms for N poses"
+
+
+def target_array(T: Target, where: str) -> tuple[Array, bool]:
+    """The targets as a C-contiguous array (N, 4, 4), and whether there is a batch.
+
+    Raises InputError for other shapes and types.
+    """
+    if type(T) is np.ndarray and T.dtype == np.float64 and T.flags.c_contiguous and T.shape[-2:] == (4, 4):
+        if T.ndim == 2:
+            return T, False
+        if T.ndim == 3:
+            return T, True
+    value: Any = T
+    if isinstance(value, Transform):
+        return value.matrix, False
+    if hasattr(value, "A") and not isinstance(value, np.ndarray):  # SE3 of spatialmath: one pose or a list
+        value = np.array(value.A)
+    elif (
+        isinstance(value, list | tuple)
+        and value
+        and all(isinstance(x, Transform) for x in cast("Sequence[object]", value))
+    ):
+        value = np.stack([x.matrix for x in cast("Sequence[Transform]", value)])
+    array: NDArray[Any]
+    try:
+        array = np.asarray(cast("ArrayLike", value))
+    except (ValueError, TypeError):
+        array = np.empty(0, dtype=object)
+    if array.dtype.kind not in "fiu":
+        raise InputError(
+            f"a target pose is not an array of real numbers but {type(T).__name__}",
+            where=where,
+            allowed=_ALLOWED,
+            fix="give the pose as a homogeneous matrix, for example arm.fkine(q)",
+        )
+    if array.shape[-2:] != (4, 4) or array.ndim > 3:
+        raise InputError(
+            f"the target poses have the shape {array.shape}",
+            where=where,
+            allowed=_ALLOWED,
+            fix="give homogeneous matrices [R p; 0 0 0 1]",
+        )
+    return np.ascontiguousarray(array, dtype=np.float64), array.ndim == 3
+
+
+def raise_invalid_target(T: Array, index: int | None, where: str) -> None:
+    """Raise an InputError that says why the matrix ``T`` (4, 4) is not a pose."""
+    name = "the target" if index is None else f"target {index}"
+    allowed, fix = "a homogeneous matrix [R p; 0 0 0 1]", "give the pose of a frame in the world"
+    if not np.isfinite(T).all():
+        what = f"{name} is not finite"
+    elif not np.array_equal(T[3], (0.0, 0.0, 0.0, 1.0)):
+        what = f"the last row of {name} is {T[3].tolist()}"
+    elif np.linalg.det(T[:3, :3]) <= 0.0:
+        what, allowed = f"the rotation of {name} is not a rotation but a reflection", "determinant +1"
+        fix = "check the signs of the axes"
+    else:
+        error = float(np.abs(T[:3, :3].T @ T[:3, :3] - np.eye(3)).max())
+        what = f"the rotation of {name} is not orthonormal: R'R differs from the identity by {error:.3g}"
+        allowed = f"at most {ORTHONORMALITY:g}"
+        fix = "give the matrix with more digits, or build it from angles with trotx, troty, trotz"
+    raise InputError(what, where=where, allowed=allowed, fix=fix)
+
+
+def start_array(q0: ArrayLike | None, nq: int, count: int | None, where: str) -> Array | None:
+    """The starts (N, nq), C-contiguous; ``count`` is N, or None for one target. Raises InputError."""
+    if q0 is None:
+        return None
+    rows = 1 if count is None else count
+    try:
+        array = np.asarray(q0, dtype=np.float64)
+    except (ValueError, TypeError):
+        array = np.full(nq, np.nan)
+    if array.shape == (nq,) and np.isfinite(array).all():
+        return np.ascontiguousarray(np.broadcast_to(array, (rows, nq)))
+    if count is not None and array.shape == (rows, nq) and np.isfinite(array).all():
+        return np.ascontiguousarray(array)
+    allowed = f"finite numbers of the shape ({nq},)" + (f" or ({rows}, {nq})" if count is not None else "")
+    shapes: list[tuple[int, ...]] = [(nq,), (rows, nq)][: 1 if count is None else 2]
+    raise InputError(
+        "q0 is not finite" if array.shape in shapes else f"q0 has the shape {array.shape}",
+        where=where,
+        allowed=allowed,
+        fix="give the coordinates of one configuration, or of one for each target",
+    )
+
+
+def mask_array(mask: Sequence[float] | ArrayLike | None, where: str) -> tuple[float, ...]:
+    """Six ones and zeros: the components of the error that count. Raises InputError for other values."""
+    if mask is None:
+        return (1.0,) * 6
+    try:
+        values = np.asarray(mask, dtype=np.float64)
+    except (ValueError, TypeError):
+        values = np.empty(0)
+    if values.shape != (6,) or not np.isin(values, (0.0, 1.0)).all() or not values.any():
+        raise InputError(
+            f"mask={mask!r}",
+            where=where,
+            allowed="six numbers 0 or 1, at least one of them 1: x, y, z, then rotations about x, y, z",
+            fix="write 0 for each direction in which the pose may differ, as in mask=[1, 1, 1, 1, 1, 0]",
+        )
+    return tuple(values.tolist())
