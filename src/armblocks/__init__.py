@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         to_python,
     )
     from armblocks.face.ikine_result import IkineResult
+    from armblocks.face.least_time import least_time
     from armblocks.face.linearizing import frequency_response, linearize
     from armblocks.face.model import CompiledDiagram, begin, compile_diagram, simulate
     from armblocks.face.payload import Payload
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
     from armblocks.face.toolbox_trajectories import ctraj, jtraj, lspb, mstraj, mtraj, tpoly
     from armblocks.face.trajectory import JointTrajectory
     from armblocks.face.trajectory_file import load_trajectory
+    from armblocks.face.trajectory_report import BindingInterval, TrajectoryReport, trajectory_report
     from armblocks.face.trimming import trim
     from armblocks.formats import load_table
     from armblocks.robot import (
@@ -94,6 +96,7 @@ else:
             "Arm": "armblocks.face.arm",
             "Assembly": "armblocks.face.assembly",
             "Attachment": "armblocks.robot",
+            "BindingInterval": "armblocks.face.trajectory_report",
             "CompiledDiagram": "armblocks.face.model",
             "Coupling": "armblocks.robot",
             "Cylindrical": "armblocks.robot",
@@ -133,6 +136,7 @@ else:
             "SimulationResult": "armblocks.simulation",
             "Spherical": "armblocks.robot",
             "SphericalClosure": "armblocks.robot",
+            "TrajectoryReport": "armblocks.face.trajectory_report",
             "Transform": "armblocks.spatial",
             "Universal": "armblocks.robot",
             "UniversalClosure": "armblocks.robot",
@@ -148,6 +152,7 @@ else:
             "formula": "armblocks.diagram",
             "frequency_response": "armblocks.face.linearizing",
             "jtraj": "armblocks.face.toolbox_trajectories",
+            "least_time": "armblocks.face.least_time",
             "linearize": "armblocks.face.linearizing",
             "list_blocks": "armblocks.face.diagrams",
             "list_examples": "armblocks.face.diagrams",
@@ -174,6 +179,7 @@ else:
             "standard_dh": "armblocks.robot",
             "to_python": "armblocks.face.diagrams",
             "tpoly": "armblocks.face.toolbox_trajectories",
+            "trajectory_report": "armblocks.face.trajectory_report",
             "trim": "armblocks.face.trimming",
             "with_comments": "armblocks.diagram",
             "with_parameter_set": "armblocks.diagram",
@@ -187,6 +193,7 @@ __all__ = [
     "Arm",
     "Assembly",
     "Attachment",
+    "BindingInterval",
     "CompiledDiagram",
     "Coupling",
     "Cylindrical",
@@ -226,6 +233,7 @@ __all__ = [
     "SimulationResult",
     "Spherical",
     "SphericalClosure",
+    "TrajectoryReport",
     "Transform",
     "Universal",
     "UniversalClosure",
@@ -241,6 +249,7 @@ __all__ = [
     "formula",
     "frequency_response",
     "jtraj",
+    "least_time",
     "linearize",
     "list_blocks",
     "list_examples",
@@ -267,6 +276,7 @@ __all__ = [
     "standard_dh",
     "to_python",
     "tpoly",
+    "trajectory_report",
     "trim",
     "with_comments",
     "with_parameter_set",

@@ -59,6 +59,7 @@ def examples() -> Mapping[str, Any]:
     robot, compiled = arm.robot, ab.CompiledDiagram(diagram)
     result = ab.simulate(compiled, stop_time=1.0)
     system = ab.linearize(diagram, "gain.gain", "integrator", at=0.5)
+    report = ab.trajectory_report(arm, ab.jtraj([0, 0], [1, 1], 5), speed=1.0)
     values = [
         *(arm, robot, robot.links[0], ab.Motor(inertia=1.0), ab.Revolute(), ab.Prismatic(), ab.Fixed()),
         *(
@@ -81,6 +82,7 @@ def examples() -> Mapping[str, Any]:
         *(ab.Cylindrical(), ab.Universal(), ab.Planar(), ab.Spherical(), ab.Free(), ab.Screw(pitch=0.1)),
         *(ab.FrictionModel.RELEASE_6, ab.JointLimits(speed=1.0), ab.standard_dh("one", a=1.0).dh),
         *(ab.Payload(mass=2.0), ab.Transform(), ab.jtraj([0, 0], [1, 1], 5)),
+        *(report, report.binding[0]),
         *(diagram, small_builder(), compiled, ab.SimulationOptions(step=0.1), ab.formula("2*k")),
         *(result, result.final_state, system, system.point, system.margins(), system.transfer_function()),
         ab.diagram_difference(diagram, ab.load_diagram("kr180model")),

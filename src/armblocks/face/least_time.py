@@ -1,0 +1,279 @@
+"""The fastest motion of an arm along a path under limits of speed, acceleration and torque."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.errors import InputError, RobotError, counted
+from armblocks.face.arm import Arm
+from armblocks.face.payload import Payload
+from armblocks.face.trajectory import JointTrajectory, sampled
+from armblocks.face.trajectory_arguments import joint_limits, positive, via_points
+from armblocks.planning.least_time import EXCESS, Limits, segment_times, solve
+from armblocks.trajectories import Motion, PiecewisePolynomial
+from armblocks.trajectories.paths import blended_path, spline_path, turning_points
+from armblocks.trajectories.piecewise import hermite
+
+Array = NDArray[np.float64]
+
+_FASTEST = 1e12
+"""Squared path speed where no joint speed is limited."""
+_ACCEPTED = 1e-3
+"""Greatest excess over a limit, relative to the limit, without an error."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionLimits:
+    """Greatest magnitudes (n,) of speeds, accelerations and torques; infinite where there is no limit."""
+
+    speed: Array
+    acceleration: Array
+    torque: Array
+
+
+def least_time(
+    arm: Arm,
+    points: ArrayLike,
+    *,
+    speed: ArrayLike | None = None,
+    acceleration: ArrayLike | None = None,
+    torque: ArrayLike | None = None,
+    payload: Payload | float | None = None,
+    blend: float | None = None,
+    grid: int = 200,
+    dt: float = 0.01,
+) -> JointTrajectory:
+    """The fastest motion of ``arm`` from rest to rest along the path through ``points`` (K, n).
+
+    The path is the cubic spline through the points; with ``blend``, straight lines in joint space with
+    parabolas at the inner points, which replace this part (0 to 0.5) of the shorter adjacent line. ``speed``,
+    ``acceleration``, ``torque``: greatest magnitudes, numbers or (n,), in rad or m, s, N m or N. By default
+    speeds and torques have the limits of the robot, and accelerations have none. ``payload``: a
+    :class:`Payload`, or a mass (kg) at the tool. ``grid``: least number of segments of the path; ``dt``: time
+    between samples, s.
+
+    Torques are those of ``arm.rne``: rigid bodies, payload, rotor inertia, gravity, viscous and Coulomb
+    friction of the motion. Source: Pham and Pham, A new approach to time-optimal path parameterization based
+    on reachability analysis, IEEE Trans. Robotics 2018; viscous friction and the limits between grid points
+    are added by iteration. The acceleration jumps at each segment of the grid. Of separate speed intervals at
+    a point, which strong viscous friction can cause, only the slowest one is used.
+
+    Raises InputError where a point of the path cannot be passed, with the joint whose torque does not
+    suffice, and for paths without a limit; RobotError for robots with ball joints or closed loops.
+    """
+    where = "least_time"
+    robot = arm.robot
+    check_joint_space(arm, where)
+    via = via_points("points", points, where)
+    if via.shape[1] != arm.n:
+        raise InputError(
+            f"the points have {counted(via.shape[1], 'joint')}",
+            where=where,
+            allowed=f"{arm.n}, as the robot '{robot.name}'",
+            fix="give one number for each joint",
+        )
+    limits = motion_limits(arm, where, speed, acceleration, torque)
+    step = positive("dt", dt, "s", where)
+    if type(grid) is not int or grid < 10:
+        raise InputError(
+            f"grid = {grid!r}",
+            where=where,
+            allowed="an integer of 10 or more: the least number of segments",
+            fix="leave out grid for 200 segments",
+        )
+    path = _path(via, limits, blend)
+    return sampled(fastest_motion(arm, path, limits, payload, _grid(arm, path, grid)), step)
+
+
+def check_joint_space(arm: Arm, where: str) -> None:
+    """Raise RobotError for robots whose coordinates cannot be moved independently along a path."""
+    if arm.nq != arm.nv or arm.robot.closures:
+        kind = "closed loops" if arm.robot.closures else "ball joints"
+        raise RobotError(
+            f"the robot has {kind}",
+            where=f"{where}, robot '{arm.name}'",
+            allowed="robots whose joint coordinates are independent numbers",
+            fix="use a robot without them, such as the tree of its links",
+        )
+
+
+def motion_limits(
+    arm: Arm,
+    where: str,
+    speed: ArrayLike | None = None,
+    acceleration: ArrayLike | None = None,
+    torque: ArrayLike | None = None,
+) -> MotionLimits:
+    """The limits of a motion, by default those of the robot."""
+
+    def given(name: str, value: ArrayLike | None, default: Array) -> Array:
+        return default if value is None else joint_limits(name, value, arm.n, where, infinite=True)
+
+    return MotionLimits(
+        speed=given("speed", speed, arm.robot.speed_limits),
+        acceleration=given("acceleration", acceleration, np.full(arm.n, np.inf)),
+        torque=given("torque", torque, arm.robot.torque_limits),
+    )
+
+
+def fastest_motion(
+    arm: Arm, path: PiecewisePolynomial, limits: MotionLimits, payload: Payload | float | None, s: Array
+) -> PiecewisePolynomial:
+    """The fastest motion along a path ``q(s)`` with the grid ``s`` (N + 1,), which contains its knots."""
+    points = _points(path, s)
+    solution = solve(_problem(arm, points, limits, payload, np.diff(s)))
+    if solution.failed is not None:
+        _raise_impassable(arm, path, limits, payload, s, solution.failed)
+    if solution.excess > _ACCEPTED:
+        raise InputError(
+            f"a limit is exceeded by {solution.excess:.2g} of its value between points of the grid",
+            where="least_time",
+            allowed=f"{EXCESS:g} after {solution.iterations} iterations",
+            fix="use a finer grid, or points that are farther apart",
+        )
+    return _motion(points, np.diff(s), solution.x)
+
+
+def _path(points: Array, limits: MotionLimits, blend: float | None) -> PiecewisePolynomial:
+    """The path through the points; joints are scaled by their speed limits, or by their ranges of motion."""
+    same = np.flatnonzero((np.diff(points, axis=0) == 0.0).all(axis=1))
+    if same.size:
+        raise InputError(
+            f"the points {same[0] + 1} and {same[0] + 2} are the same",
+            where="least_time",
+            allowed="points that differ from the one before",
+            fix="remove one of them",
+        )
+    scale = np.where(np.isfinite(limits.speed), limits.speed, 1.0)
+    if blend is None or len(points) == 2:
+        return spline_path(points, scale)
+    if not 0.0 < blend <= 0.5:
+        raise InputError(
+            f"blend = {blend!r}",
+            where="least_time",
+            allowed="a number above 0 and up to 0.5: the part of a line that a blend replaces",
+            fix="leave out blend for a path through the points",
+        )
+    return blended_path(points, scale, blend)
+
+
+def _grid(arm: Arm, path: PiecewisePolynomial, count: int) -> Array:
+    """At least ``count`` segments of the path, with points at its knots and where Coulomb friction jumps."""
+    slow = np.full(arm.n, 1e-9)
+    dry = np.abs(arm.friction(slow)) + np.abs(arm.friction(-slow)) > 1e-6
+    knots = path.times
+    if dry.any():
+        knots = np.unique(np.append(knots, turning_points(path, dry)))
+    grid: list[Array] = [knots[:1]]
+    for begin, end in pairwise(knots):
+        parts = max(math.ceil(count * (end - begin) / (knots[-1] - knots[0])), 4)
+        grid.append(np.linspace(float(begin), float(end), parts + 1)[1:])
+    return np.concatenate(grid)
+
+
+def _points(path: PiecewisePolynomial, s: Array) -> tuple[Motion[Array], Motion[Array], Motion[Array]]:
+    """The path and its derivatives (N, n) at the start, the middle and the end of each segment."""
+    middle = (s[:-1] + s[1:]) / 2.0
+    N = len(middle)
+    every = path.at(np.concatenate([s, middle]))
+    start, mid = (Motion(*(part[rows] for part in every)) for rows in (slice(0, N), slice(N + 1, None)))
+    # The curvature may jump at the knots.
+    end = [part[1 : N + 1].copy() for part in every]
+    knots = np.flatnonzero(np.isin(s[1:], path.times))
+    for part, at_knots in zip(end, path.at(s[1:][knots], side="left")):
+        part[knots] = at_knots
+    return start, mid, Motion(*end)
+
+
+def _problem(
+    arm: Arm,
+    points: tuple[Motion[Array], ...],
+    limits: MotionLimits,
+    payload: Payload | float | None,
+    lengths: Array,
+) -> Limits:
+    """The linear constraints at the start, the middle and the end of each segment of the grid."""
+    N = len(lengths)
+    q, first, second = (np.concatenate(parts) for parts in zip(*points))
+    zero = np.zeros_like(q)
+    bounds = np.concatenate([limits.torque, limits.acceleration])
+    rows = np.isfinite(bounds)
+    a = b = c = d = zero
+    if np.isfinite(limits.torque).any():
+        qd, qdd = np.concatenate([zero, zero, first]), np.concatenate([zero, first, second])
+        gravity, a, b = np.split(_torque(arm, np.tile(q, (3, 1)), qd, qdd, payload), 3)
+        # Friction is the sum of a part that is proportional to the speed and a part that depends on its sign.
+        # A joint that turns at a grid point has the direction of the segment.
+        still = np.abs(first) <= 1e-12 * np.abs(first).max()
+        direction = np.where(still, np.tile(points[1].qd, (3, 1)), first)
+        once, twice, one, two = np.split(
+            arm.friction(np.concatenate([first, 2.0 * first, direction, 2.0 * direction])), 4
+        )
+        a, b, c, d = a - gravity, b - gravity - once, gravity + 2.0 * one - two, twice - once
+    columns = {"a": (a, first), "b": (b, second), "c": (c, zero), "d": (d, zero)}
+    values = {
+        name: np.ascontiguousarray(np.hstack(parts)[:, rows].T.reshape(-1, 3, N).swapaxes(0, 1))
+        for name, parts in columns.items()
+    }
+    with np.errstate(divide="ignore"):
+        squared = (np.abs(first / limits.speed).T.max(axis=0) ** -2.0).reshape(3, N)
+    ends = np.minimum(np.append(squared[0], np.inf), np.append(np.inf, squared[2]))
+    if not rows.any() and not np.isfinite(squared).all():
+        raise InputError(
+            f"nothing limits the motion of the robot '{arm.name}'",
+            where="least_time",
+            allowed="limits of the speeds, accelerations or torques of the joints that move",
+            fix="give speed=, acceleration= or torque=, or limits in the robot's file",
+        )
+    fastest, fastest_middle = np.minimum(ends, _FASTEST), np.minimum(squared[1], _FASTEST)
+    return Limits(
+        lengths=lengths, fastest=fastest, fastest_middle=fastest_middle, bound=bounds[rows, None], **values
+    )
+
+
+def _torque(arm: Arm, q: Array, qd: Array, qdd: Array, payload: Payload | float | None) -> Array:
+    return arm.rne(q, qd, qdd) if payload is None else arm.rne(q, qd, qdd, payload=payload)
+
+
+def _motion(points: tuple[Motion[Array], ...], lengths: Array, x: Array) -> PiecewisePolynomial:
+    """The motion over time; each segment is the quintic with the exact rates at both of its ends."""
+    times = np.append(0.0, np.cumsum(segment_times(x, lengths)))
+    u = (np.diff(x) / (2.0 * lengths))[:, None]
+    start, end = (
+        (p.q, p.qd * np.sqrt(squared)[:, None], p.qd * u + p.qdd * squared[:, None])
+        for p, squared in ((points[0], x[:-1]), (points[2], x[1:]))
+    )
+    last = np.array([part[-1] for part in end])
+    last[1] = 0.0
+    return hermite(times, start, end, end=last)
+
+
+def _raise_impassable(
+    arm: Arm,
+    path: PiecewisePolynomial,
+    limits: MotionLimits,
+    payload: Payload | float | None,
+    s: Array,
+    index: int,
+) -> None:
+    """Raise InputError for a grid point that admits no speed, with the torques that hold the arm there."""
+    q = path.at(s[index]).q
+    zero = np.zeros_like(q)
+    holding = _torque(arm, q, zero, zero, payload)
+    friction = np.abs(arm.friction(path.at(s[index]).qd * 1e-9))
+    missing = (np.abs(holding) + friction) / limits.torque
+    k = int(np.argmax(missing))
+    name = arm.robot.joint_names[k] if len(arm.robot.joint_names) == arm.n else f"joint {k + 1}"
+    share = (s[index] - s[0]) / (s[-1] - s[0])
+    raise InputError(
+        f"the path cannot be passed at {100 * share:.0f} % of its length: there joint '{name}' needs "
+        f"{abs(holding[k]):.4g} to hold the arm and {friction[k]:.4g} against friction",
+        where="least_time",
+        allowed=f"torques (N m, N) up to {limits.torque[k]:.4g}",
+        fix="raise the torque limit, reduce the payload, or move the path",
+    )

@@ -1,0 +1,1 @@
+"""Motions along a given path in the least time."""

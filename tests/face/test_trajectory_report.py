@@ -1,0 +1,61 @@
+"""Reports of trajectories: peaks, shares of limits, intervals of binding limits, the figure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armblocks as ab
+from armblocks.errors import InputError
+from armblocks.robot import standard_dh
+
+
+def slider() -> ab.Arm:
+    """A mass of 2 kg on a horizontal line."""
+    link = standard_dh("x", sigma=1, mass=2.0)
+    return ab.Arm(ab.Robot(name="slider", links=(link,), gravity=(0.0, -9.81, 0.0)))
+
+
+def test_a_trapezoidal_motion_binds_acceleration_speed_acceleration() -> None:
+    path = ab.point_to_point(0.0, 2.0, speed=1.0, acceleration=2.0)
+    report = ab.trajectory_report(slider(), path, speed=1.0, acceleration=2.0, torque=8.0)
+    (row,) = report.table()
+    assert report.cycle_time == pytest.approx(2.5)
+    assert [row[name] for name in ("lowest", "highest", "speed", "acceleration")] == pytest.approx(
+        [0, 2, 1, 2]
+    )
+    assert row["torque"] == pytest.approx(4.0) and row["torque %"] == pytest.approx(50.0)
+    phases = [(part.quantity, part.start, part.end) for part in report.binding]
+    assert [name for name, *_ in phases] == ["acceleration", "speed", "acceleration"]
+    assert np.ravel([times for _, *times in phases]) == pytest.approx([0, 0.5, 0.5, 2.0, 2.0, 2.5], abs=0.02)
+    assert report.exceeded == ()
+    assert "slider: cycle time 2.5 s" in str(report)
+    assert "acceleration of x" in str(report)
+
+
+def test_exceeded_limits_are_sentences() -> None:
+    arm = ab.load_robot("puma560")
+    path = ab.jtraj(np.zeros(6), [6.0, 0, 0, 0, 0, 0], np.linspace(0, 1, 50))
+    report = ab.trajectory_report(arm, path, speed=2.0, payload=1.0)
+    assert report.position_margin[0] < 0
+    assert "position outside its range by" in report.exceeded[0]
+    assert any("speed" in sentence and "562.5 % of its limit at" in sentence for sentence in report.exceeded)
+    assert "exceeded: " in str(report)
+
+
+def test_figures_are_written_as_svg_and_png(tmp_path: Path) -> None:
+    report = ab.trajectory_report(slider(), ab.jtraj(0.0, 1.0, np.linspace(0, 1, 20)), speed=3.0)
+    report.save(tmp_path / "a.svg")
+    report.save(tmp_path / "a.png")
+    assert "Speed of its limit, %" in (tmp_path / "a.svg").read_text()
+    assert "Torque" in (tmp_path / "a.svg").read_text()
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+    with pytest.raises(InputError, match=r"is neither SVG nor PNG"):
+        report.save(tmp_path / "a.gif")
+
+
+def test_a_trajectory_of_another_robot_is_refused() -> None:
+    with pytest.raises(InputError, match=r"the trajectory has 2 joints.*1, as the robot 'slider'"):
+        ab.trajectory_report(slider(), ab.jtraj([0, 0], [1, 1], 5))
