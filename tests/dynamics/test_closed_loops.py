@@ -75,6 +75,27 @@ def test_motor_torques_cause_their_motion(seed: int) -> None:
     assert trace_rne(robot)(q, qd, qdd)[0] == pytest.approx(tau, abs=1e-8)
 
 
+@pytest.mark.parametrize("several", [False, True])
+def test_motors_of_coupled_joints_drive_a_mechanism(several: bool) -> None:
+    """The motor is at a joint without coordinate: geared to the crank, or turned by crank and rocker."""
+    loop = four_bar()
+    rotor = Link(name="rotor", mass=0.5, inertia=(0.01,) * 3, motor=Motor(inertia=1e-4, gear_ratio=20.0))
+    terms = (("rotor", 1.0), ("crank", -3.0), *([("rocker", 2.0)] if several else []))
+    robot = replace(
+        loop,
+        links=(*loop.links, rotor),
+        constraints=(*loop.constraints, Coupling(name="gear", terms=terms, constant=0.1)),
+    )
+    mechanism = Mechanism(robot)
+    q = robot.neutral
+    qd = mechanism.consistent_speeds(q, np.array((0.7, 0.0, 0.0)))
+    turns = np.array((3.0, 0.0, -2.0 if several else 0.0))  # of the rotor per unit of crank, coupler, rocker
+    qdd = trace_constrained_motion(robot)(q, qd, 2.5 * turns)[2]
+    assert trace_rne(robot)(q, qd, qdd)[0] == pytest.approx(2.5 * turns, abs=1e-10)
+    with pytest.raises(RobotError, match="the joints with motors have 2 degrees of freedom"):
+        trace_rne(robot.with_link("coupler", motor=Motor()))
+
+
 def driven_joints(mechanism: Mechanism, q: np.ndarray) -> list[str]:
     """Joints, as many as degrees of freedom, whose speeds determine all others: columns left by pivoting."""
     J = mechanism.jacobian(q)

@@ -101,6 +101,23 @@ def test_only_the_direction_of_a_quaternion_counts(robot: Robot):
             )
 
 
+@pytest.mark.parametrize("length", [1e300, 1e200, 1e-200, 1e-300])
+def test_quaternions_of_extreme_lengths_are_rotations(length: float):
+    """Their squares overflow or underflow."""
+    robot = Robot(name="ball", links=(Link(name="b", joint=Spherical(), **BODY),))
+    for q, qd, qdd in random_states(robot, 2):
+        unit = evaluate(robot, "normalised", q).ravel()
+        other = length * unit
+        assert_allclose(evaluate(robot, "normalised", other).ravel(), unit, rtol=0, atol=1e-15)
+        assert_allclose(evaluate(robot, "fkine", other), evaluate(robot, "fkine", unit), rtol=0, atol=1e-15)
+        assert_allclose(evaluate(robot, "difference", other, unit), 0.0, rtol=0, atol=1e-15)
+        assert_allclose(evaluate(robot, "difference", unit, other), 0.0, rtol=0, atol=1e-15)
+        expected = evaluate(robot, "accel", unit, qd, qdd)
+        assert_allclose(evaluate(robot, "accel", other, qd, qdd), expected, rtol=1e-12)
+        moved = evaluate(robot, "integrate", other, qd, 0.1)
+        assert_allclose(moved, evaluate(robot, "integrate", unit, qd, 0.1), rtol=0, atol=1e-15)
+
+
 def test_a_quaternion_of_zeros_gives_nan_and_not_a_wrong_pose():
     ball = Robot(name="ball", links=(Link(name="b", joint=Spherical(), **BODY),))
     assert np.isnan(evaluate(ball, "fkine", np.zeros(4))[:3, :3]).all()

@@ -59,6 +59,13 @@ EQUALITIES = {
     "weld by sites": "<weld site1='as' site2='bs'/>",
     "joint": "<joint joint1='a1' joint2='b1' polycoef='0.1 -2 0 0 0'/>",
     "fixed joint": "<joint joint1='b2' polycoef='0.2 0 0 0 0'/>",
+    "of two dependent joints": (
+        "<joint joint1='a1' joint2='a2' polycoef='0.1 2 0 0 0'/><joint joint1='b1' joint2='b2'/>"
+        "<joint joint1='a1' joint2='b1' polycoef='0.2 -1 0 0 0'/>"
+    ),
+    "opposite signs": (
+        "<joint joint1='a1' joint2='b1'/><joint joint1='b1' joint2='a1' polycoef='0.3 -1 0 0 0'/>"
+    ),
     "both ways": "<joint joint1='a1' joint2='b1'/><joint joint1='a1' joint2='b2' polycoef='0 3 0 0 0'/>",
 }
 
@@ -142,7 +149,15 @@ def _jacobian(model: mujoco.MjModel, tree_q: np.ndarray, order: list[int]) -> np
         ("<tendon tendon1='t'/>", "a robot has constraints of bodies and of two joints"),
         (
             "<joint joint1='a1'/><joint joint1='a1'/>",
-            "the joint follows from other constraints; it is left out",
+            "the coupling follows from other constraints; it is left out",
+        ),
+        (
+            "<joint joint1='a1' joint2='b1'/><joint joint1='b1' joint2='a1' polycoef='0.3 1 0 0 0'/>",
+            "the coupling contradicts other constraints, by 0.3 rad or m; it is left out",
+        ),
+        (
+            "<joint joint1='a1'/><joint joint1='a1' polycoef='0.25 0 0 0 0'/>",
+            "the coupling contradicts other constraints, by 0.25 rad or m; it is left out",
         ),
     ],
 )
@@ -353,7 +368,7 @@ def test_contradicting_couplings_and_limits_of_closing_joints_are_findings() -> 
     text = f"<sdf version='1.11'><model name='m'>{parts}</model></sdf>"
     (robot,) = read_sdf(text.encode(), "r.sdf", context).values()
     found = {finding.rule.code: finding.what for finding in context.findings}
-    assert "the coupling is left out: couplings make joint" in found["sdf-coupling"]
+    assert found["sdf-coupling"] == "the coupling follows from other constraints; it is left out"
     assert found["sdf-closure"] == "its limits, friction and springs are left out"
     assert len(robot.couplings) == 1 and [closure.title for closure in robot.closures] == ["revolute"]
 

@@ -136,7 +136,10 @@ def test_shapes_of_urdf_are_written_in_the_frame_of_the_joint() -> None:
     shapes = (Box(size=(1.0, 2.0, 3.0)), Cylinder(radius=0.1, length=1.0), Sphere(radius=0.2))
     housing = Housing(start=(0.1, 0.1), end=(0.1, 0.1), length=1.0)
     link = standard_dh("a", a=0.5, geometry=(*shapes, housing))
-    with pytest.warns(ArmblocksWarning, match="1 shape is not part of the URDF file: Housing"):
+    with (
+        pytest.warns(ArmblocksWarning, match="1 shape is not part of the URDF file: Housing"),
+        pytest.warns(ArmblocksWarning, match="1 link frame is moved to the joint, as URDF requires: a"),
+    ):
         data = write_urdf(Robot(name="r", links=(link,)))
     (_, again, _) = read(data).links
     assert [type(shape) for shape in again.geometry or ()] == [Box, Cylinder, Sphere]

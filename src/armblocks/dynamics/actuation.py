@@ -1,7 +1,8 @@
 """Inverse dynamics of robots with constraints: the torques of the joints that have a motor.
 
 The torques of a tree, ``tau_tree``, are shared between motors and constraints: ``tau_tree = tau + J' λ`` with
-``tau = 0`` at joints without a motor. The rows of those joints determine the multipliers λ.
+``Z' tau = 0`` for the directions Z in which no motor turns: the joints without a motor. These equations
+determine the multipliers λ.
 Source: Featherstone, *Rigid Body Dynamics Algorithms*, 8.12 (inverse dynamics of closed loops); Nakamura and
 Ghodoussi, *Dynamics computation of closed-link robot mechanisms*, IEEE Trans. Robotics and Automation 1989.
 """
@@ -13,7 +14,7 @@ from functools import wraps
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from casadi import SX, mtimes, vertcat
+from casadi import DM, SX, mtimes, sparsify, vertcat
 
 from armblocks.dynamics.constrained import (
     ConstrainedEquations,
@@ -52,17 +53,18 @@ def motor_forces(
     inertia torques would be wrong. Raises RobotError unless the motors and the degrees of freedom agree in
     number and the motors move all of them.
     """
-    passive = [k for k, motor in enumerate(robot.motors) if motor is None]
+    free_directions = directions_without_motor(robot)
     relations = independent_relations(robot, near)
-    _check_actuation(robot, passive, relations, near)
+    _check_actuation(robot, free_directions, relations, near)
     equations = ConstrainedEquations(robot, KinematicTree.of(robot), q, relations)
     J = equations.J
-    # J_p' λ = tau_p by its normal equations, whose matrix is J_p J_p'.
-    J_passive = J[:, passive]
+    # Z' J' λ = Z' tau by its normal equations, whose matrix is (J Z) (J Z)'.
+    Z = sparsify(DM(free_directions))
+    J_passive = mtimes(J, Z)
     solve = symmetric_solver(mtimes(J_passive, J_passive.T))
-    multipliers = vertcat(*solve(entries(mtimes(J_passive, free_torques[passive]))))
+    multipliers = vertcat(*solve(entries(mtimes(J_passive, mtimes(Z.T, free_torques)))))
     torques = free_torques - mtimes(J.T, multipliers)
-    torques[passive] = 0.0
+    torques[[k for k, row in enumerate(free_directions) if 1.0 in row]] = 0.0
     validity = nan_unless_consistent(equations, qd, qdd)
     of_all = [SX(0.0)] * len(mechanism(robot).names)
     for index, multiplier in zip(relations, entries(multipliers)):
@@ -97,12 +99,33 @@ def of_motors(trace: Callable[[Robot], TracedFunction]) -> TorqueTrace:
     return trace_of_motors
 
 
+def directions_without_motor(robot: Robot) -> Array:
+    """A basis Z (n, k) of the speeds at which no motor turns, for the motors of all joints of the tree.
+
+    Motors of joints that couplings determine are included. The directions are single coordinates (a column
+    has one entry 1) unless a motor is at a joint that depends on several coordinates without motors.
+    """
+    driven = {k for k, motor in enumerate(robot.motors) if motor is not None}
+    rows = [joint.factors for joint in robot.coupled_joints if joint.link.motor is not None]
+    while single := [{*row} - driven for row in rows if len({*row} - driven) == 1]:
+        driven |= set[int]().union(*single)
+    several = [row for row in rows if {*row} - driven]
+    passive = [k for k in range(robot.nv) if k not in driven]
+    basis: Array = np.eye(robot.nv)[:, passive]
+    if several:
+        turns = np.array([[row.get(k, 0.0) for k in passive] for row in several])
+        _, s, Vt = np.linalg.svd(turns)
+        rank = int(np.sum(s > RANK_TOLERANCE * s.max()))
+        basis = basis @ Vt[rank:].T
+    return basis
+
+
 def _check_actuation(
-    robot: Robot, passive: Sequence[int], relations: Sequence[int], near: Array | None
+    robot: Robot, free_directions: Array, relations: Sequence[int], near: Array | None
 ) -> None:
     """Raise RobotError unless the joints without a motor follow from those with a motor."""
     functions = mechanism(robot)
-    dof, motors = robot.nv - len(relations), robot.nv - len(passive)
+    dof, motors = robot.nv - len(relations), robot.nv - free_directions.shape[1]
     where = f"robot '{robot.name}'"
     if motors != dof:
         raise RobotError(
@@ -112,7 +135,7 @@ def _check_actuation(
             allowed="as many motors as degrees of freedom, so that the torques exist and are unique",
             fix="give a motor (Motor() without inertia is enough) to the actuated joints only",
         )
-    J = functions.jacobian(assembled_coordinates(robot, near))[np.ix_(relations, passive)]
+    J = functions.jacobian(assembled_coordinates(robot, near))[list(relations)] @ free_directions
     s = np.linalg.svd(J, compute_uv=False)
     if len(s) and s.min() <= RANK_TOLERANCE * s.max():
         raise RobotError(

@@ -23,6 +23,9 @@ from armblocks.spatial.vectors import Matrix, Rotation, RotationZ, Scalar, Vecto
 Quaternion = tuple[Scalar, Scalar, Scalar, Scalar]
 """w x y z."""
 
+SHRINK, GROW = 2.0**-520, 2.0**600
+"""Factors of quaternions whose squared length is outside ``SQUARES``; powers of two do not round."""
+SQUARES = 1e-280, 1e280
 TINY = 1e-200
 """Square of an angle below which its sine is replaced by the angle; the difference is below rounding."""
 
@@ -31,7 +34,7 @@ def ball_rotation(body: Body, q: Sequence[Scalar]) -> Rotation | RotationZ:
     """The rotation of one of the three bodies of a ball joint against the body before it."""
     if body.ball != 0:
         return RotationZ(1.0, 0.0)
-    w, x, y, z = q[body.position : body.position + 4]
+    w, x, y, z = _moderate(q[body.position : body.position + 4])
     # The quaternion in the axes of the first body, which are y, z, x of the joint.
     return Rotation(rotation_of((w, y, z, x)))
 
@@ -46,6 +49,17 @@ def rotation_of(quaternion: Quaternion) -> Matrix:
         (sx * y + sz * w, 1.0 - (sx * x + sz * z), sy * z - sx * w),
         (sx * z - sy * w, sy * z + sx * w, 1.0 - (sx * x + sy * y)),
     )
+
+
+def _moderate(quaternion: Sequence[Scalar]) -> Quaternion:
+    """A multiple of a quaternion whose squared length neither overflows nor underflows.
+
+    Quaternions of lengths between 1e-140 and 1e140 are unchanged.
+    """
+    w, x, y, z = quaternion
+    square = SX(w * w + x * x + y * y + z * z)
+    factor = if_else(square < SQUARES[0], GROW, if_else(square > SQUARES[1], SHRINK, 1.0))
+    return factor * w, factor * x, factor * y, factor * z
 
 
 def axis_accelerations(tree: KinematicTree, qd: Sequence[Scalar], qdd: Sequence[Scalar]) -> Sequence[Scalar]:
@@ -122,8 +136,8 @@ def difference(robot: Robot, q0: Sequence[Scalar], q1: Sequence[Scalar]) -> list
     result: list[Scalar] = []
     for (is_ball, start, _), (_, end, _) in zip(_motions(robot, q0), _motions(robot, q1)):
         if is_ball:
-            w, x, y, z = start
-            result += scale(2.0, _logarithm(_product((w, -x, -y, -z), _four(end))))
+            w, x, y, z = _moderate(start)
+            result += scale(2.0, _logarithm(_product((w, -x, -y, -z), _moderate(end))))
         else:
             result += [end[0] - start[0]]
     return result
@@ -139,7 +153,7 @@ def normalised(robot: Robot, q: Sequence[Scalar]) -> list[Scalar]:
 
 def rotation_vector(quaternion: Sequence[Scalar]) -> Vector:
     """The rotation vector (rad), of length at most π, of a quaternion w x y z of any length but zero."""
-    return scale(2.0, _logarithm(_four(quaternion)))
+    return scale(2.0, _logarithm(_moderate(quaternion)))
 
 
 def _motions(
@@ -160,13 +174,8 @@ def _three(values: Sequence[Scalar]) -> Vector:
     return x, y, z
 
 
-def _four(values: Sequence[Scalar]) -> Quaternion:
-    w, x, y, z = values
-    return w, x, y, z
-
-
 def _unit(quaternion: Sequence[Scalar]) -> Quaternion:
-    w, x, y, z = quaternion
+    w, x, y, z = _moderate(quaternion)
     factor = 1.0 / sqrt(w * w + x * x + y * y + z * z)
     return w * factor, x * factor, y * factor, z * factor
 

@@ -23,3 +23,11 @@ WARNED = Rule(code="robot-warning", allowed="files that are read without warning
 
 LINT_RULES = (INERTIA, IMPLAUSIBLE, NO_MASS, WARNED)
 """The rules of all formats."""
+
+
+def left_out_coupling(contradiction: float | None) -> str:
+    """The finding about a coupling that is left out; see :func:`remaining_coupling` for ``contradiction``."""
+    if contradiction is None:
+        return "the coupling follows from other constraints; it is left out"
+    what = f"the coupling contradicts other constraints, by {abs(contradiction):.3g} rad or m"
+    return f"{what}; it is left out"

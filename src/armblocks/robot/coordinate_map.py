@@ -10,7 +10,7 @@ A coupling makes one joint depend linearly on others. The robot's q has the inde
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ from armblocks.robot.constraints import Coupling
 from armblocks.robot.link import Link
 
 Array = NDArray[np.float64]
+ROUNDING = 1e-9
+"""Coefficients and constants below this fraction of the others count as rounding errors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +79,39 @@ def coordinate_map(links: Sequence[Link], couplings: Sequence[Coupling], where: 
             speeds.append(rate)
             offsets[link.name] = constant
     return CoordinateMap(np.vstack(positions), offsets, np.vstack(speeds))
+
+
+def remaining_coupling(
+    links: Sequence[Link], couplings: Sequence[Coupling], added: Coupling
+) -> Coupling | float | None:
+    """What a coupling adds to ``couplings``, which do not contradict each other, for the moving ``links``.
+
+    It is the coupling itself, perhaps with another joint first, or an equal one of independent coordinates if
+    all its joints depend on others. None: it follows from the others. A number: it contradicts the others,
+    which give the sum of its terms another constant, larger by this number.
+    """
+    terms = added.terms
+    for k in range(len(terms)):
+        candidate = replace(added, terms=(terms[k], *terms[:k], *terms[k + 1 :]))
+        try:
+            coordinate_map(links, [*couplings, candidate], "couplings")
+        except RobotError:
+            continue
+        return candidate
+    given = coordinate_map(links, couplings, "couplings")
+    factors: dict[str, float] = {}
+    excess = -added.constant
+    dependent = dependent_joints(couplings)
+    for joint, factor in terms:
+        of_joint, _ = _combination(joint, dependent, (), "couplings")
+        excess += factor * given.offsets.get(joint, 0.0)
+        for name, value in of_joint.items():
+            factors[name] = factors.get(name, 0.0) + factor * value
+    size = sum(abs(factor) for _, factor in terms)
+    left = tuple((name, value) for name, value in factors.items() if abs(value) > ROUNDING * size)
+    if left:
+        return replace(added, terms=left, constant=-excess)
+    return None if abs(excess) <= ROUNDING * size * max(1.0, abs(added.constant)) else excess
 
 
 def _combination(

@@ -9,16 +9,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from armblocks.errors import RobotError, UnknownNameError
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.mjcf.poses import of_quaternion
 from armblocks.formats.mjcf.rules import EQUALITY
 from armblocks.formats.mjcf.settings import Defaults, sections
+from armblocks.formats.robot_rules import left_out_coupling
 from armblocks.formats.robot_writing import free_name
 from armblocks.formats.xml_elements import Element, note, shortened
 from armblocks.robot import Attachment, Closure, Constraint, Coupling, Link, SphericalClosure, WeldClosure
 from armblocks.robot.constraint_checks import MAX_CONSTRAINTS
-from armblocks.robot.coordinate_map import coordinate_map
+from armblocks.robot.coordinate_map import remaining_coupling
 from armblocks.spatial import Transform, matrix3, transl
 
 
@@ -55,11 +55,12 @@ def constraints_of(
             continue
         found = replace(found, name=free_name(found.name, used))
         if isinstance(found, Coupling):
-            fitting = _fitting(parts.links, [c for c in constraints if isinstance(c, Coupling)], found)
-            if fitting is None:
-                note(context, EQUALITY, element, "the joint follows from other constraints; it is left out")
+            others = [other for other in constraints if isinstance(other, Coupling)]
+            remaining = remaining_coupling([link for link in parts.links if link.joint.moves], others, found)
+            if not isinstance(remaining, Coupling):
+                note(context, EQUALITY, element, left_out_coupling(remaining))
                 continue
-            found = fitting
+            found = remaining
         if len(constraints) < MAX_CONSTRAINTS:
             constraints.append(found)
         else:
@@ -157,16 +158,3 @@ def _initial_poses(links: Sequence[Link]) -> dict[str | None, Transform]:
     for link in links:
         poses[link.name] = poses[link.parent] @ link.before @ link.after
     return poses
-
-
-def _fitting(links: Sequence[Link], others: Sequence[Coupling], coupling: Coupling) -> Coupling | None:
-    """The coupling, solved for a joint that does not follow from the others yet; None without one."""
-    moving = [link for link in links if link.joint.moves]
-    for terms in (coupling.terms, coupling.terms[::-1]):
-        candidate = replace(coupling, terms=terms)
-        try:
-            coordinate_map(moving, [*others, candidate], "MJCF")
-        except (RobotError, UnknownNameError):
-            continue
-        return candidate
-    return None

@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from armblocks.errors import RobotError, UnknownNameError
+from armblocks.errors import UnknownNameError
+from armblocks.formats.robot_rules import left_out_coupling
 from armblocks.formats.robot_writing import free_name
 from armblocks.formats.sdf.frames import Frame, Frames
 from armblocks.formats.sdf.joints import AXES, direction_of, joint_type_of
@@ -25,7 +26,7 @@ from armblocks.robot import (
     UniversalClosure,
     WeldClosure,
 )
-from armblocks.robot.coordinate_map import coordinate_map
+from armblocks.robot.coordinate_map import remaining_coupling
 from armblocks.spatial import Transform, Vector3
 
 _CLOSURES: Mapping[str, type[Closure]] = {
@@ -120,12 +121,11 @@ def couplings_of(
             note(frames.context, COUPLING, owner.element, coupling)
             continue
         named = replace(coupling, name=free_name(coupling.name, used))
-        try:
-            coordinate_map(moving, [*couplings, named], "SDF")
-        except (RobotError, UnknownNameError) as error:
-            note(frames.context, COUPLING, owner.element, f"the coupling is left out: {error.what}")
-            continue
-        couplings.append(named)
+        remaining = remaining_coupling(moving, couplings, named)
+        if isinstance(remaining, Coupling):
+            couplings.append(remaining)
+        else:
+            note(frames.context, COUPLING, owner.element, left_out_coupling(remaining))
     return tuple(couplings)
 
 

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from armblocks.errors import counted
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.robot_writing import (
     Mimic,
@@ -48,8 +49,9 @@ def write_urdf(robot: Robot) -> bytes:
     """The URDF of a robot. Reading it gives the same kinematics and dynamics up to rounding.
 
     Raises ``FormatError`` for joint types and constraints that URDF does not have. Warns of data that URDF
-    does not have: another gravity, springs, the tip and the order of the coordinates of some trees, Coulomb
-    friction that depends on the direction, friction that accelerates, meshes and housings.
+    does not have: link frames that are not at the joint, another gravity, springs, the tip and the order of
+    the coordinates of some trees, Coulomb friction that depends on the direction, friction that accelerates,
+    meshes and housings.
     """
     if not np.allclose(robot.gravity, STANDARD_GRAVITY, rtol=1e-15, atol=0.0):
         what = f"gravity {robot.gravity} is not part of a URDF file, which is read with -9.81 along z"
@@ -71,6 +73,7 @@ def write_urdf(robot: Robot) -> bytes:
         parts += _link_lines(robot, link)
         if link is not own_root:
             parts += _joint_lines(robot, link, root, mimics.get(link.name))
+    _warn_of_frames(robot)
     last = robot.links[-1]
     tip, end = last.name, last.after @ robot.tool
     if not end.is_identity:
@@ -82,6 +85,15 @@ def write_urdf(robot: Robot) -> bytes:
     data = ('<?xml version="1.0"?>\n' + "\n".join([*parts, "</robot>"]) + "\n").encode()
     warn_of_order(robot, tip, read_urdf(data, "robot.urdf", FileContext()), "URDF")
     return data
+
+
+def _warn_of_frames(robot: Robot) -> None:
+    """Warn of links whose frames are not at their joints."""
+    moved = [link.name for link in robot.links if not link.after.is_identity]
+    if moved:
+        count = counted(len(moved), "link frame is", "link frames are")
+        what = f"{count} moved to the joint, as URDF requires: {', '.join(moved[:6])}"
+        warn_of_loss(f"robot '{robot.name}'", what + (" …" if len(moved) > 6 else ""))
 
 
 def _root_link(robot: Robot) -> Link | None:
