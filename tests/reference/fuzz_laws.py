@@ -36,6 +36,8 @@ from armblocks.formats.diagram_python import diagram_to_python
 Signals = Mapping[str, np.ndarray]
 TOO_LARGE = 1e4
 """A diagram with larger signals counts as unstable, and is not compared."""
+SLOW_REFERENCE = 40.0
+"""A diagram whose run in the reference simulator takes longer is not judged, s of processor time."""
 
 
 class InconclusiveError(Exception):
@@ -99,10 +101,16 @@ class Case:
     ) -> dict[str, np.ndarray]:
         """Run the reference with two step sizes; the difference is the uncertainty of each signal."""
         try:
-            two = run_reference(diagram, self.times if times is None else times, steps[1], max_events=300)
+            two = run_reference(
+                diagram,
+                self.times if times is None else times,
+                steps[1],
+                max_events=300,
+                seconds=SLOW_REFERENCE,
+            )
             if times is not None:
                 return two
-            one = run_reference(diagram, self.times, steps[0], max_events=300)
+            one = run_reference(diagram, self.times, steps[0], max_events=300, seconds=SLOW_REFERENCE)
         except (UnsupportedError, EndlessEventsError, np.linalg.LinAlgError) as error:
             raise InconclusiveError(f"reference: {error}") from None
         for name in self.run:
@@ -183,7 +191,11 @@ def expect_well_posed(case: Case, run: Signals) -> None:
         with contextlib.suppress(ArmblocksError, UnsupportedError, EndlessEventsError, np.linalg.LinAlgError):
             momentary = recipe is case.recipe
             diagram = recipe.diagram()
-            results.append(run_reference(diagram, case.times, 0.004, max_events=300, momentary=momentary))
+            results.append(
+                run_reference(
+                    diagram, case.times, 0.004, max_events=300, seconds=SLOW_REFERENCE, momentary=momentary
+                )
+            )
         if k >= NEIGHBOURS and are_explained(case, run, results):
             raise InconclusiveError("a change of the signals by a rounding error changes the result")
     for recipe in candidates[1:]:
@@ -552,7 +564,8 @@ def failure(recipe: Recipe, message: str) -> dict[str, list[str]]:
     times = np.concatenate([recipe.times, recipe.times[-1] + RECORD * np.arange(1, 6)])
     try:
         result, finer = (
-            run_reference(recipe.diagram(), times, step, max_events=300) for step in (0.004, 0.0011)
+            run_reference(recipe.diagram(), times, step, max_events=300, seconds=SLOW_REFERENCE)
+            for step in (0.004, 0.0011)
         )
     except (UnsupportedError, EndlessEventsError, np.linalg.LinAlgError) as error:
         raise InconclusiveError(f"{message}; reference: {error}") from None

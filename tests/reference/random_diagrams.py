@@ -389,7 +389,7 @@ class RecipeGenerator:
             return
         parameters: dict[str, Any] = {}
         ports: dict[str, Signal] = {f"in{k}": s for k, s in enumerate(subsystem_inputs)}
-        control = scalars[int(r.integers(len(scalars)))]
+        control = self.control(nodes, signals, scalars)
         if kind == "EnabledSubsystem":
             parameters["states_when_enabling"] = str(r.choice(["held", "reset"]))
         elif kind != "Subsystem":
@@ -402,9 +402,21 @@ class RecipeGenerator:
         }
         for port in names.get(kind, []):
             ports[port] = control
-            control = scalars[int(r.integers(len(scalars)))]
+            control = self.control(nodes, signals, scalars)
         if self.add(nodes, signals, kind, parameters, ports, inside):
             self.add_event_block(nodes, signals)
+
+    def control(self, nodes: list[Node], signals: list[Signal], scalars: Sequence[Signal]) -> Signal:
+        """Return a scalar signal, or the sum of a late signal and another one: both may jump together."""
+        r = self.random
+        chosen = scalars[int(r.integers(len(scalars)))]
+        if r.random() < 0.5:
+            late = scalars[-1 - int(r.integers(min(3, len(scalars))))]
+            if late != chosen and self.add(
+                nodes, signals, "Sum", {"signs": "+-"}, {"u1": late, "u2": chosen}
+            ):
+                return signals[-1]
+        return chosen
 
     def add_event_block(self, nodes: list[Node], signals: list[Signal]) -> None:
         """Add a block with an event after the latest signal, which must not react to intermediate values."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from reference_block import BlockNumbers, UnsupportedError
 from reference_controls import CONTROLS, Enable, Trigger
-from reference_events import event_ranks, has_own_events
+from reference_events import has_own_events, instant_order
 from reference_order import EvaluationOrder, Node, assign_clocks
 
 from armblocks.diagram import Diagram, PortRef, flat_diagram, infer_shapes
@@ -47,7 +47,8 @@ class Network:
         self._locate_states()
         self.clocks = assign_clocks(flat, self.blocks, self.drivers)
         self.order = EvaluationOrder(self.blocks, self.drivers, flat.gates)
-        self.ranks, self.rank_before_ticks = event_ranks(self.order)
+        self.instant_order = instant_order(self.order)
+        self.ranks = self.instant_order.ranks
         self.links = {b.name: [self._link(b, port) for port in b.inputs_read] for b in self.blocks.values()}
         self.links_of_node: dict[Node, list[Link]] = {}
         self.plans: dict[tuple[bool, bool], list[Work]] = {}
@@ -73,7 +74,7 @@ class Network:
 
     def _start(self) -> None:
         self.frozen = False
-        self.ticking: set[int] = set()
+        self.ticking: set[str] = set()
         self.t = 0.0
         for block in self.blocks.values():
             block.restart()
@@ -160,7 +161,7 @@ class Network:
         block = self.blocks[name]
 
         def held() -> bool:
-            return block.clock is not None and (block.clock not in self.ticking or not block.on)
+            return block.clock is not None and (name not in self.ticking or not block.on)
 
         def take_derivative() -> bool:
             ref = self.drivers[name, block.block.time_derivatives[port]]
@@ -253,7 +254,7 @@ class Network:
                 start += array.size
             for kind, name, port in loop:
                 block = self.blocks[name]
-                if block.clock is not None and block.clock not in self.ticking:
+                if block.clock is not None and name not in self.ticking:
                     residuals.append(block.outputs[port].copy())
                     continue
                 self._feed_some(block, (kind, name, port))
@@ -360,13 +361,21 @@ class Network:
                 for name, value in captured.items():
                     block.arrays[f"x:{name}"][:] = value
 
-    def tick(self, t: float, clocks: list[int]) -> None:
-        """Evaluate the outputs of all blocks that tick, then update their discrete states."""
-        self._mark(set(clocks))
+    def tick(self, t: float, clocks: list[int], level: int) -> None:
+        """Evaluate the outputs of this level of all blocks that tick, then update the discrete states."""
+        order, ticking = self.instant_order, [b for b in self.blocks.values() if b.clock in clocks]
+        self._mark({b.name for b in ticking if order.output_level[b.name] == level})
+        updating = {b.name for b in ticking if order.update_level[b.name] == level}
+        last_rank = order.last_rank_after(level)
         self.evaluate(t)
         restarted: set[str] = set()
         for _ in range(2):  # a restart at this tick changes the values that are read
-            restarting = [b for b in self.blocks.values() if b.clock in (None, *self.ticking) and b.restarts]
+            restarting = [
+                b
+                for b in self.blocks.values()
+                if b.restarts
+                and (self.ranks[b.name] <= last_rank if b.clock is None else b.name in self.ticking)
+            ]
             restarting = [block for block in restarting if block.name not in restarted]
             if not restarting:
                 break
@@ -376,17 +385,17 @@ class Network:
             self.evaluate(t)
         new: list[tuple[np.ndarray, np.ndarray]] = []
         for block in self.blocks.values():
-            if block.clock in self.ticking and block.on:
+            if block.name in updating and block.on:
                 new += self._updated(block)
         self._act(t, new)
         self._mark(set())
 
-    def _mark(self, clocks: set[int]) -> None:
-        """Set the clocks that tick at the present time."""
-        self.ticking = clocks
+    def _mark(self, ticking: set[str]) -> None:
+        """Set the blocks whose outputs tick now."""
+        self.ticking = ticking
         for block in self.blocks.values():
             if isinstance(block, Enable):
-                block.ticking = bool(clocks)
+                block.ticking = bool(ticking)
 
     def iterate(self, t: float, first: bool = False, last_rank: float = math.inf) -> bool:
         """Perform one iteration of an instant; return whether it has changed a state or a mode.
@@ -478,7 +487,7 @@ class Network:
         """Assign the new states, and execute the restarts and triggers of subsystems."""
         starts: list[Any] = []
         for block in self.blocks.values():
-            if block.restarts and block.clock not in self.ticking:
+            if block.restarts and block.name not in self.ticking:
                 starts.append(block)
             if block.fires and block.block.sampled:
                 new += self._updated(block)

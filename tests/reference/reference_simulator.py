@@ -23,9 +23,9 @@ the time of an event. At an instant, in this order:
 
 1. left limits: values "just before" the instant, such as the held output of a subsystem that is disabled,
    are evaluated with the old modes and states;
-2. events on which no sampled signal acts, if a clock ticks;
-   ticks: the outputs of all blocks whose clock ticks are evaluated with the others, from the previous
-   discrete states; then all their discrete states are updated together;
+2. if a clock ticks, for each level of ticks: the events before this level; the outputs of this level are
+   evaluated with the other signals, from the previous discrete states; then the discrete states of this
+   level are updated together. Level 0 follows the events on which no sampled signal acts;
 3. mode iteration: modes are made consistent with the signals; guards whose sign has changed fire, and
    ``resets`` gives new states; controls of conditional subsystems act. This is repeated until nothing
    changes;
@@ -41,6 +41,7 @@ Unsupported diagrams raise ``UnsupportedError``.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -69,6 +70,7 @@ class ReferenceRun:
 
     ``momentary``: whether a condition such as u ~= 0 has the value for u = 0 for a moment where u passes
     through 0. Otherwise it has this value only if u is exactly 0 at the end of a step, after rounding.
+    ``seconds``: the processor time after which a run raises ``UnsupportedError``.
     """
 
     def __init__(
@@ -78,8 +80,10 @@ class ReferenceRun:
         step: float = 0.01,
         max_events: int = 500,
         momentary: bool = False,
+        seconds: float = math.inf,
     ) -> None:
         self.momentary = momentary
+        self.seconds, self.begin = seconds, time.process_time()
         self.network = network = Network(diagram)
         self.step = min([step, *network.shortest_delays()])
         self.stop = float(record[-1])
@@ -98,6 +102,8 @@ class ReferenceRun:
         for t, clocks, recorded, jumps in self.instants():
             if t > 0.0:
                 while not self.stopped and self.t < t:
+                    if time.process_time() - self.begin > self.seconds:
+                        raise UnsupportedError(f"the reference is too slow at {self.t} s")
                     self.flow(t, jumps)
                 if self.stopped:
                     break
@@ -218,14 +224,14 @@ class ReferenceRun:
             network.capture(t)
         self.t = t
         if clocks:
-            if t > 0.0:
-                self.iterate(t, network.rank_before_ticks)
-            network.tick(t, clocks)
+            for level, last_rank in enumerate(network.instant_order.ranks_before_level):
+                if t > 0.0:
+                    self.iterate(t, last_rank)
+                elif last_rank >= 0:
+                    self.start()
+                network.tick(t, clocks, level)
         if t == 0.0:
-            # Guards have no sign yet: resets without events give states consistent with the signals.
-            for _ in range(MAX_ITERATIONS):
-                if not network.iterate(0.0, first=True):
-                    break
+            self.start()
             network.take_signs()
         if self.momentary and t > 0.0 and network.hold_zeros(ALMOST_ZERO):
             self.iterate(t)
@@ -234,6 +240,12 @@ class ReferenceRun:
         network.select_segments()
         network.end_instant()
         self.stopped = network.ended()
+
+    def start(self) -> None:
+        """Make the states consistent with the signals by resets without events: guards have no sign yet."""
+        for _ in range(MAX_ITERATIONS):
+            if not self.network.iterate(0.0, first=True):
+                break
 
     def iterate(self, t: float, last_rank: float = math.inf) -> None:
         """Repeat the iteration of an instant until nothing changes; with a ``last_rank``, only for events up
@@ -251,6 +263,8 @@ def run_reference(
     max_events: int = 500,
     *,
     momentary: bool = False,
+    seconds: float = math.inf,
 ) -> dict[str, np.ndarray]:
     """Return signals ``(N, *shape)`` by ``block/port`` at the times ``record`` (N,), which start at 0."""
-    return ReferenceRun(diagram, np.asarray(record, dtype=np.float64), step, max_events, momentary).run()
+    times = np.asarray(record, dtype=np.float64)
+    return ReferenceRun(diagram, times, step, max_events, momentary, seconds).run()

@@ -76,8 +76,12 @@ def initial_point(evaluated: EvaluatedSystem, p: Array) -> Point:
     point = solved(evaluated, Point(t=0.0, x=x, z=z, w=w, p=p))
     if system.clocks:
         ticking = np.array([float(clock.offset == 0.0) for clock in system.clocks])
-        z = evaluated.update(point, ticking)
-        point = solved(evaluated, Point(t=0.0, x=x, z=z, w=point.w, p=p))
+        for marks, follows_events in system.ticks_by_level(ticking):
+            if follows_events:
+                z = evaluated.consistent_modes(point)
+                point = solved(evaluated, Point(t=0.0, x=x, z=z, w=point.w, p=p))
+            z = evaluated.update(point, marks)
+            point = solved(evaluated, Point(t=0.0, x=x, z=z, w=point.w, p=p))
     if system.discrete.size:
         z = evaluated.consistent_modes(point)
         point = solved(evaluated, Point(t=0.0, x=x, z=z, w=point.w, p=p))

@@ -332,4 +332,6 @@ class MergedOutput(Block):
         return {"held": self._selected_output(x, u, p)}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        return {"held": self._selected_output(x, u, p)}
+        # At t = 0 the controls may still change during the mode iteration.
+        held = if_else(t <= 0.0, p["initial"], x["held"])
+        return {"held": self._selected_output({**x, "held": held}, u, p)}

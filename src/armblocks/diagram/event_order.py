@@ -1,4 +1,4 @@
-"""The order of events at one instant: the events of a block follow those of all blocks that it reads.
+"""The order of events and ticks at one instant: each block follows all blocks that it reads.
 
 Where an event changes a signal, another block may seem to have an event because the signal has not changed
 yet. An example is a trigger on the sum of a step and the output of a subsystem that the step enables. Events
@@ -6,14 +6,17 @@ at one instant are therefore processed by *rank*. The rank of a block is the lar
 events on a path of direct feedthrough to it. Blocks with events that depend on each other in a loop have one
 rank; their events are processed together.
 
-Events on which no sampled signal acts come before the ticks of the same instant, so that sampled blocks read
-the values after them. All other events come after the ticks, and have higher ranks.
+Ticks have *levels*. The outputs of level 0 read events on which no sampled signal acts; these events come
+before the ticks. Then follow the events on which outputs of level 0 act, then the ticks of level 1, which
+read these events, and so on. In a loop of ticks and events the ticks come first. The discrete states of a
+block are updated after all its outputs, at the level of the signals that its updates read.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from armblocks.diagram.components import strongly_connected
 from armblocks.diagram.controls import EnableControl, TriggerControl
@@ -22,16 +25,20 @@ from armblocks.diagram.ordering import HELD, Network, Node
 
 _EVENT_KINDS = {SlotKind.MODE, SlotKind.CONTRADICTION, SlotKind.GUARD, SlotKind.RESET}
 """The roles of equations that determine the modes and events of a block at an instant."""
-_Vertex = Node | str
-"""A node of the network, or the name of a block for its events and modes."""
 
 
 @dataclass(frozen=True)
 class EventOrder:
-    """The rank of the events and modes of each block, and the highest rank before the ticks (-1: none)."""
+    """The order at one instant.
+
+    ``rank_of``: the rank of the events and modes of each block. ``level_of``: the level at which the outputs
+    (``SlotKind.OUTPUT``) and the discrete states (``SlotKind.UPDATE``) of each sampled block are computed.
+    ``before_ticks``: for each level, the highest rank before its ticks (-1: none).
+    """
 
     rank_of: Mapping[str, int]
-    before_ticks: int
+    level_of: Mapping[tuple[str, SlotKind], int]
+    before_ticks: tuple[int, ...]
 
 
 def event_order(network: Network) -> EventOrder | None:
@@ -44,47 +51,81 @@ def event_order(network: Network) -> EventOrder | None:
     clocked = [name for name in network.equations if network.diagram.clocked(name)]
     if len(eventful) < (1 if clocked else 2):
         return None
-    excluded = _outputs_before_events(network)
-    read_inside = _read_inside_subsystems(network, excluded)
-    vertices: dict[_Vertex, int] = {}
-    needs: list[list[int]] = []
-    pending: list[_Vertex] = []
-
-    def number(vertex: _Vertex) -> int:
-        if vertex not in vertices:
-            vertices[vertex] = len(needs)
-            needs.append([])
-            pending.append(vertex)
-        return vertices[vertex]
-
+    graph = _Graph(network)
     for name in network.equations:
-        number(name)
-    readers = [
-        number(node) for name in clocked for node in _read_by_groups(network, name, set(AT_TICKS), excluded)
-    ]
-    while pending:
-        vertex = pending.pop()
+        graph.number(name)
+    ticks = {(name, kind): graph.number(_Tick(name, kind)) for name in clocked for kind in AT_TICKS}
+    graph.complete()
+    called = {ticks[name, SlotKind.OUTPUT] for name in clocked if network.diagram.blocks[name].called}
+    places = _Places(graph.needs, {graph.vertices[name] for name in eventful}, set(ticks.values()), called)
+    level_of = {tick: places.level[vertex] for tick, vertex in ticks.items()}
+    position_of = {name: places.event[graph.vertices[name]] for name in network.equations}
+    if not any(places.reads_events[vertex] for vertex in ticks.values()):
+        # No sampled block reads an event: all events come after the ticks, in the order of their paths.
+        position_of = {name: (1, places.rank[graph.vertices[name]]) for name in network.equations}
+    phases = range(max(level_of.values(), default=-1) + 3)
+    highest = {
+        phase: max((position_of[name][1] for name in eventful if position_of[name][0] == phase), default=-1)
+        for phase in phases
+    }
+    first_rank = [sum(highest[before] + 1 for before in range(phase)) for phase in phases]
+    ranks = {name: first_rank[phase] + rank for name, (phase, rank) in position_of.items()}
+    before_ticks = tuple(first_rank[level + 1] - 1 for level in range(max(level_of.values(), default=0) + 1))
+    if before_ticks == (-1,) and len({ranks[name] for name in eventful}) == 1:
+        return None
+    return EventOrder(ranks, level_of, before_ticks)
+
+
+class _Tick(NamedTuple):
+    """The outputs or the discrete states of a sampled block at a tick."""
+
+    block: str
+    kind: SlotKind
+
+
+_Vertex = Node | _Tick | str
+"""A node of the network, a tick, or the name of a block for its events and modes."""
+
+
+class _Graph:
+    """The dependencies of events, ticks and signals at one instant: ``needs`` by the number of a vertex."""
+
+    def __init__(self, network: Network) -> None:
+        self.network = network
+        self.vertices: dict[_Vertex, int] = {}
+        self.needs: list[list[int]] = []
+        self._pending: list[_Vertex] = []
+        self._excluded = _outputs_before_events(network)
+        self._read_inside = _read_inside_subsystems(network, self._excluded)
+
+    def number(self, vertex: _Vertex) -> int:
+        """The number of a vertex; a new vertex is added."""
+        if vertex not in self.vertices:
+            self.vertices[vertex] = len(self.needs)
+            self.needs.append([])
+            self._pending.append(vertex)
+        return self.vertices[vertex]
+
+    def complete(self) -> None:
+        """Add everything on which the vertices depend."""
+        while self._pending:
+            vertex = self._pending.pop()
+            self.needs[self.vertices[vertex]] += [self.number(needed) for needed in self._needed(vertex)]
+
+    def _needed(self, vertex: _Vertex) -> list[_Vertex]:
+        network, excluded = self.network, self._excluded
         if isinstance(vertex, str):
             own = _read_by_groups(network, vertex, _EVENT_KINDS, excluded)
-            found: list[_Vertex] = [*own, *read_inside.get(vertex, ())]
-        else:
-            found = [*_needed(network, vertex, excluded), vertex.block]
-        needs[vertices[vertex]] += [number(needed) for needed in found]
-    sampled = {
-        index for vertex, index in vertices.items() if isinstance(vertex, Node) and vertex.group == HELD
-    }
-    counted = {vertices[name] for name in eventful}
-    paths = _Paths(needs, counted, sampled)
-    before_ticks = -1
-    if any(paths.reads_free[index] for index in readers):
-        before_ticks = max(paths.rank[k] for k in counted if not paths.is_sampled[k])
-    ranks = {
-        name: paths.rank[vertices[name]] + (before_ticks + 1) * paths.is_sampled[vertices[name]]
-        for name in network.equations
-    }
-    if before_ticks < 0 and len({ranks[name] for name in eventful}) == 1:
-        return None
-    return EventOrder(ranks, before_ticks)
+            return [*own, *self._read_inside.get(vertex, ())]
+        if isinstance(vertex, _Tick):
+            read: list[_Vertex] = [
+                *_read_by_groups(network, vertex.block, {vertex.kind}, excluded),
+                vertex.block,
+            ]
+            return read if vertex.kind is SlotKind.OUTPUT else [*read, _Tick(vertex.block, SlotKind.OUTPUT)]
+        if vertex.group == HELD:
+            return [_Tick(vertex.block, SlotKind.OUTPUT)]
+        return [*_needed(network, vertex, excluded), vertex.block]
 
 
 def _read_inside_subsystems(network: Network, excluded: set[str]) -> dict[str, list[Node]]:
@@ -128,24 +169,34 @@ def _read_by_groups(network: Network, name: str, kinds: set[SlotKind], excluded:
             yield from _needed(network, Node(name, index, 0), excluded)
 
 
-class _Paths:
-    """Properties of all paths to each vertex.
+class _Places:
+    """The places of vertices in the order of an instant, from all paths to them.
 
-    ``rank``: the largest number of counted vertices on a path to it; loops count once. ``is_sampled``:
-    whether a path begins at a sampled vertex. ``reads_free``: whether a path contains a counted vertex
-    without a sampled one before it.
+    ``rank``: the largest number of counted vertices on a path; loops count once. ``level``: that of a tick.
+    ``event``: the place of an event, the number of levels of ticks before it and its rank among the events
+    after them. ``reads_events``: whether a counted vertex is on a path. The ticks ``early`` have level 0.
     """
 
-    def __init__(self, needs: list[list[int]], counted: set[int], sampled: set[int]) -> None:
-        self.rank, after = [0] * len(needs), [0] * len(needs)
-        self.is_sampled, self.reads_free = [False] * len(needs), [False] * len(needs)
+    def __init__(
+        self, needs: Sequence[Sequence[int]], counted: set[int], ticks: set[int], early: set[int]
+    ) -> None:
+        count = len(needs)
+        self.rank, after = [0] * count, [0] * count
+        self.level, self.event = [-1] * count, [(0, 0)] * count
+        self.reads_events = [False] * count
+        ticked, passed = [-1] * count, [(0, 0)] * count
         for component in strongly_connected(needs):
             inside = set(component)
             others = {other for k in component for other in needs[k]} - inside
             rank = max((after[other] for other in others), default=0)
             counts = not inside.isdisjoint(counted)
-            is_sampled = not inside.isdisjoint(sampled) or any(self.is_sampled[other] for other in others)
-            reads_free = (counts and not is_sampled) or any(self.reads_free[other] for other in others)
+            reads = counts or any(self.reads_events[other] for other in others)
+            latest = max((passed[other] for other in others), default=(0, 0))
+            level = max((ticked[other] for other in others), default=-1)
+            if not inside.isdisjoint(ticks):
+                level = max(level, 0 if inside & early else latest[0])
+            event = max(latest, (level + 1, 0))
             for k in component:
                 self.rank[k], after[k] = rank, rank + counts
-                self.is_sampled[k], self.reads_free[k] = is_sampled, reads_free
+                self.level[k], self.event[k], self.reads_events[k] = level, event, reads
+                ticked[k], passed[k] = level, (event[0], event[1] + 1) if counts else latest

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from casadi import SX
 
 from armblocks.diagram.controls import EnableControl, TriggerControl
-from armblocks.diagram.event_order import event_order
+from armblocks.diagram.event_order import EventOrder
 from armblocks.diagram.features import SlotKind
 from armblocks.diagram.model import Model
 from armblocks.diagram.port import Guard
@@ -67,11 +67,10 @@ def recaptured_states(model: Model, symbols: Symbols) -> tuple[int, ...]:
     )
 
 
-def event_ranks(model: Model, symbols: Symbols, guards: Sequence[tuple[str, Guard]]) -> EventRanks | None:
-    """The ranks of all events; ``None`` if all events are processed together."""
-    order = event_order(model.flow)
-    if order is None:
-        return None
+def event_ranks(
+    model: Model, symbols: Symbols, guards: Sequence[tuple[str, Guard]], order: EventOrder
+) -> EventRanks:
+    """The ranks of all events in this order."""
     rank_of = order.rank_of
     names = [name for slot in symbols.discrete_slots for name in [slot.name.rpartition("/")[0]] * slot.size]
     ranges = signature(*symbols.discrete_slots).ranges

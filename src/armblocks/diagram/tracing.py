@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from armblocks import interrupts
 from armblocks.diagram.block import Signals
 from armblocks.diagram.conditional_equations import ON
-from armblocks.diagram.features import SlotKind
+from armblocks.diagram.features import AT_TICKS, SlotKind
 from armblocks.diagram.flat_values import named_values, tunable_slots
 from armblocks.diagram.implicit import check_solvable, solve_affine
 from armblocks.diagram.model import Model
@@ -82,12 +82,12 @@ class Tracing:
         network: Network,
         symbols: Symbols,
         sums: Collection[Node],
-        clock_of: Mapping[str, int] | None = None,
+        tick_marks: Mapping[tuple[str, SlotKind], SX] | None = None,
     ) -> None:
         self.network = network
         self._sums = sums
         self.symbols = symbols
-        self._clock_of = clock_of or {}
+        self._tick_marks = tick_marks or {}
         self._values: dict[Node, dict[tuple[SlotKind, str], SX]] = {}
         self._residuals: dict[Value, SX] = {}
         self.products: list[SX] = []
@@ -142,12 +142,14 @@ class Tracing:
                     self._residuals[unknown] = self._values[node].pop((slot.kind, slot.name)) - self.value(
                         unknown
                     )
-        if node.block in self._clock_of:
-            ticks = symbols.m[self._clock_of[node.block]]
+        if (node.block, SlotKind.OUTPUT) in self._tick_marks:
+            is_on: SX | None = None
             if ON in self.network.diagram.gates.get(node.block, {}):
-                ticks = logic_and(ticks, self.value(self.network.input(node.block, ON)))
+                is_on = self.value(self.network.input(node.block, ON))
             for slot in group.slots:
-                if slot.kind in (SlotKind.OUTPUT, SlotKind.UPDATE):
+                if slot.kind in AT_TICKS:
+                    ticks = self._tick_marks[node.block, slot.kind]
+                    ticks = ticks if is_on is None else logic_and(ticks, is_on)
                     computed = self._values[node][slot.kind, slot.name]
                     held = symbols.discrete[f"{node.block}/{slot.name}"]
                     self._values[node][slot.kind, slot.name] = if_else(ticks, computed, held)

@@ -67,7 +67,8 @@ class LinearLoops:
 @dataclass(frozen=True, kw_only=True)
 class EventRanks:
     """The ranks of events at one instant: events of a lower rank are processed first. Events of a negative
-    rank change only derivatives. Those up to the rank ``before_ticks`` come before the ticks.
+    rank change only derivatives. Events up to the rank ``before_ticks[k]`` come before the ticks of level
+    ``k``.
 
     ``guards``, ``hysteresis_modes``, ``recaptured_states``: the ranks of the entries of the fields of
     :class:`HybridSystem` with these names. ``controls``: for each control of a conditional subsystem, the
@@ -75,7 +76,7 @@ class EventRanks:
     its rank. While events of a lower rank are processed, the mode has its old value.
     """
 
-    before_ticks: int
+    before_ticks: tuple[int, ...]
     guards: tuple[int, ...]
     hysteresis_modes: tuple[int, ...]
     recaptured_states: tuple[int, ...]
@@ -98,9 +99,11 @@ class HybridSystem:
     ``residual_jacobian`` and ``guards``: inputs ``t ()``, ``x (nx,)``, ``z (nz,)``, ``w (nw,)``, ``p (np,)``;
     one output ``xd (nx,)``, ``y (ny,)``, ``r (nw,)``, ``J (nw, nw)``, ``g (ng,)``. ``update``: the additional
     input ``m (nclocks,)``; output ``z (nz,)``: the new z at an instant at which the clocks with ``m[k] = 1``
-    tick. If ``captures`` is true, it is also evaluated without a ticking clock just before every instant, at
-    a time one unit in the last place earlier: z then stores left limits. ``reset``: the additional input ``e
-    (ng,)``, +1 or -1 where a guard fired upwards or downwards, else 0; outputs ``x (nx,)`` and ``z (nz,)``.
+    tick. If ticks have several levels, a clock with ``m[k] = 2 + j`` ticks for the outputs and discrete
+    states of level ``j`` only. If ``captures`` is true, it is also evaluated without a ticking clock just
+    before every instant, at a time one unit in the last place earlier: z then stores left limits. ``reset``:
+    the additional input ``e (ng,)``, +1 or -1 where a guard fired upwards or downwards, else 0; outputs
+    ``x (nx,)`` and ``z (nz,)``.
     With all ``e`` zero it gives the consistent modes (for example of a limiter that starts beyond its limit)
     and the resulting states. A run makes this call at the start after the ticks, and whenever no guard fires
     and a mode is inconsistent. At a breakpoint, as at a tick, the signs of guards before and after the
@@ -178,3 +181,13 @@ class HybridSystem:
     """Blocks without equations, whose outputs are computed in Python at their ticks."""
     loops: LinearLoops | None = None
     """The linear loops that are solved symbolically."""
+
+    def ticks_by_level(self, ticking: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], bool]]:
+        """The arguments ``m`` of ``update``, level by level, for clocks of which those with 1 tick, and
+        whether events come before this level."""
+        ranks = (-1,) if self.ranks is None else self.ranks.before_ticks
+        if not ticking.any():
+            return []
+        if len(ranks) == 1:
+            return [(ticking, ranks[0] >= 0)]
+        return [(ticking * (2.0 + level), rank >= 0) for level, rank in enumerate(ranks)]

@@ -54,17 +54,23 @@ class _Start:
         p = self.p = np.asarray(system.parameter_values, dtype=np.float64)
         x, z = system.initial_states(p)[0].ravel(), system.initial_discrete(p)[0].ravel()
         marks = np.array([float(clock.offset == 0.0) for clock in system.clocks])
-        if marks.any():
-            (z,) = self._at(system.update, x, z, marks)
+        self._no_event = np.zeros(len(system.guard_directions))
+        for ticking, follows_events in system.ticks_by_level(marks):
+            if follows_events:
+                x, z = self._consistent(x, z)
+            (z,) = self._at(system.update, x, z, ticking)
         self.before = (x, z)
-        no_event = np.zeros(len(system.guard_directions))
-        for _ in range(no_event.size):
-            after = self._at(system.reset, x, z, no_event)
-            same = np.array_equal(after[0], x) and np.array_equal(after[1], z)
-            x, z = after
+        self.after = self._consistent(x, z)
+
+    def _consistent(self, x: Array, z: Array) -> tuple[Array, Array]:
+        """States and discrete variables after resets without events."""
+        for _ in range(self._no_event.size):
+            new_x, new_z = self._at(self.system.reset, x, z, self._no_event)
+            same = np.array_equal(new_x, x) and np.array_equal(new_z, z)
+            x, z = new_x, new_z
             if same:
                 break
-        self.after = (x, z)
+        return x, z
 
     def _at(self, traced: TracedFunction, x: Array, z: Array, *arguments: Array) -> tuple[Array, ...]:
         return tuple(value.ravel() for value in traced(0.0, x, z, np.empty(0), self.p, *arguments))

@@ -5,6 +5,8 @@ Tick ``k`` of a clock is at ``offset + k period``. Times are computed from ``k``
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from armblocks.integration import system_functions
 from armblocks.integration.evaluation import Evaluation
 from armblocks.integration.frame import SAME_ABOVE, Frame
@@ -12,6 +14,9 @@ from armblocks.integration.workspace import Count, Scalar, Stage, Status
 from armblocks.routines.arithmetic import select
 from armblocks.routines.memory import RealVariable
 from armblocks.routines.values import Boolean, Real
+
+ALL_LEVELS, FIRST_LEVEL = 1.0, 2.0
+"""Marks of a clock that ticks: for all its blocks, and for those of the first level of ticks."""
 
 
 class Clocks:
@@ -45,19 +50,25 @@ class Clocks:
             self.point.value = self.frame.just_before(time)
             self.update()
 
-    def tick(self, time: Real, until: Real) -> None:
-        """Mark the clocks that tick up to ``until`` and update ``z``."""
-        any_ticks: Boolean | None = None
+    def due(self, until: Real) -> tuple[list[Boolean], Boolean | None]:
+        """Whether each clock ticks up to ``until``, and whether any does; the number of its next tick
+        increases."""
+        due: list[Boolean] = []
+        any_due: Boolean | None = None
         for clock in range(self.count):
             ticks = self.next_tick(clock) <= until
             self.numbers[clock] = self.numbers[clock] + ticks.count()
-            self.ticking[clock] = select(ticks, 1.0, 0.0)
-            any_ticks = ticks if any_ticks is None else any_ticks | ticks
-        if any_ticks is not None:
-            with self.frame.r.when(any_ticks):
-                self.frame.increase(Count.INSTANTS)
-                self.point.value = time
-                self.update()
+            any_due = ticks if any_due is None else any_due | ticks
+            due.append(ticks)
+        return due, any_due
+
+    def tick(self, time: Real, due: Sequence[Boolean], level: int | None = None) -> None:
+        """Mark these clocks, for one level or for all, and update ``z``."""
+        mark = ALL_LEVELS if level is None else FIRST_LEVEL + level
+        for clock, ticks in enumerate(due):
+            self.ticking[clock] = select(ticks, mark, 0.0)
+        self.point.value = time
+        self.update()
 
     def update(self) -> None:
         """Set ``z`` to the result of ``update`` for the marked clocks."""

@@ -65,11 +65,12 @@ class Events:
             return count
         return count - f.r.call(self.undecided.accept, t, x, f.reals, f.p)
 
-    def make_modes_consistent(self, time: Real) -> None:
+    def make_modes_consistent(self, time: Real, *, last: bool = True) -> None:
         """At the start of the run, apply resets without events until states and modes are consistent.
 
         A mode may change a signal on which another mode depends. The reset is therefore repeated until
-        nothing changes. The maximum number is ``START_ITERATIONS`` plus the number of guards.
+        nothing changes. The maximum number is ``START_ITERATIONS`` plus the number of guards. ``last``:
+        whether the ticks of the start are complete.
         """
         f, r, workspace = self.frame, self.frame.r, self.frame.workspace
         counter, fired = Count.AT_START, f.vector(workspace.fired)
@@ -95,7 +96,7 @@ class Events:
                 remaining = f.counts[counter] - 1
                 f.counts[counter] = remaining
                 iteration.again_when((same.value == 0.0) & (remaining > 0))
-            f.counts[counter] = 0
+            f.counts[counter] = 0 if last else 1
 
     def _make_following_modes_consistent(self) -> None:
         """Make the following modes consistent, before the stateful modes."""
@@ -149,14 +150,18 @@ class Events:
         for i in r.each(self.guards):
             derivatives[i] = float("nan")
 
-    def process_before_ticks(self, time: Real) -> None:
-        """Process the events on which no sampled signal acts.
+    def process_before_ticks(self, time: Real, level: int) -> None:
+        """Process the events that come before the ticks of this level; at the start of the run, the resets
+        without events.
 
         All other modes and signs have their values only after the ticks, so none is stored here.
         """
-        if self.frame.sizes.rank_before_ticks >= 0:
-            with self.frame.r.when(self.frame.counts[Count.AT_START] == 0):
-                self._iterate(time, self.frame.sizes.rank_before_ticks)
+        f, r, last_rank = self.frame, self.frame.r, self.frame.sizes.ranks_before_ticks[level]
+        if last_rank >= 0:
+            starts = f.counts[Count.AT_START] != 0
+            self.make_modes_consistent(time, last=False)
+            with r.unless(starts):
+                self._iterate(time, last_rank)
 
     def _iterate(self, time: Real, last_rank: int | None = None) -> None:
         """The iteration of :meth:`process`; with a ``last_rank``, only events up to this rank."""

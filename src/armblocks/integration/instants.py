@@ -7,7 +7,8 @@ At an instant (a tick, an event, a breakpoint, the start) the loop does the foll
 1. the flow is integrated up to the instant with the old values, and a step ends exactly there; if states
 store left limits, ``update`` is called without a marked clock;
 2. events on which no sampled signal acts are processed as in step 3, if sampled blocks read them; all clocks
-   that tick now are marked and ``update`` gives ``z``;
+   that tick now are marked and ``update`` gives ``z``. If sampled blocks read events that ticks cause, this
+   is repeated for each level of ticks (:mod:`armblocks.diagram.event_order`);
 3. mode iteration: following modes are made consistent; then ``reset`` gives ``x`` and ``z`` for the guards
    that fire, because the jump changed their sign or their zero was located here; if none fires, inconsistent
    stateful modes take their consistent values; this is repeated until nothing changes;
@@ -108,7 +109,7 @@ class Instants(Schedule):
         if self.delays:
             self.delays.pass_jumps(time)
         if self.events:
-            self.events.process_before_ticks(time)
+            self.events.process_before_ticks(time, level=0)
         self.clocks.pause_before_ticks(time)
 
     def ticks_and_events(self) -> None:
@@ -120,7 +121,7 @@ class Instants(Schedule):
         # the last place: a later sample time is not recorded with it, even if it is close.
         known = time >= f.end.value * SAME_BELOW
         recorded = select(known, until, time)
-        self.clocks.tick(time, until)
+        self.tick(time, until)
         if self.events:
             self.events.make_modes_consistent(time)
             self.events.process(time)
@@ -139,6 +140,18 @@ class Instants(Schedule):
         f.leave_unless(f.count[Count.SEGMENT].value < f.segments, Status.DONE)
         self.begin_piece()
         f.count[Count.STAGE].value = Stage.START
+
+    def tick(self, time: Real, until: Real) -> None:
+        """Process the ticks up to ``until`` level by level, and the events between the levels."""
+        f, levels = self.frame, len(self.frame.sizes.ranks_before_ticks)
+        due, any_due = self.clocks.due(until)
+        if any_due is not None:
+            with f.r.when(any_due):
+                f.increase(Count.INSTANTS)
+                for level in range(levels):
+                    if level and self.events:
+                        self.events.process_before_ticks(time, level)
+                    self.clocks.tick(time, due, None if levels == 1 else level)
 
     def record_left_limits(self, time: Real) -> None:
         """Record the left limits at an instant, unless they are recorded. At the start of a run they are the

@@ -311,7 +311,7 @@ def _sizes_of_ranks(ranks: Mapping[str, Any] | None) -> dict[str, Any]:
     if ranks is None:
         return {}
     return {
-        "rank_before_ticks": int(ranks["before_ticks"]),
+        "ranks_before_ticks": tuple(int(rank) for rank in ranks["before_ticks"]),
         "guard_ranks": tuple(int(rank) for rank in ranks["guards"]),
         "hysteresis_ranks": tuple(int(rank) for rank in ranks["hysteresis_modes"]),
         "recaptured_ranks": tuple(int(rank) for rank in ranks["recaptured_states"]),

@@ -163,7 +163,8 @@ class LoopSizes:
       ``hysteresis_ranks``, ``recaptured_ranks``: those of the entries of ``hysteresis_modes`` and
       ``recaptured_states``. ``controls``: the indices in ``z`` of a mode and of its old value, and a rank;
       while events of a lower rank are processed, the mode has its old value.
-      ``rank_before_ticks``: the highest rank of events before the ticks; negative if there are none.
+      ``ranks_before_ticks``: for each level of ticks, the highest rank of the events before it; negative if
+      there are none.
     - ``parameters``: the number of parameters.
     - ``looped``: whether the system has algebraic loops.
     - ``tangents``: the first entries of ``x``, ``z`` and the guards that belong to derivatives, if there are
@@ -186,7 +187,7 @@ class LoopSizes:
     silenced_guards: tuple[tuple[int, int], ...] = ()
     locating_guards: tuple[int, ...] = ()
     guard_ranks: tuple[int, ...] = ()
-    rank_before_ticks: int = -1
+    ranks_before_ticks: tuple[int, ...] = (-1,)
     hysteresis_ranks: tuple[int, ...] = ()
     recaptured_ranks: tuple[int, ...] = ()
     controls: tuple[tuple[int, int, int], ...] = ()
