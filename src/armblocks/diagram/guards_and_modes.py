@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from casadi import SX
 
 from armblocks.diagram.controls import EnableControl, TriggerControl
-from armblocks.diagram.event_order import EventOrder
 from armblocks.diagram.features import SlotKind
 from armblocks.diagram.model import Model
 from armblocks.diagram.port import Guard
@@ -67,10 +66,11 @@ def recaptured_states(model: Model, symbols: Symbols) -> tuple[int, ...]:
     )
 
 
-def event_ranks(
-    model: Model, symbols: Symbols, guards: Sequence[tuple[str, Guard]], order: EventOrder
-) -> EventRanks:
-    """The ranks of all events in this order."""
+def event_ranks(model: Model, symbols: Symbols, guards: Sequence[tuple[str, Guard]]) -> EventRanks | None:
+    """The ranks of all events; ``None`` if all events are processed together."""
+    order = model.events
+    if order is None:
+        return None
     rank_of = order.rank_of
     names = [name for slot in symbols.discrete_slots for name in [slot.name.rpartition("/")[0]] * slot.size]
     ranges = signature(*symbols.discrete_slots).ranges

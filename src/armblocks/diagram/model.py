@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from armblocks.diagram.block_equations import (
     BlockEquations,
     block_equations,
 )
 from armblocks.diagram.diagram import Diagram
+from armblocks.diagram.event_order import EventOrder, event_order
 from armblocks.diagram.hierarchy import flatten_hierarchy
 from armblocks.diagram.ordering import Evaluation, Network, evaluation_order
 from armblocks.diagram.sampling import Sampling, check_triggered, moving_blocks, resolve_sampling
@@ -27,6 +29,11 @@ class Model:
     flow_order: Evaluation
     tick: Network
     tick_order: Evaluation
+
+    @cached_property
+    def events(self) -> EventOrder | None:
+        """The order of events and ticks at one instant; ``None`` if all events are processed together."""
+        return event_order(self.flow)
 
 
 def diagram_model(diagram: Diagram) -> Model:

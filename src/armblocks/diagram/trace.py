@@ -23,7 +23,6 @@ from casadi import (
 from armblocks.diagram.block_equations import BlockSlot
 from armblocks.diagram.conditional_equations import FIRE, ON
 from armblocks.diagram.diagram import Diagram
-from armblocks.diagram.event_order import EventOrder, event_order
 from armblocks.diagram.features import AT_TICKS, SlotKind
 from armblocks.diagram.flat_values import broadcast_column
 from armblocks.diagram.guards_and_modes import (
@@ -87,14 +86,11 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
     guards = guards_of(model, flow)
     entries = [(name, guard) for name, guard, value in guards for _ in range(value.numel())]
     modes, followers, contradictions = mode_contradictions(model, symbols, flow)
-    momentary, events = momentary_states(model, symbols), event_order(model.flow)
+    momentary = momentary_states(model, symbols)
     point = {"t": symbols.t, "x": symbols.x, "z": symbols.z, "w": loops.w, "p": symbols.p}
     m, e, p = {"m": symbols.m}, {"e": symbols.e}, {"p": symbols.p}
 
-    products, updated, updated_products = (
-        loops.solved(flow.products),
-        *_updated(model, symbols, flow, loops, events),
-    )
+    products, updated, updated_products = loops.solved(flow.products), *_updated(model, symbols, flow, loops)
 
     def function(name: str, inputs: Mapping[str, SX], **results: Sequence[SX]) -> TracedFunction:
         rounded = products if inputs.keys() >= point.keys() else SX(0, 1)
@@ -130,7 +126,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
         recaptured_states=recaptured_states(model, symbols),
         momentary_states=tuple(momentary.values()),
         silenced_guards=silenced_guards(entries, momentary),
-        ranks=None if events is None else event_ranks(model, symbols, entries, events),
+        ranks=event_ranks(model, symbols, entries),
         locating_guards=tuple(number for number, (_, guard) in enumerate(entries) if guard.locates),
         contradictions=function("contradictions", point, c=contradictions) if modes else None,
         reset=function("reset", point | e, **_reset(model, symbols, flow)),
@@ -155,14 +151,12 @@ def _linear_loops(loops: Implicit, point: Mapping[str, SX]) -> LinearLoops | Non
     )
 
 
-def _updated(
-    model: Model, symbols: Symbols, flow: Tracing, loops: Implicit, events: EventOrder | None
-) -> tuple[SX, SX]:
+def _updated(model: Model, symbols: Symbols, flow: Tracing, loops: Implicit) -> tuple[SX, SX]:
     """All discrete variables after a tick, and the signals that are products.
 
     Raises ``DiagramError`` where a nonlinear loop depends on a signal that is sampled at the same tick.
     """
-    tick = Tracing(model.tick, symbols, model.tick_order.sums, _tick_marks(model, symbols, events))
+    tick = Tracing(model.tick, symbols, model.tick_order.sums, _tick_marks(model, symbols))
     for node in model.tick_order.order:
         tick.evaluate(node)
     equations, discrete = model.tick.equations, dict(symbols.discrete)
@@ -197,17 +191,17 @@ def _updated(
     return substituted(updated, cuts, solution), substituted(products, cuts, solution)
 
 
-def _tick_marks(model: Model, symbols: Symbols, events: EventOrder | None) -> dict[tuple[str, SlotKind], SX]:
+def _tick_marks(model: Model, symbols: Symbols) -> dict[tuple[str, SlotKind], SX]:
     """Whether the outputs and the discrete states of each sampled block change at a tick."""
-    several = events is not None and len(events.before_ticks) > 1
-    return {
-        (name, kind): logic_or(mark == 1.0, mark == float(events.level_of[name, kind] + 2))
-        if events is not None and several
-        else mark
-        for name, clock in model.sampling.clock_of.items()
-        for mark in (symbols.m[clock],)
-        for kind in AT_TICKS
-    }
+    marks = {name: symbols.m[clock] for name, clock in model.sampling.clock_of.items()}
+    events = model.events if model.events is not None and len(model.events.before_ticks) > 1 else None
+
+    def changes(mark: SX, name: str, kind: SlotKind) -> SX:
+        if events is None:
+            return mark
+        return logic_or(mark == 1.0, mark == float(events.level_of[name, kind] + 2))
+
+    return {(name, kind): changes(mark, name, kind) for name, mark in marks.items() for kind in AT_TICKS}
 
 
 def _has_captures(model: Model) -> bool:
