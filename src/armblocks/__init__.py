@@ -41,17 +41,20 @@ if TYPE_CHECKING:
     from armblocks.face.least_time import least_time
     from armblocks.face.linearizing import frequency_response, linearize
     from armblocks.face.model import CompiledDiagram, begin, compile_diagram, simulate
+    from armblocks.face.motor_catalogue import load_drives
     from armblocks.face.payload import Payload
     from armblocks.face.planned_trajectories import point_to_point, spline_trajectory
     from armblocks.face.reporting import draw_diagram, write_files, write_report
     from armblocks.face.robots import list_robots, load_robot, save_robot
     from armblocks.face.sensitivity import SensitivityResult, sensitivity
+    from armblocks.face.sizing import SizingReport, size_drives
     from armblocks.face.toolbox_trajectories import ctraj, jtraj, lspb, mstraj, mtraj, tpoly
     from armblocks.face.trajectory import JointTrajectory
     from armblocks.face.trajectory_file import load_trajectory
     from armblocks.face.trajectory_report import BindingInterval, TrajectoryReport, trajectory_report
     from armblocks.face.trimming import trim
     from armblocks.formats import load_table
+    from armblocks.report.drive_load import Drive, DriveLoad
     from armblocks.robot import (
         Attachment,
         Coupling,
@@ -106,6 +109,8 @@ else:
             "DiagramBuilder": "armblocks.diagram",
             "DiagramDifference": "armblocks.diagram",
             "DiagramRun": "armblocks.face.diagram_run",
+            "Drive": "armblocks.report.drive_load",
+            "DriveLoad": "armblocks.report.drive_load",
             "Fixed": "armblocks.robot",
             "Free": "armblocks.robot",
             "FrictionModel": "armblocks.robot",
@@ -134,6 +139,7 @@ else:
             "SensitivityResult": "armblocks.face.sensitivity",
             "SimulationOptions": "armblocks.equations",
             "SimulationResult": "armblocks.simulation",
+            "SizingReport": "armblocks.face.sizing",
             "Spherical": "armblocks.robot",
             "SphericalClosure": "armblocks.robot",
             "TrajectoryReport": "armblocks.face.trajectory_report",
@@ -159,6 +165,7 @@ else:
             "list_libraries": "armblocks.face.diagrams",
             "list_robots": "armblocks.face.robots",
             "load_diagram": "armblocks.face.diagrams",
+            "load_drives": "armblocks.face.motor_catalogue",
             "load_library": "armblocks.face.diagrams",
             "load_robot": "armblocks.face.robots",
             "load_table": "armblocks.formats",
@@ -175,6 +182,7 @@ else:
             "save_robot": "armblocks.face.robots",
             "sensitivity": "armblocks.face.sensitivity",
             "simulate": "armblocks.face.model",
+            "size_drives": "armblocks.face.sizing",
             "spline_trajectory": "armblocks.face.planned_trajectories",
             "standard_dh": "armblocks.robot",
             "to_python": "armblocks.face.diagrams",
@@ -203,6 +211,8 @@ __all__ = [
     "DiagramBuilder",
     "DiagramDifference",
     "DiagramRun",
+    "Drive",
+    "DriveLoad",
     "Fixed",
     "Free",
     "FrictionModel",
@@ -231,6 +241,7 @@ __all__ = [
     "SensitivityResult",
     "SimulationOptions",
     "SimulationResult",
+    "SizingReport",
     "Spherical",
     "SphericalClosure",
     "TrajectoryReport",
@@ -256,6 +267,7 @@ __all__ = [
     "list_libraries",
     "list_robots",
     "load_diagram",
+    "load_drives",
     "load_library",
     "load_robot",
     "load_table",
@@ -272,6 +284,7 @@ __all__ = [
     "save_robot",
     "sensitivity",
     "simulate",
+    "size_drives",
     "spline_trajectory",
     "standard_dh",
     "to_python",

@@ -1,7 +1,8 @@
 """The entry point of the command line: commands, and handling of errors, warnings and Ctrl-C.
 
 Exit codes: 0 done, 1 a defect of armblocks (with a traceback), 2 invalid input (a message, no traceback), 130
-interrupted with Ctrl-C. ``diff`` also exits with 1 if its diagrams differ, and ``lint`` if it has findings.
+interrupted with Ctrl-C. ``diff`` also exits with 1 if its diagrams differ, ``lint`` if it has findings, and
+``size`` if a joint has no drive that passes.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from armblocks.cli import (
     listing,
     run,
     show,
+    size,
     studio,
     trim,
 )
@@ -70,6 +72,7 @@ app.command("diagram")(diagram.diagram)
 app.command("convert")(convert.convert)
 app.command("show")(show.show)
 app.command("lint")(lint.lint)
+app.command("size")(size.size)
 app.command("list")(listing.list_names)
 app.command("blocks")(blocks.describe_blocks)
 app.command("docs")(docs.docs)
