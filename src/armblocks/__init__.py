@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         save_library,
         to_python,
     )
+    from armblocks.face.ikine_branches import IkineBranches
     from armblocks.face.ikine_result import IkineResult
     from armblocks.face.least_time import least_time
     from armblocks.face.linearizing import frequency_response, linearize
@@ -114,6 +115,7 @@ else:
             "Fixed": "armblocks.robot",
             "Free": "armblocks.robot",
             "FrictionModel": "armblocks.robot",
+            "IkineBranches": "armblocks.face.ikine_branches",
             "IkineResult": "armblocks.face.ikine_result",
             "JointLimits": "armblocks.robot",
             "JointSpring": "armblocks.robot",
@@ -216,6 +218,7 @@ __all__ = [
     "Fixed",
     "Free",
     "FrictionModel",
+    "IkineBranches",
     "IkineResult",
     "JointLimits",
     "JointSpring",

@@ -80,6 +80,7 @@ def examples() -> Mapping[str, Any]:
             ab.Coupling(name="c", terms=(("a", 1.0), ("b", 2.0))),
             arm.assemble(),
             arm.ikine(arm.fkine([0.1, 0.2])),
+            arm.ikine_all(arm.fkine([0.1, 0.2])),
         ),
         *(ab.Cylindrical(), ab.Universal(), ab.Planar(), ab.Spherical(), ab.Free(), ab.Screw(pitch=0.1)),
         *(ab.FrictionModel.RELEASE_6, ab.JointLimits(speed=1.0), ab.standard_dh("one", a=1.0).dh),

@@ -30,6 +30,7 @@ from armblocks.dynamics.ball_joints import (
     structure_matrix,
 )
 from armblocks.dynamics.base_parameters import regrouped
+from armblocks.dynamics.closed_form.trace import trace_branches
 from armblocks.dynamics.constrained import constrained_motion, restoring_rates
 from armblocks.dynamics.crba import crba
 from armblocks.dynamics.energy import first_moment, kinetic_energy, potential_energy
@@ -414,6 +415,7 @@ TRACES: Mapping[str, Callable[..., TracedFunction]] = {
     "jacobe": trace_jacobe,
     "pose_error_in_world": trace_pose_error_in_world,
     "pose_error_in_tool": trace_pose_error_in_tool,
+    "branches": trace_branches,
     "manipulability": trace_manipulability,
     "rne": trace_rne,
     "rne_loaded": trace_rne_loaded,

@@ -26,6 +26,7 @@ from armblocks.face.arm_functions import (
     StateFunction,
 )
 from armblocks.face.assembly import Assembly, assemble, coordinates
+from armblocks.face.ikine_branches import ClosedForm, IkineBranches, chosen_branch, configuration_of
 from armblocks.face.ikine_result import IkineResult
 from armblocks.face.notebook_views import robot_view
 from armblocks.face.payload import Payload, payload_numbers
@@ -232,6 +233,32 @@ class Arm(metaclass=ArgumentErrors):
         axes = check_axes(axes, where) if mask is not None or axes != "tool" else "world"
         return solve(self._search(frame, axes), T, q0, options, threads)
 
+    def ikine_all(
+        self, T: Target, *, limits: bool = True, tolerance: float = 1e-9, threads: int = 1
+    ) -> IkineBranches:
+        """Find all coordinates q (nq,) with ``fkine(q) = T`` in closed form, for one pose or for N.
+
+        For arms with six joints and a spherical wrist or three parallel axes, arms of parallel axes (SCARA,
+        planar), palletisers, and arms with three to five joints of these kinds. The geometry is detected.
+        Every branch is checked by forward kinematics to ``tolerance`` (m and rad). ``T`` and ``limits`` as
+        for :meth:`ikine`; of angles that differ by whole turns, the one within the limits is given, else
+        the one nearest to zero. Raises RobotError that names the reason for other arms.
+        """
+        return self._closed_form.branches(T, limits, tolerance, threads)
+
+    def ikine6s(
+        self, T: Target, configuration: str = "lun", *, limits: bool = False, threads: int = 1
+    ) -> IkineResult:
+        """Find the solution with the letters of the toolbox's ``ikine6s``, in closed form.
+
+        For arms with six revolute joints, parallel axes 2 and 3, and a spherical wrist. ``l`` or ``r``: left
+        or right-handed, ``u`` or ``d``: elbow up or down, ``n`` or ``f``: wrist not flipped or flipped, as in
+        release 10 and the Python toolbox. The arm is right-handed if the centre of the wrist is on the side
+        of ``z1 × z2`` of axis 1, where z1 and z2 are the directions of axes 1 and 2.
+        """
+        index = configuration_of(self._closed_form, configuration)
+        return chosen_branch(self.robot, self._closed_form.branches(T, limits, 1e-9, threads), index)
+
     # ---- dynamics ----------------------------------------------------------------------------------------
     @cached_property
     def rne(self) -> MotionFunction:
@@ -354,6 +381,15 @@ class Arm(metaclass=ArgumentErrors):
             kernel = cached_kernel(key, lambda: _traces()[method](self.robot, frame))
             self._kernels[name] = kernel
         return kernel
+
+    @cached_property
+    def _closed_form(self) -> ClosedForm:
+        kernel = self._kernel("branches")
+
+        def iterate(targets: Array, starts: Array | None) -> IkineResult:
+            return self.ikine(targets, starts, limits=False, restarts=100 if starts is None else 0)
+
+        return ClosedForm.of(self.robot, kernel, iterate)
 
     def _search(self, frame: str | None, axes: str) -> ArmSearch:
         """The compiled inverse kinematics of the tool or of a frame. Raises UnknownNameError."""

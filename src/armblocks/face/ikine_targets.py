@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 Target = Transform | ArrayLike | Sequence[Transform]
 """One pose or several: a Transform, a (4, 4) or (N, 4, 4) array, a list of them, or an SE3 of spatialmath."""
 
+ROUNDING = 1e-12
+"""Deviation of ``R' R`` from the identity above which the nearest rotation replaces ``R``."""
 _ALLOWED = "a Transform, shape (4, 4), or (N, 4, 4) or a list of Transforms for N poses"
 
 
@@ -60,6 +62,34 @@ def target_array(T: Target, where: str) -> tuple[Array, bool]:
             fix="give homogeneous matrices [R p; 0 0 0 1]",
         )
     return np.ascontiguousarray(array, dtype=np.float64), array.ndim == 3
+
+
+def checked_poses(T: Target, where: str) -> tuple[Array, bool]:
+    """The targets (N, 4, 4) with exact rotations, and whether there is a batch.
+
+    Raises InputError for matrices that are not poses.
+    """
+    targets, batch = target_array(T, where)
+    targets = targets.reshape(-1, 4, 4)
+    R = targets[:, :3, :3]
+    x, y, z = (R[:, :, k].T for k in range(3))
+    products = [_dot(x, x) - 1.0, _dot(y, y) - 1.0, _dot(z, z) - 1.0, _dot(x, y), _dot(y, z), _dot(z, x)]
+    deviation = np.abs(np.stack(products)).max(axis=0)
+    volume = _dot(x, (y[1] * z[2] - y[2] * z[1], y[2] * z[0] - y[0] * z[2], y[0] * z[1] - y[1] * z[0]))
+    sound = (deviation <= ORTHONORMALITY) & (volume > 0.0) & np.isfinite(targets[:, :3, 3]).all(axis=1)
+    sound &= (targets[:, 3] == (0.0, 0.0, 0.0, 1.0)).all(axis=1)
+    for k in np.flatnonzero(~sound)[:1]:
+        raise_invalid_target(targets[k], int(k) if batch else None, where)
+    rounded = np.flatnonzero(deviation > ROUNDING)
+    if rounded.size:
+        U, _, Vt = np.linalg.svd(R[rounded])
+        targets = targets.copy()
+        targets[rounded, :3, :3] = U @ Vt
+    return targets, batch
+
+
+def _dot(a: Sequence[Array] | Array, b: Sequence[Array] | Array) -> Array:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def raise_invalid_target(T: Array, index: int | None, where: str) -> None:
