@@ -221,3 +221,22 @@ def test_frames_follow_a_renamed_link() -> None:
     frame = NamedFrame(name="camera", link="torso")
     assert frame.with_renamed_link("torso", "trunk").link == "trunk"
     assert frame.with_renamed_link("other", "trunk") is frame
+
+
+def test_blocks_compute_the_pose_and_the_jacobian_of_a_frame() -> None:
+    robot = two_armed()
+    q = np.random.default_rng(5).uniform(-1, 1, robot.n)
+    name = robot.frames[0].name
+    arm = ab.Arm(robot)
+    builder = ab.DiagramBuilder("frames")
+    constant = builder.add("q", ab.blocks.Constant(value=q))
+    for kind in (ab.blocks.Fkine, ab.blocks.Jacob0, ab.blocks.Jacobe):
+        builder.add(kind.__name__, kind(robot=robot, frame=name), constant)
+    builder.add("tool", ab.blocks.Fkine(robot=robot), constant)
+    result = ab.simulate(builder.build(), stop_time=0.01)
+    np.testing.assert_allclose(result["tool/T"][0], arm.fkine(q), atol=1e-14)
+    np.testing.assert_allclose(result["Fkine/T"][0], arm.fkine(q, frame=name), atol=1e-14)
+    np.testing.assert_allclose(result["Jacob0/J"][0], arm.jacob0(q, frame=name), atol=1e-14)
+    np.testing.assert_allclose(result["Jacobe/J"][0], arm.jacobe(q, frame=name), atol=1e-14)
+    with pytest.raises(UnknownNameError, match="no frame named 'nowhere'"):
+        ab.blocks.Fkine(robot=robot, frame="nowhere")

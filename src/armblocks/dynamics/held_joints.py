@@ -10,16 +10,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from casadi import SX, if_else, logic_and, logic_or, mtimes, sign, vertcat
+from casadi import SX, dot, if_else, logic_and, logic_or, mtimes, sign, vertcat
 from numpy.typing import NDArray
 
 from armblocks.dynamics.base_parameters import regrouped
 from armblocks.dynamics.crba import FactoredInertia, SquareMatrix, crba
 from armblocks.dynamics.forward import check_accelerations_exist
+from armblocks.dynamics.held_mechanism import MechanismEquations
 from armblocks.dynamics.joint_motion import entries, joint_motions
 from armblocks.dynamics.loads import tip_wrench, with_payload
+from armblocks.dynamics.mechanism import Array
 from armblocks.dynamics.rnea import rnea
 from armblocks.dynamics.springs import spring_torques
+from armblocks.errors import RobotError, counted
+from armblocks.robot.link import Motor
 from armblocks.robot.robot import Robot
 from armblocks.robot.tree import KinematicTree
 
@@ -43,10 +47,22 @@ class DryFriction:
         """The Coulomb friction of the motors, referred to the joints by the robot's friction model."""
         limits = np.zeros((robot.n, 2))
         for k, motor in enumerate(robot.motors):
-            if motor is not None:
-                limits[k] = robot.friction_model.factors(motor.gear_ratio)[1] * np.array(
-                    motor.coulomb_friction
+            limits[k] = _dry_limits(robot, motor)
+        for joint in robot.coupled_joints:
+            own = _dry_limits(robot, joint.link.motor)
+            if not own.any():
+                continue
+            if len(joint.factors) != 1:
+                raise RobotError(
+                    f"joint '{joint.link.name}' has Coulomb friction and depends on "
+                    f"{counted(len(joint.factors), 'coordinate')}",
+                    where=f"robot '{robot.name}'",
+                    allowed="Coulomb friction at coupled joints that depend on one coordinate",
+                    fix="give the friction to the joints on which it depends, or use ForwardDynamics",
                 )
+            ((k, factor),) = joint.factors.items()
+            # Where the factor is negative, the joint moves backwards when the coordinate moves forwards.
+            limits[k] += factor * (own if factor > 0.0 else own[::-1])
         return cls(limits[:, 0] + 0.0, limits[:, 1] + 0.0)
 
     @property
@@ -59,14 +75,32 @@ class DryFriction:
         return if_else(mode > 0.0, SX(self.forward), if_else(mode < 0.0, SX(self.backward), 0.0))
 
 
-def viscous_friction(robot: Robot) -> NDArray[np.float64]:
-    """Torque per joint speed (n,), N m s/rad or N s/m, by the robot's friction model."""
-    return np.array(
-        [
-            robot.friction_model.factors(motor.gear_ratio)[0] * motor.viscous_friction if motor else 0.0
-            for motor in robot.motors
-        ]
-    )
+def _dry_limits(robot: Robot, motor: Motor | None) -> NDArray[np.float64]:
+    """Coulomb friction (2,) of a motor at its joint, forwards and backwards."""
+    if motor is None:
+        return np.zeros(2)
+    return robot.friction_model.factors(motor.gear_ratio)[1] * np.array(motor.coulomb_friction)
+
+
+def viscous_torque(robot: Robot, qd: SX) -> SX:
+    """The torque (n,), N m or N, that overcomes viscous friction, by the robot's friction model."""
+    factors = np.array([_viscous_factor(robot, motor) for motor in robot.motors])
+    torque = SX(factors) * qd
+    for joint in robot.coupled_joints:
+        factor = _viscous_factor(robot, joint.link.motor)
+        if factor:
+            row = SX.zeros(robot.n)
+            for k, value in joint.factors.items():
+                row[k] = value
+            torque = torque + row * (factor * dot(row, qd))
+    return SX(torque)
+
+
+def _viscous_factor(robot: Robot, motor: Motor | None) -> float:
+    """Torque per speed of a joint, N m s/rad or N s/m."""
+    if motor is None:
+        return 0.0
+    return robot.friction_model.factors(motor.gear_ratio)[0] * motor.viscous_friction
 
 
 class JointEquations:
@@ -109,13 +143,13 @@ class JointEquations:
             result[body.speed] = value
         return result
 
-    def accelerations(self, torque: SX, free: SX) -> SX:
-        """``qdd`` (n,), exactly 0 for locked joints."""
-        return self.solve(torque - self.bias, free)
+    def motion(self, torque: SX, free: SX) -> tuple[SX, SX]:
+        """``qdd`` (n,), exactly 0 for locked joints, and the torque that holds each locked joint (n,).
 
-    def holding_torque(self, torque: SX, qdd: SX) -> SX:
-        """The torque that holds each locked joint (n,); 0 up to rounding for free joints."""
-        return torque - self.bias - mtimes(self.M, qdd)
+        The holding torque of free joints is 0 up to rounding.
+        """
+        qdd = self.solve(torque - self.bias, free)
+        return qdd, torque - self.bias - mtimes(self.M, qdd)
 
     def speeds_after_impact(self, qd: SX, stopping: SX) -> SX:
         """Speeds after an impact that stops some joints (1) and leaves the others free (0).
@@ -146,8 +180,22 @@ def breakaway_direction(held_torque: SX, contact: SX, forward: SX, backward: SX)
     return forwards - backwards
 
 
+def equations_at(
+    robot: Robot, q: SX, qd: SX, wrench: SX | None, payload: SX | None, near: Array | None
+) -> JointEquations | MechanismEquations:
+    """The equations of motion at a state; ``near``: see :class:`MechanismEquations`."""
+    if robot.constraints:
+        return MechanismEquations(robot, q, qd, wrench, payload, near)
+    return JointEquations(robot, q, qd, wrench, payload)
+
+
 def locked_joints(
-    equations: JointEquations, qd: SX, driving: SX, start: JointModes, friction: DryFriction, breakaway: SX
+    equations: JointEquations | MechanismEquations,
+    qd: SX,
+    driving: SX,
+    start: JointModes,
+    friction: DryFriction,
+    breakaway: SX,
 ) -> JointModes:
     """The locked joints, and the sliding directions of the others.
 
@@ -167,8 +215,8 @@ def locked_joints(
     mode, contact = start.mode, start.contact
     for iteration in range(n + 1):
         torque = driving - friction.sliding(mode)
-        qdd = equations.accelerations(torque, mode != 0.0)
-        released = breakaway_direction(equations.holding_torque(torque, qdd), contact, forward, backward)
+        qdd, holding_torque = equations.motion(torque, mode != 0.0)
+        released = breakaway_direction(holding_torque, contact, forward, backward)
         slides = mode
         if iteration < n:
             inertia = SX(vertcat(*(equations.M[i, i] for i in range(n))))

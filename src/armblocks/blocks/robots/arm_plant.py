@@ -14,8 +14,8 @@ from casadi import SX, dot, fmax, fmin, if_else, logic_and, logic_not, logic_or,
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.blocks.robots.ports import (
+    check_consistent_start,
     check_joint_values,
-    check_no_constraints,
     check_start,
     coordinate_rates,
     normalised_coordinates,
@@ -23,6 +23,7 @@ from armblocks.blocks.robots.ports import (
     qd_port,
     qdd_port,
     start_coordinates,
+    start_numbers,
     tau_port,
 )
 from armblocks.blocks.robots.robot_field import RobotField
@@ -39,13 +40,16 @@ from armblocks.diagram import (
     driver,
     parameter,
 )
+from armblocks.dynamics.constrained import ConstrainedMotion, restoring_rates
 from armblocks.dynamics.held_joints import (
     DryFriction,
     JointEquations,
     JointModes,
+    equations_at,
     locked_joints,
-    viscous_friction,
+    viscous_torque,
 )
+from armblocks.dynamics.held_mechanism import MechanismEquations, check_lockable, consistent_state
 from armblocks.errors import InputError
 from armblocks.robot import Robot
 
@@ -63,6 +67,9 @@ class ArmPlant(Block):
     stiffness (limit - q) - damping qd, but only in the direction away from the stop. ``hard``: the joint
     stops at once in a plastic impact, whose impulse also acts on the other joints. It stays exactly at the
     limit until a torque moves it away. Joints that rest at their stops before the impact stay there.
+
+    The robot may have coupled joints and closed loops; the start must satisfy them (``arm.assemble``). In
+    a mechanism with loops, only joints that determine the others can have dry friction or hard stops.
 
     ``payload``: mass (kg), centre x y z (m) and inertia xx yy zz xy yz xz (kg m^2) about this centre, in the
     tool frame. If the payload jumps, the joint speeds do not change: a payload is picked up and released at
@@ -123,10 +130,11 @@ class ArmPlant(Block):
     wrench_input: bool = parameter(False, doc="whether the block has an input for a force at the tip")
 
     def check(self) -> None:
-        check_no_constraints(self, self.robot)
         check_start(self, self.robot, "q0")
         for name in ("qd0", "breakaway", "stiffness", "damping"):
             check_joint_values(self, self.robot, name)
+        check_consistent_start(self, self.robot, "q0", "qd0")
+        check_lockable(self.robot, self._lockable_joints(), self._near(), "ArmPlant")
         friction = DryFriction.of(self.robot)
         starts = self.robot.neutral + np.asarray(self.q0) if np.ndim(self.q0) == 0 else np.asarray(self.q0)
         for k, (name, _) in enumerate(self.robot.speeds):
@@ -201,8 +209,8 @@ class ArmPlant(Block):
     # -- equations
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        equations, torque, qdd = self._motion(x, u, p)
-        holding_torque = equations.holding_torque(torque, qdd)
+        x = self._consistent(x)
+        qdd, holding_torque = self._motion(x, u, p)
         mode, contact = self._mode(x), self._rigid(self._contact(x))
         dry = DryFriction.of(self.robot)
         forward, backward = (p["breakaway"] * SX(side) for side in (dry.forward, dry.backward))
@@ -213,25 +221,28 @@ class ArmPlant(Block):
             "q": normalised_coordinates(self.robot, x["q"]),
             "qd": x["qd"],
             "qdd": qdd,
-            "friction": friction + SX(viscous_friction(self.robot)) * x["qd"],
+            "friction": friction + viscous_torque(self.robot, x["qd"]),
             "stop": rigid + self._elastic_stops(x, p),
         }
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {
-            "q": coordinate_rates(self.robot, x["q"], x["qd"]),
-            "qd": self._motion(x, u, p)[2],
-        }
+        near = self._consistent(x)
+        qdd, _ = self._motion(near, u, p)
+        if self.robot.closures:
+            motion = ConstrainedMotion(near["q"], near["qd"], qdd, SX(0, 1))
+            q_rates, qd_rates = restoring_rates(self.robot, x["q"], x["qd"], motion)
+            return {"q": q_rates, "qd": qd_rates}
+        return {"q": coordinate_rates(self.robot, x["q"], x["qd"]), "qd": qdd}
 
     def initial_states(self, p: Signals) -> Signals:
         return {"q": start_coordinates(self.robot, p["q0"]), "qd": p["qd0"]}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        x = self._consistent(x)
         mode, contact, q, qd = self._mode(x), self._contact(x), self._axis_positions(x), x["qd"]
         values: dict[str, SX] = {"rest": if_else(mode == 0.0, 1.0, mode * qd)}
         if self._lockable_joints():
-            equations, torque, qdd = self._motion(x, u, p)
-            holding_torque = equations.holding_torque(torque, qdd)
+            _, holding_torque = self._motion(x, u, p)
             dry = DryFriction.of(self.robot)
             forward, backward = (p["breakaway"] * SX(side) for side in (dry.forward, dry.backward))
             held, rigid = mode == 0.0, self._rigid(contact)
@@ -254,6 +265,7 @@ class ArmPlant(Block):
         return {name: values[name][list(self._joints_of(name))] for name in names}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        x = self._consistent(x)
         q, qd = self._axis_positions(x), x["qd"]
         if self.stops == "hard":
             resting = qd == 0.0
@@ -276,6 +288,7 @@ class ArmPlant(Block):
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         # Modes change by the guards; the consistent modes are the solution of a complementarity problem.
         inconsistent = dict[str, SX]()
+        x = self._consistent(x)
         guards = self.guard_values(t, x, u, p)
         if self._lockable_joints():
             reversed_joints = (
@@ -297,6 +310,7 @@ class ArmPlant(Block):
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         if not e:
             return {}
+        before, x = x, self._consistent(x)
         fired = {
             name: self._on_all_joints(name, e) for name in ("rest", "forwards", "backwards", "upper", "lower")
         }
@@ -313,9 +327,7 @@ class ArmPlant(Block):
         if self.stops == "hard":
             impact = logic_or(hits_upper, hits_lower)
             resting = logic_or(impact, contact != 0.0)
-            after = JointEquations(self.robot, q, qd, u.get("wrench"), u.get("payload")).speeds_after_impact(
-                qd, resting
-            )
+            after = self._equations({"q": q, "qd": qd}, u).speeds_after_impact(qd, resting)
             qd = if_else(dot(impact, impact) > 0.0, after, qd)
             at_stop = if_else(hits_upper, self._limits(1), self._limits(0))
             q = self._with_axis_positions(q, impact, at_stop)
@@ -330,7 +342,7 @@ class ArmPlant(Block):
         if self._lower_stop_joints() or self._upper_stop_joints():
             values["contact"] = rest.contact if self.stops == "hard" else contact
         any_event = dot(vertcat(*e.values()), vertcat(*e.values())) > 0.0
-        after = {name: if_else(any_event, value, x[name]) for name, value in values.items()}
+        after = {name: if_else(any_event, value, before[name]) for name, value in values.items()}
         # At rest the speed is 0 for all parameter values, so its derivatives with respect to parameters are 0
         # too.
         rests = logic_and(rest.mode == 0.0, x["qd"] == 0.0)
@@ -443,19 +455,35 @@ class ArmPlant(Block):
 
     def _driving_torque(self, x: Signals, u: Signals, p: Signals) -> SX:
         """The joint torque without dry friction and rigid stops."""
-        return u["tau"] - SX(viscous_friction(self.robot)) * x["qd"] + self._elastic_stops(x, p)
+        return u["tau"] - viscous_torque(self.robot, x["qd"]) + self._elastic_stops(x, p)
 
-    def _motion(self, x: Signals, u: Signals, p: Signals) -> tuple[JointEquations, SX, SX]:
-        """The equations of motion, the joint torque with sliding friction, and the accelerations."""
-        equations = JointEquations(self.robot, x["q"], x["qd"], u.get("wrench"), u.get("payload"))
+    def _near(self) -> NDArray[np.float64] | None:
+        return start_numbers(self, self.robot, "q0") if self.robot.closures else None
+
+    def _consistent(self, x: Signals) -> Signals:
+        """The state that satisfies the closures of the robot; locked joints keep their values."""
+        if not self.robot.closures:
+            return x
+        q, qd = consistent_state(self.robot, x["q"], x["qd"], self._free(self._mode(x)), self._near())
+        return {**x, "q": q, "qd": qd}
+
+    def _equations(self, x: Signals, u: Signals) -> JointEquations | MechanismEquations:
+        wrench, payload = u.get("wrench"), u.get("payload")
+        return equations_at(self.robot, x["q"], x["qd"], wrench, payload, self._near())
+
+    def _free(self, mode: SX) -> SX:
+        """The mask (n,) of joints that are not locked."""
+        return mode != 0.0 if self._lockable_joints() else SX.ones(self.robot.n)
+
+    def _motion(self, x: Signals, u: Signals, p: Signals) -> tuple[SX, SX]:
+        """The accelerations, and the torques that hold the locked joints."""
         mode = self._mode(x)
         torque = self._driving_torque(x, u, p) - DryFriction.of(self.robot).sliding(mode)
-        free = mode != 0.0 if self._lockable_joints() else SX.ones(self.robot.n)
-        return equations, torque, equations.accelerations(torque, free)
+        return self._equations(x, u).motion(torque, self._free(mode))
 
     def _consistent_rest(self, x: Signals, u: Signals, p: Signals, guess: JointModes) -> JointModes:
         """The consistent modes and contacts of the joints at rest; the search begins at ``guess``."""
-        equations = JointEquations(self.robot, x["q"], x["qd"], u.get("wrench"), u.get("payload"))
+        equations = self._equations(x, u)
         breakaway = p["breakaway"] * SX.ones(self.robot.n)
         driving = self._driving_torque(x, u, p)
         return locked_joints(equations, x["qd"], driving, guess, DryFriction.of(self.robot), breakaway)

@@ -117,7 +117,7 @@ class RobotEnergy(Block):
     """Kinetic and potential energy of an arm: T = 1/2 qd' M(q) qd, V = -sum of m g . r.
 
     M contains the rotor inertias. The sum is over the links, with mass m and centre of mass r in the world
-    frame; g is the acceleration of gravity.
+    frame; g is the acceleration of gravity. V includes the energy of the robot's springs.
     """
 
     title: ClassVar[str] = "Energy"

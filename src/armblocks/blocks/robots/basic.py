@@ -106,7 +106,10 @@ class JTraj(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Fkine(Block):
-    """Forward kinematics: T = fkine(q), the pose of the tool in the world frame."""
+    """Forward kinematics: T = fkine(q), the pose of the tool in the world frame.
+
+    ``frame``: the name of a named frame or a link of the robot, whose pose is computed instead.
+    """
 
     title: ClassVar[str] = "fkine"
     card_size: ClassVar[tuple[float, float]] = (84.0, 64.0)
@@ -117,6 +120,10 @@ class Fkine(Block):
     )
 
     robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    frame: str = parameter("", doc="named frame or link of the robot in the place of the tool")
+
+    def check(self) -> None:
+        self.robot.frame(self.frame or self.robot.links[-1].name)
 
     def input_ports(self) -> tuple[Port, ...]:
         return (q_port(self.robot),)
@@ -125,12 +132,15 @@ class Fkine(Block):
         return (Port("T", "pose of the tool in the world frame", shape=(4, 4)),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"T": apply_traced(dynamics.trace_fkine(self.robot), u["q"])}
+        return {"T": apply_traced(dynamics.trace_fkine(self.robot, self.frame or None), u["q"])}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Jacob0(Block):
-    """The Jacobian in the world frame: (v; w) = J qd, rows linear then angular, point = tool origin."""
+    """The Jacobian in the world frame: (v; w) = J qd, rows linear then angular, point = tool origin.
+
+    ``frame``: the name of a named frame or a link of the robot that takes the place of the tool.
+    """
 
     title: ClassVar[str] = "jacob0"
     sign: ClassVar[FaceSign] = Words("J(q)")
@@ -140,6 +150,10 @@ class Jacob0(Block):
     )
 
     robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    frame: str = parameter("", doc="named frame or link of the robot in the place of the tool")
+
+    def check(self) -> None:
+        self.robot.frame(self.frame or self.robot.links[-1].name)
 
     def input_ports(self) -> tuple[Port, ...]:
         return (q_port(self.robot),)
@@ -148,12 +162,15 @@ class Jacob0(Block):
         return (Port("J", "Jacobian in the world frame", shape=(6, self.robot.n)),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"J": apply_traced(dynamics.trace_jacob0(self.robot), u["q"])}
+        return {"J": apply_traced(dynamics.trace_jacob0(self.robot, self.frame or None), u["q"])}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Jacobe(Block):
-    """The Jacobian in the tool frame: (v; w) = J qd, rows linear then angular (jacobn in the toolbox)."""
+    """The Jacobian in the tool frame: (v; w) = J qd, rows linear then angular (jacobn in the toolbox).
+
+    ``frame``: the name of a named frame or a link of the robot that takes the place of the tool.
+    """
 
     title: ClassVar[str] = "jacobn"
     sign: ClassVar[FaceSign] = Words("Jₑ(q)")
@@ -163,6 +180,10 @@ class Jacobe(Block):
     )
 
     robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    frame: str = parameter("", doc="named frame or link of the robot in the place of the tool")
+
+    def check(self) -> None:
+        self.robot.frame(self.frame or self.robot.links[-1].name)
 
     def input_ports(self) -> tuple[Port, ...]:
         return (q_port(self.robot),)
@@ -171,7 +192,7 @@ class Jacobe(Block):
         return (Port("J", "Jacobian in the tool frame", shape=(6, self.robot.n)),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"J": apply_traced(dynamics.trace_jacobe(self.robot), u["q"])}
+        return {"J": apply_traced(dynamics.trace_jacobe(self.robot, self.frame or None), u["q"])}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -147,11 +147,6 @@ def check_no_closures(block: Block, robot: Robot) -> None:
     check_independent(block, robot, robot.closures)
 
 
-def check_no_constraints(block: Block, robot: Robot) -> None:
-    """Raise ``InputError`` for a robot with constraints, whose joints do not move independently."""
-    check_independent(block, robot, robot.constraints)
-
-
 def check_independent(block: Block, robot: Robot, constraints: Sequence[Constraint]) -> None:
     """Raise ``InputError`` for the first of the constraints that a block does not support."""
     if constraints:
