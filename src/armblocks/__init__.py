@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from armblocks.face.planned_trajectories import point_to_point, spline_trajectory
     from armblocks.face.reporting import draw_diagram, write_files, write_report
     from armblocks.face.robots import list_robots, load_robot, save_robot
+    from armblocks.face.run_films import write_film
     from armblocks.face.sensitivity import SensitivityResult, sensitivity
     from armblocks.face.sizing import SizingReport, size_drives
     from armblocks.face.toolbox_trajectories import ctraj, jtraj, lspb, mstraj, mtraj, tpoly
@@ -194,6 +195,7 @@ else:
             "with_comments": "armblocks.diagram",
             "with_parameter_set": "armblocks.diagram",
             "write_files": "armblocks.face.reporting",
+            "write_film": "armblocks.face.run_films",
             "write_report": "armblocks.face.reporting",
         },
         argument_errors=True,
@@ -297,6 +299,7 @@ __all__ = [
     "with_comments",
     "with_parameter_set",
     "write_files",
+    "write_film",
     "write_report",
 ]
 

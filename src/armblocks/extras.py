@@ -15,6 +15,7 @@ LIBRARIES = {
     "analysis": ("scipy",),
     "data": ("pandas", "pyarrow", "scipy"),
     "figures": ("matplotlib",),
+    "film": ("PIL", "imageio_ffmpeg"),
     "notebook": ("anywidget", "traitlets"),
     "studio": ("pydantic", "starlette", "uvicorn", "websockets"),
     "xacro": ("xacro",),

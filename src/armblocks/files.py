@@ -47,19 +47,19 @@ def write_atomically(path: str | Path, data: bytes, *, mode: int = 0o666) -> os.
 class GrowingFile:
     """A file that is written in parts under a temporary name and renamed when it is complete.
 
-    Before the renaming, an existing file of that name is unchanged. Raises ``FormatError`` as
-    :func:`write_atomically` does.
+    Before the renaming, an existing file of that name is unchanged. ``stream`` receives the parts; another
+    program may write them to ``temporary`` instead. Raises ``FormatError`` as :func:`write_atomically` does.
     """
 
     def __init__(self, path: str | Path) -> None:
-        self._path_text = str(path)
+        self.path = str(path)
         self._target = _writable_target(path)
         name = f".{self._target.name[:64]}.{secrets.token_hex(6)}.part"
-        self._temporary = self._target.parent / name
+        self.temporary = self._target.parent / name
         try:
-            self.stream: BinaryIO = self._temporary.open("xb")
+            self.stream: BinaryIO = self.temporary.open("xb")
         except OSError as error:
-            raise _write_error(self._path_text, error) from error
+            raise _write_error(self.path, error) from error
 
     def finish(self) -> None:
         """Rename the complete file to its final name."""
@@ -68,19 +68,19 @@ class GrowingFile:
             os.fsync(self.stream.fileno())
             self.stream.close()
             if self._target.exists():
-                self._temporary.chmod(self._target.stat().st_mode & 0o7777)
-            self._temporary.replace(self._target)
+                self.temporary.chmod(self._target.stat().st_mode & 0o7777)
+            self.temporary.replace(self._target)
             sync_folder(self._target.parent)
         except OSError as error:
             self.abandon()
-            raise _write_error(self._path_text, error) from error
+            raise _write_error(self.path, error) from error
 
     def abandon(self) -> None:
         """Delete the temporary file."""
         with contextlib.suppress(OSError):
             self.stream.close()
         with contextlib.suppress(OSError):
-            self._temporary.unlink(missing_ok=True)
+            self.temporary.unlink(missing_ok=True)
 
 
 def read_bounded(path: str | Path, limit: int) -> bytes:

@@ -220,3 +220,12 @@ def test_a_run_logs_the_chosen_signals_while_it_runs(
     assert result.exit_code == 0, result.output
     assert pq.read_table("all.parquet").column_names == ["time", "x1/y", "x2/y"]
     assert "all 101 rows: all.parquet" in result.output
+
+
+def test_run_writes_a_film(invoke: Callable[..., Result], refusal: Callable[..., str]) -> None:
+    result = invoke(
+        "run", "kr180model", "--stop-time", "0.1", "--no-figures", "--film", "run.gif", "--out", "report"
+    )
+    assert result.exit_code == 0, result.output
+    assert "film: run.gif" in result.output and Path("run.gif").read_bytes().startswith(b"GIF89a")
+    assert "no format of films named '.avi'" in refusal("run", "kr180model", "--film", "run.avi")

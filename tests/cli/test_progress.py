@@ -6,7 +6,7 @@ import pytest
 from rich.console import Console
 
 from armblocks.cli import progress as module
-from armblocks.cli.progress import RunProgress
+from armblocks.cli.progress import FrameProgress, RunProgress
 
 
 @pytest.mark.parametrize(
@@ -46,3 +46,14 @@ def test_a_run_that_is_nearly_finished_shows_no_remaining_time(monkeypatch: pyte
         clock_time[0] += 5.0
         progress(1.0, 0.9, 3.0)
     assert "left" not in text.getvalue()
+
+
+def test_the_progress_of_a_film_counts_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = io.StringIO()
+    now = [0.0]
+    monkeypatch.setattr(module.time, "perf_counter", lambda: now[0])
+    with FrameProgress("a.mp4", Console(file=text, width=200)) as progress:
+        for frame in (1, 30, 60):
+            now[0] += 6.0
+            progress(frame, 60)
+    assert "a.mp4: frame 1 of 60" in text.getvalue() and "frame 30 of 60" in text.getvalue()

@@ -21,6 +21,8 @@ CORE_DEPENDENCY = "pydantic"
 """Also a dependency of the core, through typer."""
 INDIRECT = {"anywidget": {"traitlets"}}
 """Indirect dependencies."""
+IMPORT_NAMES = {"pillow": "PIL", "imageio-ffmpeg": "imageio_ffmpeg"}
+"""Import names of libraries that differ from their names in the package index."""
 
 WITHOUT_EXTRAS = """
 import importlib, json, pkgutil, sys, warnings
@@ -71,6 +73,8 @@ for name, call in {
     "poles": linear.poles,
     "widget": lambda: ab.robot_widget(ab.load_robot("puma560")),
     "xacro": lambda: ab.load_robot("arm.xacro"),
+    "gif": lambda: ab.load_robot("puma560").animate([[0.0] * 6] * 2, 0.1, save="x.gif"),
+    "mp4": lambda: ab.load_robot("puma560").animate([[0.0] * 6] * 2, 0.1, save="x.mp4"),
 }.items():
     try:
         said[name] = repr(call())
@@ -118,6 +122,8 @@ def test_the_core_runs_without_the_extras_and_names_missing_libraries(tmp_path: 
         "poles": ("scipy", "analysis", "poles of a linear system"),
         "widget": ("anywidget", "notebook", "widgets in notebooks"),
         "xacro": ("xacro", "xacro", "xacro files"),
+        "gif": ("PIL", "film", "GIF films"),
+        "mp4": ("imageio_ffmpeg", "film", "MP4 films"),
     }
     assert message.keys() == expected.keys()
     for name, (library, extra, use) in expected.items():
@@ -132,7 +138,7 @@ def test_messages_and_pyproject_agree_on_the_libraries_of_the_extras() -> None:
     extras = project["optional-dependencies"]
     named = {name: {entry.partition(">")[0] for entry in extras[name]} for name in LIBRARIES}
     for name, libraries in LIBRARIES.items():
-        installed = named[name] - {"armblocks[figures]"}
+        installed = {IMPORT_NAMES.get(entry, entry) for entry in named[name] - {"armblocks[figures]"}}
         installed |= {other for library in installed for other in INDIRECT.get(library, set())}
         assert installed == set(libraries), name
     assert extras["all"] == [f"armblocks[{','.join(sorted(LIBRARIES))}]"]

@@ -9,14 +9,19 @@ const REST_DELAY_MS = 150
 export function shareCursor(onRest: (time: number) => void) {
   let channel: BroadcastChannel | null = null
   let receivedTime: number | null = null
+  let sentTime: number | null = null
   let timer: ReturnType<typeof setTimeout> | undefined
   useCursor.subscribe(({ time }, before) => {
     if (time === null || time === before.time || time === receivedTime) return
     channel?.postMessage(time)
     clearTimeout(timer)
-    timer = setTimeout(() => onRest(time), REST_DELAY_MS)
+    timer = setTimeout(() => {
+      sentTime = time
+      onRest(time)
+    }, REST_DELAY_MS)
   })
   const show = (time: number) => {
+    if (time === sentTime) return // the echo of a sent time must not stop a slow playback
     receivedTime = time
     useCursor.setState({ time, playing: false })
   }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from types import TracebackType
+from typing import Self
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn
@@ -30,7 +31,7 @@ class RunProgress:
         self._bar: Progress | None = None
         self._task: TaskID | None = None
 
-    def __enter__(self) -> RunProgress:
+    def __enter__(self) -> Self:
         if self._console.is_terminal:
             self._bar = Progress(
                 TextColumn("{task.description}"),
@@ -52,6 +53,9 @@ class RunProgress:
     def __call__(self, simulated: float, fraction: float, real_time_factor: float) -> None:
         time_text = f"{simulated:,.0f}" if simulated >= 1000 else f"{simulated:.4g}"
         where = f"t = {time_text} s, {factor_text(real_time_factor)} x real time"
+        self._show(where, fraction)
+
+    def _show(self, where: str, fraction: float) -> None:
         now = time.perf_counter()
         remaining = (now - self._start_time) * (1.0 / fraction - 1.0) if fraction > 0.0 else 0.0
         if remaining >= _MIN_REMAINING_TIME:
@@ -61,6 +65,13 @@ class RunProgress:
         elif now >= self._next_line and fraction < 1.0:
             self._next_line = now + _LINE_INTERVAL
             self._console.print(f"{self._name}: {where} ({fraction:.0%})")
+
+
+class FrameProgress(RunProgress):
+    """Displays the progress of a film: called with the number of written frames, and of all frames."""
+
+    def __call__(self, frame: float, count: float, _: float = 0.0) -> None:
+        self._show(f"frame {frame:.0f} of {count:.0f}", frame / count)
 
 
 def _duration(seconds: float) -> str:

@@ -13,7 +13,7 @@ import typer
 
 from armblocks.cli.assignments import chosen_parameters
 from armblocks.cli.completion import ModelName, ParameterSetName
-from armblocks.cli.progress import RunProgress
+from armblocks.cli.progress import FrameProgress, RunProgress
 from armblocks.cli.terminal import messages_console, results_console
 from armblocks.errors import FormatError, LimitWarning, SimulationError
 
@@ -29,6 +29,14 @@ class DataFormat(StrEnum):
     MAT = "mat"
 
 
+FilmFile = Annotated[
+    Path | None,
+    typer.Option(help="Write a film of the arms in this .mp4 or .gif file; needs the extra film."),
+]
+StateFile = Annotated[
+    Path | None, typer.Option(help="Save the final state in this .npz file, for --from-state.")
+]
+ReportFolder = Annotated[Path | None, typer.Option(help="Folder of the report.", show_default="MODEL-report")]
 RecordJumps = Annotated[
     bool | None,
     typer.Option(
@@ -56,9 +64,7 @@ def run(
     from_state: Annotated[
         Path | None, typer.Option(help="Continue from the saved state of an earlier run.")
     ] = None,
-    save_state: Annotated[
-        Path | None, typer.Option(help="Save the final state in this .npz file, for --from-state.")
-    ] = None,
+    save_state: StateFile = None,
     log: Annotated[
         Path | None,
         typer.Option(help="Write all recorded samples to this .parquet or .csv file during the run."),
@@ -66,9 +72,8 @@ def run(
     log_signals: Annotated[
         str | None, typer.Option(help="Only these signals, separated by commas.", show_default="all")
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder of the report.", show_default="MODEL-report")
-    ] = None,
+    film: FilmFile = None,
+    out: ReportFolder = None,
     assignments: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="BLOCK.PARAMETER=VALUE", help="Change a parameter; may be repeated."),
@@ -93,7 +98,7 @@ def run(
     parameters = chosen_parameters(diagram, parameter_set, assignments)
     settings = _given_settings(stop_time=stop_time, solver=solver, step=step, sample_time=sample_time)
     settings |= _given_settings(rtol=rtol, atol=atol, record_jumps=jumps)
-    _check_files(diagram, formats or [])
+    _check_files(diagram, formats or [], film)
     folder = out or Path(f"{diagram.name}-report")
     new_folders = [path for path in (folder, *folder.parents) if not path.exists()]
     _check_writable(folder)
@@ -109,6 +114,8 @@ def run(
     print_displays(diagram, result, console)
     print_motions(diagram, result, console)
     print_files(files, console)
+    if film is not None:
+        console.print(f"film: {_film(film, diagram, result)}", highlight=False)
     if result.log is not None:
         console.print(f"all {result.log.rows} rows: {result.log.path}", highlight=False)
     if open_report:
@@ -155,8 +162,19 @@ def _report(
         )
 
 
-def _check_files(diagram: Diagram, formats: list[DataFormat]) -> None:
+def _film(path: Path, diagram: Diagram, result: SimulationResult) -> Path:
+    import armblocks as ab
+
+    with FrameProgress(path.name, messages_console()) as progress:
+        return ab.write_film(path, diagram, result, progress=progress)
+
+
+def _check_files(diagram: Diagram, formats: list[DataFormat], film: Path | None) -> None:
     """Check before the run that the files can be written."""
+    if film is not None:
+        from armblocks.pictures.film import check_film
+
+        check_film(film, 1, (2, 2))
     from armblocks.report.sink_files import REPORT_DATA, sink_files
     from armblocks.simulation.export import check_format
 

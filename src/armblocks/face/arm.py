@@ -6,7 +6,8 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, cached_property
-from typing import TYPE_CHECKING
+from os import PathLike
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,6 +39,8 @@ if TYPE_CHECKING:
     from armblocks.equations import TracedFunction
     from armblocks.face.ikine_search import ArmSearch
     from armblocks.face.ikine_targets import Target
+    from armblocks.face.trajectory import JointTrajectory
+    from armblocks.pictures.film import FilmProgress
 
 Array = NDArray[np.float64]
 
@@ -324,6 +327,69 @@ class Arm(metaclass=ArgumentErrors):
     def centre_of_mass(self) -> ConfigurationFunction:
         """``centre_of_mass(q)`` → (3,) m: centre of mass of all links, in the world."""
         return self._entry("centre_of_mass")
+
+    # ---- views -------------------------------------------------------------------------------------------
+    def plot(
+        self,
+        q: ArrayLike | None = None,
+        *,
+        save: str | PathLike[str] | None = None,
+        block: bool = False,
+        theme: Literal["light", "dark"] | None = None,
+        size: tuple[int, int] | None = None,
+        view: tuple[float, float] | None = None,
+    ) -> Any:
+        """Show the arm at ``q`` (nq,), or a motion ``q`` (N, nq), with a slider for each joint.
+
+        In a notebook the result is a widget; elsewhere the 3-D page opens in the browser, and the call
+        returns at once. ``block`` waits until the page is closed. The result has ``q``, the coordinates at
+        the sliders. ``save``: write a file instead, ``.png``, ``.svg`` or ``.pdf``, and return its path; a
+        motion is drawn as its last pose, with the first one pale and the path of the tool. ``theme``: by
+        default that of the viewer. ``size``: width and height, px (files, widgets). ``view``: azimuth and
+        elevation of the camera of a file, degrees.
+
+        Raises InputError for a wrong shape of ``q``, UnknownNameError for another suffix.
+        """
+        from armblocks.face import arm_views
+
+        return arm_views.plot(self, q, save=save, block=block, theme=theme, size=size, view=view)
+
+    def animate(
+        self,
+        q: ArrayLike | JointTrajectory,
+        dt: ArrayLike | None = None,
+        *,
+        save: str | PathLike[str] | None = None,
+        rate: float = 25.0,
+        speed: float = 1.0,
+        block: bool = False,
+        theme: Literal["light", "dark"] | None = None,
+        size: tuple[int, int] | None = None,
+        view: tuple[float, float] | None = None,
+        progress: FilmProgress | None = None,
+    ) -> Any:
+        """Play a motion: ``q`` (N, nq) with ``dt`` s between rows, or at times ``dt`` (N,), or a trajectory.
+
+        As :meth:`plot`, in a notebook or in the browser. The default of ``dt`` is 0.05 s. ``save``: write a
+        film instead, ``.mp4`` or ``.gif``, and return its path; ``.png`` and ``.svg`` show the path of the
+        tool. Films need the extra ``film``. ``rate``: frames per second. ``speed`` 2 plays twice as fast.
+        ``progress(done, all)`` is called after each frame. Ctrl-C leaves an old file unchanged.
+        """
+        from armblocks.face import arm_views
+
+        appearance: dict[str, Any] = {"theme": theme, "size": size, "view": view}
+        film: dict[str, Any] = {"rate": rate, "speed": speed, "progress": progress}
+        return arm_views.animate(self, q, dt, save=save, block=block, **appearance, **film)
+
+    def teach(self, q: ArrayLike | None = None, *, block: bool = False) -> Any:
+        """Move the joints by sliders, from ``q`` (nq,) on: :meth:`plot` without a motion.
+
+        ``view = arm.teach()``; ``view.q`` are the present coordinates, which can also be set. Robots with
+        closed loops stay closed. ``arm.teach(block=True).q`` waits until the page is closed.
+        """
+        from armblocks.face import arm_views
+
+        return arm_views.teach(self, q, block=block)
 
     # ---- compilation ---------------------------------------------------------------------------------
     def operation_count(self, method: str) -> OperationCount:

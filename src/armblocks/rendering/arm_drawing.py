@@ -15,7 +15,7 @@ from armblocks.pictures.numbers import axis_number, nice_step
 from armblocks.pictures.picture import Disc, Picture, Polyline, Raster, Rectangle, Text
 from armblocks.pictures.style import FIGURE_WIDTH, SMALL_SIZE, TEXT_SIZE, Theme, Tone
 from armblocks.pictures.svg import svg_file
-from armblocks.rendering.camera import Camera
+from armblocks.rendering.camera import AZIMUTH, ELEVATION, Camera
 from armblocks.rendering.render import Rendering, composite, crop, render, shadow, with_opacity
 from armblocks.robot import Robot
 from armblocks.robot.geometry import Body, link_frames, reach, robot_bodies
@@ -42,12 +42,26 @@ class Stage:
     """Spacing, then minimum x, maximum x, minimum y, maximum y of the floor grid, m."""
     width: float
     height: float
+    raster_scale: float = RASTER_SCALE
+    """Rendered pixels of the bodies per px of the figure."""
 
     @classmethod
     def framing(
-        cls, robot: Robot, poses: _Array, path: _Array, width: float, height: float, *, margin: float = 10.0
+        cls,
+        robot: Robot,
+        poses: _Array,
+        path: _Array,
+        width: float,
+        height: float,
+        *,
+        margin: float = 10.0,
+        view: tuple[float, float] = (AZIMUTH, ELEVATION),
+        raster_scale: float = RASTER_SCALE,
     ) -> Stage:
-        """A stage with a camera that shows all ``poses`` (K, L+2, 4, 4) and the ``path`` (N, 3) m."""
+        """A stage with a camera that shows all ``poses`` (K, L+2, 4, 4) and the ``path`` (N, 3) m.
+
+        ``view``: azimuth and elevation of the camera, degrees.
+        """
         bodies = robot_bodies(robot)
         corner_points = [
             body.mesh.corners.reshape(-1, 3) @ pose[body.row, :3, :3].T + pose[body.row, :3, 3]
@@ -67,7 +81,14 @@ class Stage:
         x1, y1 = ((math.ceil(float(v) / spacing) + 8) * spacing for v in high[:2])
         floor_corners = np.array([(x, y, floor) for x in (low[0], high[0]) for y in (low[1], high[1])])
         # The corners of the floor may touch the edge of the panel, the arm must not.
-        camera = Camera.framing(np.concatenate([points, floor_corners]), width, height, margin=margin)
+        camera = Camera.framing(
+            np.concatenate([points, floor_corners]),
+            width,
+            height,
+            margin=margin,
+            azimuth=view[0],
+            elevation=view[1],
+        )
         return cls(
             bodies=bodies,
             pedestal=_pedestal(robot, base_height, floor),
@@ -76,6 +97,7 @@ class Stage:
             grid=(spacing, x0, x1, y0, y1),
             width=width,
             height=height,
+            raster_scale=raster_scale,
         )
 
     def meshes(self, pose: _Array) -> list[TriangleMesh]:
@@ -84,7 +106,7 @@ class Stage:
 
     def render(self, meshes: Sequence[TriangleMesh]) -> Rendering:
         """Bodies in the world, shaded."""
-        return render(meshes, self.camera, self.width, self.height, RASTER_SCALE)
+        return render(meshes, self.camera, self.width, self.height, self.raster_scale)
 
 
 def pose_sequence_picture(
@@ -103,7 +125,7 @@ def pose_sequence_picture(
     height, caption = round(width * 0.84), 34.0
     stage = Stage.framing(robot, poses[samples], path, width, height, margin=16.0)
     start_pose = stage.render(stage.meshes(poses[samples[0]]))
-    floor = _floor(stage)
+    floor = floor_marks(stage)
     rows = math.ceil(count / columns)
     picture = Picture(
         width=FIGURE_WIDTH,
@@ -112,7 +134,7 @@ def pose_sequence_picture(
         description=(
             f"The arm {robot.name} at "
             + ", ".join(f"{axis_number(float(time[k]))} s" for k in samples)
-            + f"; the tool goes from {_position(path[samples[0]])} to {_position(path[samples[-1]])}."
+            + f"; the tool goes from {position_text(path[samples[0]])} to {position_text(path[samples[-1]])}."
         ),
     )
     for number, k in enumerate(samples):
@@ -123,11 +145,13 @@ def pose_sequence_picture(
         panel.extend(floor)
         meshes = stage.meshes(poses[k])
         body = start_pose if number == 0 else stage.render(meshes)
-        panel.add(_raster(stage, meshes, body, None if number == 0 else start_pose))
-        panel.extend(_path_marks(stage, body, path, k))
+        panel.add(arm_raster(stage, meshes, body, None if number == 0 else start_pose))
+        panel.extend(path_marks(stage, body, path, k))
         panel.add(
             Text(2, height + 16, f"t = {axis_number(float(time[k]))} s", size=TEXT_SIZE, bold=True),
-            Text(width - 2, height + 16, _position(path[k]), size=SMALL_SIZE, tone=Tone.MUTED, anchor="end"),
+            Text(
+                width - 2, height + 16, position_text(path[k]), size=SMALL_SIZE, tone=Tone.MUTED, anchor="end"
+            ),
         )
         picture.place(panel, left, top)
     note = f"Floor grid {axis_number(stage.grid[0])} m, floor at z = {axis_number(stage.floor, 3)} m"
@@ -137,29 +161,36 @@ def pose_sequence_picture(
     return picture
 
 
-def arm_picture(robot: Robot, q: Sequence[float], *, width: float = 420.0, height: float = 340.0) -> Picture:
-    """The robot at joint coordinates ``q`` (n,) rad or m, on its floor."""
+def arm_picture(
+    robot: Robot,
+    q: Sequence[float],
+    *,
+    width: float = 420.0,
+    height: float = 340.0,
+    view: tuple[float, float] = (AZIMUTH, ELEVATION),
+) -> Picture:
+    """The robot at joint coordinates ``q`` (nq,) rad or m, on its floor.
+
+    ``view``: azimuth and elevation of the camera, degrees.
+    """
     poses = link_frames(robot, q)
-    stage = Stage.framing(robot, poses[None], poses[None, -1, :3, 3], width, height)
+    stage = Stage.framing(robot, poses[None], poses[None, -1, :3, 3], width, height, view=view)
     picture = Picture(
         width=width,
         height=height,
         title=robot.name,
-        description=f"The arm {robot.name} with its tool at {_position(poses[-1, :3, 3])}.",
+        description=f"The arm {robot.name} with its tool at {position_text(poses[-1, :3, 3])}.",
     )
-    picture.extend(_floor(stage))
+    picture.extend(floor_marks(stage))
     meshes = stage.meshes(poses)
-    picture.add(_raster(stage, meshes, stage.render(meshes), None))
-    picture.add(
-        Text(
-            8,
-            height - 8,
-            f"grid {axis_number(stage.grid[0])} m",
-            size=SMALL_SIZE,
-            tone=Tone.MUTED,
-        )
-    )
+    picture.add(arm_raster(stage, meshes, stage.render(meshes), None), grid_note(stage))
     return picture
+
+
+def grid_note(stage: Stage) -> Text:
+    """The spacing of the floor grid, at the lower left corner."""
+    text = f"grid {axis_number(stage.grid[0])} m"
+    return Text(8, stage.height - 8, text, size=SMALL_SIZE, tone=Tone.MUTED)
 
 
 def arm_picture_svg(
@@ -169,13 +200,14 @@ def arm_picture_svg(
     return svg_file(arm_picture(robot, q, width=size[0], height=size[1]), theme=theme)
 
 
-def _raster(
+def arm_raster(
     stage: Stage, meshes: Sequence[TriangleMesh], body: Rendering, start_pose: Rendering | None
 ) -> Raster:
     """Shadow, start pose and body as one image in the panel, without its empty margin."""
-    rows, columns = round(stage.height * RASTER_SCALE), round(stage.width * RASTER_SCALE)
+    scale = stage.raster_scale
+    rows, columns = round(stage.height * scale), round(stage.width * scale)
     canvas = np.zeros((rows, columns, 4), dtype=np.uint8)
-    half = RASTER_SCALE / 2
+    half = scale / 2
     shadow_pixels = shadow(meshes, stage.camera, stage.floor, stage.width, stage.height, half)
     doubled = np.repeat(np.repeat(shadow_pixels, 2, axis=0), 2, axis=1)[:rows, :columns]
     canvas[: doubled.shape[0], : doubled.shape[1]] = doubled
@@ -187,15 +219,15 @@ def _raster(
         window[:] = composite(pixels, window)
     pixels, left, top = crop(canvas)
     return Raster(
-        left / RASTER_SCALE,
-        top / RASTER_SCALE,
-        pixels.shape[1] / RASTER_SCALE,
-        pixels.shape[0] / RASTER_SCALE,
+        left / scale,
+        top / scale,
+        pixels.shape[1] / scale,
+        pixels.shape[0] / scale,
         pixels,
     )
 
 
-def _floor(stage: Stage) -> list[Polyline]:
+def floor_marks(stage: Stage) -> list[Polyline]:
     """The floor grid up to the panel's edge."""
     spacing, x0, x1, y0, y1 = stage.grid
     xs = [x0 + k * spacing for k in range(round((x1 - x0) / spacing) + 1)]
@@ -225,7 +257,7 @@ def _clipped(line: _Array, width: float, height: float) -> _Array | None:
     return np.stack([start + enter * step, start + leave * step]) if enter < leave else None
 
 
-def _path_marks(stage: Stage, body: Rendering, path: _Array, current: int) -> list[Polyline | Disc]:
+def path_marks(stage: Stage, body: Rendering, path: _Array, current: int) -> list[Polyline | Disc]:
     """The future path as a dotted line; the past path fades with age and is dim behind bodies."""
     x, y, inverse_depth = stage.camera.project(path)
     points = np.column_stack([x, y])
@@ -290,6 +322,7 @@ def _cone(lower: float, upper: float, length: float) -> Housing:
     return Housing(start=start, end=end, length=length, roundness=1.0, material=Material.BASE)
 
 
-def _position(p: _Array) -> str:
+def position_text(p: _Array) -> str:
+    """A position (3,) m as text with two decimals."""
     x, y, z = (axis_number(round(float(v), 2) + 0.0) for v in p)
     return f"x {x}  y {y}  z {z} m"

@@ -8,24 +8,25 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armblocks.diagram import Diagram, View, ViewKind, diagram_views
 from armblocks.errors import InputError
 from armblocks.extras import from_extra
 from armblocks.face.arm import Arm
-from armblocks.rendering.arm_drawing import arm_picture_svg
 from armblocks.robot import Robot
 from armblocks.simulation import SimulationResult
 from armblocks.studio.built_page import built_page
 from armblocks.studio.protocol.frames import sample_frame
-from armblocks.studio.robots.scene import link_frames_of, scene_of
+from armblocks.studio.robots.scene import link_frames_of
+from armblocks.studio.view_content import ViewContent, arm_content, moved
+
+Array = NDArray[np.float64]
 
 if TYPE_CHECKING:
     from anywidget import AnyWidget
@@ -35,8 +36,6 @@ HEIGHT = 460
 PARTS = ("scopes", "robot")
 DISPLAYED_KINDS = (ViewKind.TRACES, ViewKind.PATH, ViewKind.ROBOT)
 SCRIPT = Path(__file__).parent / "notebook_widget.js"
-DRAWING_SIZE = (480, 360)
-"""Width and height of the static drawing of an arm, px."""
 
 
 def run_widget(
@@ -71,24 +70,28 @@ def run_widget(
 
 
 def robot_widget(robot: Arm | Robot, q: ArrayLike | None = None, *, height: int = HEIGHT) -> AnyWidget:
-    """Show an arm at the joint coordinates ``q`` (n,), rad or m; the default is zero. The view can rotate.
+    """Show an arm at the joint coordinates ``q`` (nq,), rad or m, with a slider for each of them.
+
+    The default is the neutral configuration. ``widget.q`` reads and sets the coordinates.
 
     Raises ``InputError`` for a wrong number of coordinates, ``MissingLibraryError`` if anywidget is not
     installed.
     """
-    described_robot = robot.robot if isinstance(robot, Arm) else robot
-    content = {"key": described_robot.name, "run": None, "scopes": False, "arm": _arm("", described_robot, q)}
-    return _widget(f"Robot {described_robot.name}", height, content, b"")
+    described = robot.robot if isinstance(robot, Arm) else robot
+    coordinates = described.neutral if q is None else np.asarray(q, dtype=np.float64)
+    link_frames_of(described, coordinates.tolist())  # raises for a wrong number of coordinates
+    return content_widget(arm_content(described, coordinates), height)
 
 
-def _arm(path: str, robot: Robot, q: ArrayLike | None = None) -> dict[str, Any]:
-    q_list = robot.neutral.tolist() if q is None else np.asarray(q, dtype=np.float64).tolist()
-    return {
-        "path": path,
-        "scene": asdict(scene_of(robot)),
-        "rest": link_frames_of(robot, q_list),
-        "drawing": arm_picture_svg(robot, q_list, DRAWING_SIZE),
-    }
+def content_widget(content: ViewContent, height: int) -> AnyWidget:
+    """A widget with an arm: sliders, or a motion. ``widget.q`` reads and sets the coordinates."""
+    widget = _widget(content.title, height, content.shown, content.frame)
+    widget.follow(content.robot, content.q)
+    return widget
+
+
+def _arm(path: str, robot: Robot) -> dict[str, Any]:
+    return {**arm_content(robot, robot.neutral).shown["arm"], "path": path}
 
 
 def _record(views: Sequence[tuple[str, View]], result: SimulationResult) -> tuple[str, dict[str, Any], bytes]:
@@ -128,7 +131,7 @@ def _record(views: Sequence[tuple[str, View]], result: SimulationResult) -> tupl
     return key, run, sample_frame(key, 0, result.time, signals)
 
 
-def _widget(title: str, height: int, content: dict[str, Any], frame: bytes) -> AnyWidget:
+def _widget(title: str, height: int, content: dict[str, Any], frame: bytes) -> Any:
     return _widget_class()(title=title, height=height, _shown=content, _frame=frame, _page=_page())
 
 
@@ -160,5 +163,32 @@ def _widget_class() -> type[AnyWidget]:
         title = traitlets.Unicode().tag(sync=True)
         height = traitlets.Int().tag(sync=True)
         time = traitlets.Float(None, allow_none=True).tag(sync=True)
+        joints = traitlets.List(traitlets.Float()).tag(sync=True)
+        _poses = traitlets.Dict(None, allow_none=True).tag(sync=True)
+        _live = traitlets.Bool(True).tag(sync=True)
+
+        def follow(self, robot: Robot, q: Array) -> None:
+            """Compute the poses of a robot at the coordinates that the sliders or Python set."""
+            self._robot, self._q = robot, q
+            self.joints = q.tolist()
+            self.observe(self._move, "joints")
+
+        @property
+        def q(self) -> Array:
+            """The coordinates (nq,) at the sliders, rad or m."""
+            return self._q.copy()
+
+        @q.setter
+        def q(self, value: ArrayLike) -> None:
+            coordinates = np.asarray(value, dtype=np.float64)
+            link_frames_of(self._robot, coordinates.tolist())
+            self.joints = coordinates.tolist()
+
+        def _move(self, change: Any) -> None:
+            q = np.asarray(change["new"], dtype=np.float64)
+            if q.shape != self._q.shape or not np.isfinite(q).all():
+                return
+            self._q, poses = moved(self._robot, self._q, q)
+            self._poses = {"q": self._q.tolist(), "poses": poses}
 
     return StudioWidget

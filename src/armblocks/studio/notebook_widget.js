@@ -19,11 +19,17 @@ function render({ model, el }) {
     send({ ...model.get('_shown'), kind: 'show', dark: isDark(), frame: bytes(model.get('_frame')) })
   const sendTheme = () => send({ kind: 'theme', dark: isDark() })
   const sendTime = () => send({ kind: 'time', time: model.get('time') })
+  const sendPoses = () => model.get('_poses') && send({ kind: 'poses', ...model.get('_poses') })
+  const sendLive = () => send({ kind: 'live', live: model.get('_live') })
   const receive = ({ source, data }) => {
     if (source !== frame.contentWindow) return
     if (data.kind === 'ready') {
       sendContent()
+      sendPoses()
       if (model.get('time') !== null) sendTime()
+    } else if (data.kind === 'joints') {
+      model.set('joints', data.q)
+      model.save_changes()
     } else if (data.kind === 'time') {
       model.set('time', data.time)
       model.save_changes()
@@ -36,6 +42,8 @@ function render({ model, el }) {
   themeObserver.observe(document.body, { attributeFilter: ['class', 'data-jp-theme-light'] })
   model.on('change:_shown', sendContent)
   model.on('change:time', sendTime)
+  model.on('change:_poses', sendPoses)
+  model.on('change:_live', sendLive)
   frame.srcdoc = model.get('_page')
   el.append(frame)
   return () => {
@@ -44,6 +52,8 @@ function render({ model, el }) {
     themeObserver.disconnect()
     model.off('change:_shown', sendContent)
     model.off('change:time', sendTime)
+    model.off('change:_poses', sendPoses)
+    model.off('change:_live', sendLive)
   }
 }
 

@@ -1,6 +1,7 @@
-import { Button, SegmentedControl, Slider } from '@mantine/core'
+import { Button, SegmentedControl } from '@mantine/core'
 import { useState } from 'react'
 import type { LinkRow } from '../../protocol'
+import { JointSlider } from '../joint_slider'
 import { atRest, cellText, setJoints, useRobotEditor, type Joints } from './state'
 
 const HALF_TURN = Math.PI
@@ -36,7 +37,7 @@ export function JointsPanel() {
         </Button>
       </div>
       {moving.map((link, k) => (
-        <JointSlider
+        <LinkSlider
           key={link.name}
           link={link}
           quantity={quantity}
@@ -50,71 +51,30 @@ export function JointsPanel() {
   )
 }
 
-interface JointSliderProps {
+interface LinkSliderProps {
   link: LinkRow
   quantity: keyof Joints
   value: number
   onValue: (value: number) => void
 }
 
-function JointSlider({ link, quantity, value, onValue }: JointSliderProps) {
+function LinkSlider({ link, quantity, value, onValue }: LinkSliderProps) {
   const angles = useRobotEditor((s) => s.angles)
   const [low, high] = range(link, quantity)
   const unit = link.turns ? (angles === 'deg' ? '°' : 'rad') : 'm'
   const per = { q: '', qd: '/s', qdd: '/s²' }[quantity]
   const factor = link.turns && angles === 'deg' ? 180 / Math.PI : 1
   return (
-    <div className="joint-slider">
-      <span className="name" title={link.name}>
-        {link.name}
-      </span>
-      <Slider
-        size="sm"
-        thumbLabel={`${quantity} of ${link.name}`}
-        min={low}
-        max={high}
-        step={(high - low) / 720}
-        label={null}
-        value={value}
-        onChange={onValue}
-        marks={low < 0 && high > 0 ? [{ value: 0 }] : []}
-      />
-      <NumberField
-        label={`${quantity} of ${link.name} as a number`}
-        text={cellText(Number((value * factor).toFixed(4)), false, angles)}
-        onNumber={(typed) => onValue(typed / factor)}
-      />
-      <span className="unit">
-        {unit}
-        {per}
-      </span>
-    </div>
-  )
-}
-
-function NumberField({
-  label,
-  text,
-  onNumber,
-}: {
-  label: string
-  text: string
-  onNumber: (value: number) => void
-}) {
-  const [typed, setTyped] = useState<string | null>(null)
-  return (
-    <input
-      className="cell numbers"
-      aria-label={label}
-      value={typed ?? text}
-      onFocus={(event) => event.currentTarget.select()}
-      onChange={(event) => {
-        setTyped(event.currentTarget.value)
-        const value = Number(event.currentTarget.value)
-        if (event.currentTarget.value.trim() && Number.isFinite(value)) onNumber(value)
-      }}
-      onBlur={() => setTyped(null)}
-      onKeyDown={(event) => event.key === 'Enter' && event.currentTarget.blur()}
+    <JointSlider
+      name={link.name}
+      label={`${quantity} of ${link.name}`}
+      low={low}
+      high={high}
+      value={value}
+      text={cellText(Number((value * factor).toFixed(4)), false, angles)}
+      unit={`${unit}${per}`}
+      onValue={onValue}
+      onNumber={(typed) => onValue(typed / factor)}
     />
   )
 }
