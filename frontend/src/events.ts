@@ -1,10 +1,17 @@
-import { restoreView, storeRun, storeView, updateStoredRun } from './documents/document_views'
+import {
+  changeStoredRun,
+  restoreView,
+  storeRun,
+  storeView,
+  updateStoredRun,
+} from './documents/document_views'
 import { lastShown, storeShown } from './documents/last_shown'
 import { addTab, reattachTabs } from './documents/tabs'
 import type { ChangeOf, ContentOf, DocumentKind, EventOf, ServerEvent } from './messages'
 import type { Checked, DocumentState, Fault, Wire } from './protocol'
 import { reattachRobots, leaveEditor, robotChanged, robotOpened, showRobot } from './robot/editor/state'
 import { canDraw } from './run/pace'
+import { onBlocksRenamed, onRunRenamed, runViewAfter } from './run/renames'
 import * as runs from './run/runs'
 import { recoverable } from './model/recoverable'
 import {
@@ -66,6 +73,7 @@ const EVENT_HANDLERS: { [Kind in ServerEvent['kind']]: (event: EventOf<Kind>) =>
   run_started: runStarted,
   run_tuned: runs.onRunTuned,
   run_rewound: runs.onRunRewound,
+  run_renamed: runRenamed,
   run_progress: runProgressed,
   reply: () => {},
 }
@@ -163,6 +171,8 @@ function diagramChanged(event: EventOf<'changed'>, change: ChangeOf<'diagram'>):
     void ask({ kind: 'show_sheet', document: event.state.document, inside: document.inside })
   else {
     useStudio.setState(showState(withChange(document, event.state, change)))
+    const { renamed = {} } = change
+    if (Object.keys(renamed).length) onBlocksRenamed(event.state.document, document.inside, renamed)
     storeShown(event.state, document.inside)
   }
 }
@@ -176,7 +186,13 @@ function documentChecked(event: EventOf<'checked'>): void {
 function runStarted(event: EventOf<'run_started'>): void {
   // After a reconnection the server sends the same event again.
   const { run, document } = useStudio.getState()
-  if (run?.run === event.run) return
+  if (run?.run === event.run) {
+    // Renames of blocks follow, as after the first time.
+    const { channels, views, aliases, tunables } = event
+    runs.nameAgain(event)
+    useStudio.setState({ run: { ...run, channels, views, aliases, tunables } })
+    return
+  }
   const displayed = document?.state.document === event.document
   runs.onRunStarted(event, displayed)
   const started: RunView = {
@@ -196,6 +212,13 @@ function runStarted(event: EventOf<'run_started'>): void {
   }
   if (displayed) useStudio.setState({ strict: false, notices: [], run: started })
   else storeRun(event.document, started)
+}
+
+function runRenamed(event: EventOf<'run_renamed'>): void {
+  onRunRenamed(event)
+  const { run } = useStudio.getState()
+  if (run?.run === event.run) useStudio.setState({ run: runViewAfter(run, event.renamed) })
+  else changeStoredRun(event.run, (stored) => runViewAfter(stored, event.renamed))
 }
 
 function runProgressed(event: EventOf<'run_progress'>): void {

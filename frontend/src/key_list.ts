@@ -44,7 +44,7 @@ export const KEYS: KeyGroup[] = [
       ['middle button', 'Move the sheet'],
       ['Ctrl+wheel', 'Zoom'],
       ['rest on a subsystem', 'Show a picture of the sheet inside; also with the keyboard focus'],
-      ['Esc', 'Cancel the copy or the branch; close the picture'],
+      ['Esc', 'Cancel the drag; close the picture'],
     ],
   },
   {
@@ -54,6 +54,15 @@ export const KEYS: KeyGroup[] = [
       ['Enter', 'Accept the name'],
       ['Ctrl+Enter', 'Accept the note'],
       ['Esc', 'Discard the change'],
+    ],
+  },
+  {
+    title: 'Dialogs of blocks',
+    sources: ['inspector/block_dialog.tsx'],
+    keys: [
+      ['Enter', 'Accept the values'],
+      ['Ctrl+Enter', 'Accept the values and run the model'],
+      ['Esc', 'Discard the changes'],
     ],
   },
   {

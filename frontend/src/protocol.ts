@@ -889,7 +889,18 @@ export interface Undo {
  * All text messages of the server, for the generated types of the front end.
  */
 export interface ServerMessage {
-  event: Changed | Checked | Documents | Opened | Reply | RunProgress | RunRewound | RunStarted | RunTuned | Welcome;
+  event:
+    | Changed
+    | Checked
+    | Documents
+    | Opened
+    | Reply
+    | RunProgress
+    | RunRenamed
+    | RunRewound
+    | RunStarted
+    | RunTuned
+    | Welcome;
 }
 /**
  * The change of a document from version ``before`` to the version in ``state``, which may be the same.
@@ -930,6 +941,9 @@ export interface DiagramChange {
     [k: string]: boolean | number | string | null;
   };
   outer_comment: OuterComment | null;
+  renamed?: {
+    [k: string]: string;
+  };
 }
 /**
  * The difference between two versions of a sheet.
@@ -1209,6 +1223,16 @@ export interface RunProgress {
   fault?: Fault | null;
   solver?: string;
   reason?: string;
+}
+/**
+ * Blocks of the diagram of a run were renamed; ``renamed`` has their old and new paths.
+ */
+export interface RunRenamed {
+  kind: "run_renamed";
+  run: string;
+  renamed: {
+    [k: string]: string;
+  };
 }
 /**
  * A run has returned to an earlier time (s); only the first ``count`` samples remain valid.

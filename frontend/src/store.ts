@@ -1,6 +1,7 @@
 import { create } from 'zustand'
 import { Connection, Refusal, type ConnectionState } from './connection'
 import { scheduleFrame } from './frames'
+import { holdKeys, setConnected } from './held_keys'
 import { newKey } from './keys'
 import { outstandingMoves, pathOf, withMoves, type SentMove } from './model/sent_moves'
 import type { Edit, EventOf, ReplyTo, Request } from './messages'
@@ -121,7 +122,10 @@ export const connection = new Connection(
     receiveFrame(frame)
     scheduleFrame()
   },
-  (state) => useStudio.setState({ connectionState: state }),
+  (state) => {
+    useStudio.setState({ connectionState: state })
+    setConnected(state === 'up')
+  },
   (refusal) => refuse(refusal),
 )
 
@@ -165,7 +169,7 @@ export async function change(edit: Edit): Promise<number | undefined> {
   const { inside, state } = document
   const request = { kind: 'change' as const, ...alteration(state), inside, edit }
   if (edit.kind !== 'move') {
-    const version = await ask(request)
+    const version = await holdKeys(ask(request))
     if (version === undefined) openSheet(inside)
     return version
   }
@@ -202,7 +206,8 @@ export function showState(document: OpenDocument): Pick<Studio, 'document' | 'se
 /** Apply an edit to the sheet at a path of subsystems; a refusal is thrown to the caller. */
 export async function attempt(edit: Edit, inside: string[]): Promise<void> {
   const { document } = useStudio.getState()
-  if (document) await connection.ask({ kind: 'change', ...alteration(document.state), inside, edit })
+  if (document)
+    await holdKeys(connection.ask({ kind: 'change', ...alteration(document.state), inside, edit }))
 }
 
 /** Undo or redo a step of a document, or reload its file. */
@@ -210,18 +215,18 @@ export function alterDocument(
   kind: 'undo' | 'redo' | 'reload',
   state: DocumentState | undefined = useStudio.getState().document?.state,
 ): void {
-  if (state) void ask({ kind, ...alteration(state) })
+  if (state) void holdKeys(ask({ kind, ...alteration(state) }))
 }
 
 /** Show a document that the server has open. */
 export function bringToFront({ document, kind, path, origin }: DocumentState): Promise<string | undefined> {
-  return ask({ kind: 'attach', document, document_kind: kind, path, origin })
+  return holdKeys(ask({ kind: 'attach', document, document_kind: kind, path, origin }))
 }
 
 /** Show the sheet inside a subsystem; the empty path is the top sheet. */
 export function openSheet(inside: string[]): void {
   const document = useStudio.getState().document
-  if (document) void ask({ kind: 'show_sheet', document: document.state.document, inside })
+  if (document) void holdKeys(ask({ kind: 'show_sheet', document: document.state.document, inside }))
 }
 
 /** Show the sheet of a block and select the block. */
@@ -231,6 +236,12 @@ export async function showBlock(inside: string[], name: string): Promise<void> {
   if (document.inside.join('/') !== inside.join('/'))
     await ask({ kind: 'show_sheet', document: document.state.document, inside })
   useStudio.setState({ selection: new Set([name]), blockToCentre: name })
+}
+
+/** Select the result of an edit, unless the user has selected something else since the edit was sent. */
+export function selectIfUnchanged(before: ReadonlySet<string>, names: Iterable<string>): void {
+  const { selection, select } = useStudio.getState()
+  if (selection === before) select(names)
 }
 
 /** The names of the blocks and signals of the visible sheet, which a new block cannot have. */

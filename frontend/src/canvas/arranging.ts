@@ -1,5 +1,5 @@
 import type { Place, SheetBlock } from '../protocol'
-import { change, freeName, namesInUse, useStudio } from '../store'
+import { change, freeName, namesInUse, selectIfUnchanged, useStudio } from '../store'
 
 /** Commands on all selected blocks: each is one undo step. */
 
@@ -98,9 +98,11 @@ export function ground(): void {
 
 /** Move the selected blocks into a new subsystem. */
 export function group(): void {
-  const { document, select } = useStudio.getState()
+  const { document, selection } = useStudio.getState()
   const selected = selectedBlocks()
   if (!document || !selected.length) return
   const name = freeName('Subsystem', namesInUse())
-  void change({ kind: 'group', blocks: selected.map((block) => block.name), name }).then(() => select([name]))
+  void change({ kind: 'group', blocks: selected.map((block) => block.name), name }).then(
+    (version) => version !== undefined && selectIfUnchanged(selection, [name]),
+  )
 }

@@ -8,7 +8,6 @@ import {
   ReactFlow,
   ReactFlowProvider,
   useReactFlow,
-  type Connection,
   type EdgeChange,
   type NodeChange,
 } from '@xyflow/react'
@@ -19,11 +18,11 @@ import type { Edit } from '../messages'
 import type { Places } from '../model/wires'
 import type { OuterComment } from '../protocol'
 import { WireValues } from '../run/wire_values'
-import { alteration, ask, change, openSheet, useStudio } from '../store'
+import { alteration, ask, openSheet, useStudio } from '../store'
 import { sheetKey } from '../documents/document_views'
 import { selectedBlocks } from './arranging'
 import { BlockNode } from './block_node'
-import { endConnection } from './connecting'
+import { connect, endConnection, startConnection } from './connecting'
 import { DragPreview, useDraggedCopies } from './drag_preview'
 import { GRID } from './insert'
 import { NoteNode } from './note_node'
@@ -152,6 +151,7 @@ function Sheet({ sheetKey }: { sheetKey: string }) {
       if (selectOnly(event, node.id)) setSelectedWires(new Set())
     },
     onNodeDoubleClick: (_: unknown, node: SheetNode) => node.type === 'block' && openBlock(node.data.block),
+    onConnectStart: startConnection,
     onConnect: connect,
     onConnectEnd: endConnection,
   })
@@ -236,14 +236,6 @@ function selectOnly({ ctrlKey, metaKey, shiftKey }: React.MouseEvent, id: string
   return true
 }
 
-function connect({ source, sourceHandle, target, targetHandle }: Connection): void {
-  if (sourceHandle && targetHandle)
-    void change({
-      kind: 'connect',
-      wire: { source: `${source}/${sourceHandle}`, target: `${target}/${targetHandle}` },
-    })
-}
-
 /** Show copies of the dragged blocks at the dragged positions; the blocks themselves are not moved. */
 function showCopies(places: Places): void {
   const { document } = useStudio.getState()
@@ -270,7 +262,7 @@ function nodesChanged(
     } else if (nodeChange.type === 'dimensions' && nodeChange.dimensions)
       graph.measured.set(nodeChange.id, nodeChange.dimensions)
   }
-  const names = Object.keys(places)
+  const names = effect.current.cancelled ? [] : Object.keys(places)
   if (names.length && effect.current.duplicates) showCopies(places)
   else if (names.length) setDrag((now) => ({ ...now, ...places }))
   if (selected) useStudio.getState().select(selected)

@@ -1,4 +1,6 @@
-import { ask, change, freeName, namesInUse, useStudio } from '../store'
+import { holdKeys } from '../held_keys'
+import { freeShift } from '../model/free_place'
+import { ask, change, freeName, namesInUse, selectIfUnchanged, useStudio } from '../store'
 import { GRID } from './insert'
 
 /** Displacement of pasted blocks to the right and down, px. */
@@ -23,52 +25,69 @@ async function copiedText(
 
 /** Paste the blocks of a diagram text under unused names, and select them. */
 async function pasteText(text: string, offset: number | [number, number] = PASTE_OFFSET): Promise<void> {
-  const { document, select } = useStudio.getState()
+  const { document, selection } = useStudio.getState()
   if (!document) return
-  const { blocks = {}, layout = {} } = JSON.parse(text) as { blocks?: object; layout?: object }
+  const { blocks = {}, layout = {} } = JSON.parse(text) as {
+    blocks?: object
+    layout?: Record<string, { x?: number; y?: number }>
+  }
   const names: Record<string, string> = {}
   const usedNames = new Set(namesInUse())
   for (const name of Object.keys(blocks)) usedNames.add((names[name] = freeName(name, usedNames)))
   let lastNote = Math.max(0, ...Object.keys(document.notes).map((id) => Number(id.slice(1)) || 0))
   for (const id of Object.keys(layout)) if (id.startsWith('/')) names[id] = `/${++lastNote}`
-  if ((await change({ kind: 'paste', text, names, shift: offset })) !== undefined)
-    select(Object.values(names))
+  // A copy at the place of another block or note would hide it.
+  const places = [
+    ...Object.values(document.blocks).map(({ place }) => place),
+    ...Object.values(document.notes),
+  ]
+  const shift = typeof offset === 'number' ? freeShift(Object.values(layout), places, offset) : offset
+  if ((await change({ kind: 'paste', text, names, shift })) !== undefined)
+    selectIfUnchanged(selection, Object.values(names))
 }
 
-export async function duplicate(): Promise<void> {
-  const text = await copiedText()
-  if (text) await pasteText(text)
-}
+export const duplicate = (): Promise<void> => holdKeys(duplicateBy(PASTE_OFFSET))
 
 /** Duplicate blocks and notes at a distance from them. */
-export async function duplicateAt(names: readonly string[], shift: [number, number]): Promise<void> {
+export const duplicateAt = (names: readonly string[], shift: [number, number]): Promise<void> =>
+  holdKeys(duplicateBy(shift, names))
+
+async function duplicateBy(shift: number | [number, number], names?: readonly string[]): Promise<void> {
   const text = await copiedText(names)
   if (text) await pasteText(text, shift)
 }
 
 /** Copy the selection as the text of a diagram file, which can be pasted into another window or an e-mail. */
-export async function copy(): Promise<void> {
+export const copy = (): Promise<void> => holdKeys(copySelection())
+
+async function copySelection(): Promise<void> {
   const text = await copiedText()
   if (text) await navigator.clipboard.writeText(text)
 }
 
-export async function cut(): Promise<void> {
-  const { document, selection, select } = useStudio.getState()
-  await copy()
+export const cut = (): Promise<void> => holdKeys(cutSelection())
+
+async function cutSelection(): Promise<void> {
+  const { document, selection } = useStudio.getState()
+  await copySelection()
   const blocks = [...selection].filter((name) => document?.blocks[name])
   const notes = [...selection].filter((name) => document?.notes[name])
   if (!blocks.length && !notes.length) return
   await change({ kind: 'remove', blocks, notes })
-  select([])
+  selectIfUnchanged(selection, [])
 }
 
-export async function paste(): Promise<void> {
+export const paste = (): Promise<void> => holdKeys(pasteClipboard())
+
+async function pasteClipboard(): Promise<void> {
   const text = await navigator.clipboard.readText()
   if (isDiagram(text)) await pasteText(text)
 }
 
 /** Paste with the top left corner of all blocks and notes at a point of the sheet. */
-export async function pasteAt({ x, y }: { x: number; y: number }): Promise<void> {
+export const pasteAt = (point: { x: number; y: number }): Promise<void> => holdKeys(pasteClipboardAt(point))
+
+async function pasteClipboardAt({ x, y }: { x: number; y: number }): Promise<void> {
   const text = await navigator.clipboard.readText()
   if (!isDiagram(text)) return
   const { layout = {} } = JSON.parse(text) as { layout?: Record<string, { x?: number; y?: number }> }

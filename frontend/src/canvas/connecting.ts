@@ -1,12 +1,39 @@
-import type { FinalConnectionState } from '@xyflow/react'
+import type { Connection, FinalConnectionState } from '@xyflow/react'
 import { showDialog } from '../dialogs'
 import { freePort } from '../model/free_port'
 import { change, useStudio } from '../store'
+import { onEscape } from './pointer_drag'
+
+/** Ends the wait for Escape, which cancels the drag from a port. */
+let escape = new AbortController()
+let cancelled = false
+
+/** Handle the start of a drag from a port. */
+export function startConnection(): void {
+  escape.abort()
+  escape = new AbortController()
+  cancelled = false
+  onEscape(() => {
+    cancelled = true
+    // React Flow ends a drag only at the release of the button.
+    document.dispatchEvent(new MouseEvent('mouseup'))
+  }, escape.signal)
+}
+
+/** Handle the end of a drag from a port at another port. */
+export function connect({ source, sourceHandle, target, targetHandle }: Connection): void {
+  if (!cancelled && sourceHandle && targetHandle)
+    void change({
+      kind: 'connect',
+      wire: { source: `${source}/${sourceHandle}`, target: `${target}/${targetHandle}` },
+    })
+}
 
 /** Handle the end of a drag from a port, unless it ends at another port. */
 export function endConnection(event: MouseEvent | TouchEvent, state: FinalConnectionState): void {
   const { fromHandle, fromNode, toHandle, isValid } = state
-  if (toHandle || isValid || !fromHandle?.id || !fromNode || !('clientX' in event)) return
+  escape.abort()
+  if (cancelled || toHandle || isValid || !fromHandle?.id || !fromNode || !('clientX' in event)) return
   connectAt(
     { x: event.clientX, y: event.clientY },
     `${fromNode.id}/${fromHandle.id}`,

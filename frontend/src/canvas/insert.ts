@@ -1,6 +1,6 @@
 import { freeBelow, freeInView, type Rectangle } from '../model/free_place'
 import type { BlockType, Place, Wire } from '../protocol'
-import { change, freeName, namesInUse, useStudio } from '../store'
+import { change, freeName, namesInUse, selectIfUnchanged, useStudio } from '../store'
 import { sheetView } from './sheet_actions'
 
 /** Drag data from the library: a block type. */
@@ -30,7 +30,7 @@ export async function insertBlock(
   at: { x: number; y: number },
   { wire, wireY, connectTo, reveal = false, parameters = {}, name: preferredName }: Insertion = {},
 ): Promise<string | undefined> {
-  const { document, library, select } = useStudio.getState()
+  const { document, library, selection } = useStudio.getState()
   const blockType = library.get(type)
   if (!document || !blockType) return undefined
   const name = freeName((preferredName ?? blockType.title).replace(/[/.]/g, ' '), namesInUse())
@@ -60,7 +60,7 @@ export async function insertBlock(
     instead: splitsWire ? [wire] : [],
   })
   if (version === undefined) return undefined
-  select([name])
+  selectIfUnchanged(selection, [name])
   if (reveal) sheetView.reveal?.({ ...place, width: blockType.width, height: blockType.height })
   return name
 }

@@ -2,7 +2,8 @@ import type { Node, NodeProps } from '@xyflow/react'
 import { memo, useEffect, useRef, useState } from 'react'
 import { create } from 'zustand'
 import type { SheetNote } from '../protocol'
-import { change, useStudio } from '../store'
+import { holdKeys } from '../held_keys'
+import { change, selectIfUnchanged, useStudio } from '../store'
 
 export type NoteNodeType = Node<{ note: SheetNote }, 'note'>
 
@@ -11,18 +12,28 @@ const useNoteEditing = create<{ id: string | null }>(() => ({ id: null }))
 
 /** Start a note at a position on the sheet. */
 export function createNote(x: number, y: number): void {
-  const { document, select } = useStudio.getState()
+  const { document, selection } = useStudio.getState()
   if (!document) return
   const numbers = Object.keys(document.notes).map((id) => Number(id.slice(1)) || 0)
   const id = `/${Math.max(0, ...numbers) + 1}`
-  void change({ kind: 'notes', notes: { [id]: { x: Math.round(x), y: Math.round(y), text: 'Note' } } }).then(
-    (version) => {
-      if (version === undefined) return
-      select([id])
-      useNoteEditing.setState({ id })
-    },
-  )
+  const created = async () => {
+    const note = { x: Math.round(x), y: Math.round(y), text: 'Note' }
+    if ((await change({ kind: 'notes', notes: { [id]: note } })) === undefined) return
+    selectIfUnchanged(selection, [id])
+    useNoteEditing.setState({ id })
+    // The text typed meanwhile belongs to the note.
+    await new Promise<void>((resolve) => {
+      noteFocused = resolve
+      setTimeout(resolve, FOCUS_TIMEOUT_MS)
+    })
+  }
+  void holdKeys(created())
 }
+
+/** Called when the field of a note has the focus. */
+let noteFocused = () => {}
+/** Longest time to wait for the focus: the sheet may be closed meanwhile. */
+const FOCUS_TIMEOUT_MS = 2000
 
 export const editNote = (id: string): void => useNoteEditing.setState({ id })
 
@@ -51,7 +62,8 @@ function NoteEditor({ id, note }: { id: string; note: SheetNote }) {
     let handle = 0
     const focus = () => {
       field.current?.focus()
-      if (window.document.activeElement !== field.current) handle = requestAnimationFrame(focus)
+      if (window.document.activeElement === field.current) noteFocused()
+      else handle = requestAnimationFrame(focus)
     }
     focus()
     return () => cancelAnimationFrame(handle)

@@ -2,7 +2,20 @@
 interface Drag {
   move: (event: PointerEvent) => void
   drop: (event: PointerEvent) => void
-  finish: () => void
+  finish: (dropped: boolean) => void
+}
+
+/** Call a function when Escape is pressed, before any other handler, until the signal is aborted. */
+export function onEscape(cancel: () => void, signal: AbortSignal): void {
+  addEventListener(
+    'keydown',
+    (event) => {
+      if (event.key !== 'Escape') return
+      event.stopImmediatePropagation()
+      cancel()
+    },
+    { signal, capture: true },
+  )
 }
 
 /**
@@ -18,7 +31,7 @@ export function followPointer(
   const { signal } = listeners
   const cancel = () => {
     listeners.abort()
-    finish()
+    finish(false)
   }
   addEventListener('pointermove', (event) => event.pointerId === pointerId && move(event), { signal })
   addEventListener(
@@ -27,18 +40,10 @@ export function followPointer(
       if (event.button !== button) return
       listeners.abort()
       drop(event)
-      finish()
+      finish(true)
     },
     { signal },
   )
   addEventListener('pointercancel', cancel, { signal })
-  addEventListener(
-    'keydown',
-    (event) => {
-      if (event.key !== 'Escape') return
-      event.stopPropagation()
-      cancel()
-    },
-    { signal, capture: true },
-  )
+  onEscape(cancel, signal)
 }

@@ -3,6 +3,7 @@ import { useState } from 'react'
 import { resized, type Corner } from '../model/resizing'
 import type { SheetBlock } from '../protocol'
 import { change, useStudio } from '../store'
+import { onEscape } from './pointer_drag'
 
 const CORNERS: Corner[] = [
   [-1, -1],
@@ -37,7 +38,9 @@ export function ResizeHandles({ block }: { block: SheetBlock }) {
       )
       setSize(rectangle)
     }
+    const escape = new AbortController()
     const end = (apply: boolean) => () => {
+      escape.abort()
       handle.onpointermove = handle.onpointerup = handle.onpointercancel = null
       setSize(null)
       if (apply && (rectangle.width !== width || rectangle.height !== height))
@@ -45,6 +48,7 @@ export function ResizeHandles({ block }: { block: SheetBlock }) {
     }
     handle.onpointerup = end(true)
     handle.onpointercancel = end(false)
+    onEscape(end(false), escape.signal)
   }
   return (
     <>

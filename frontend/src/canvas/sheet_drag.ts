@@ -15,19 +15,24 @@ import { duplicateAt } from './clipboard'
 import { clearCopies } from './drag_preview'
 import { alignment, useGuides } from './guides'
 import { BLOCK_TYPE, insertBlock } from './insert'
+import { onEscape } from './pointer_drag'
 import { moveNodes } from './sheet_actions'
 import type { SheetNode } from './sheet_graph'
 import type { WireEdgeType } from './wire_edge'
 
 /**
  * The effect of a drag on wires: names of disconnected blocks, and of an unconnected block that is inserted
- * into the wire on which it is dropped. `duplicates`: the drag duplicates the blocks.
+ * into the wire on which it is dropped. `duplicates`: the drag duplicates the blocks. `cancelled`: Escape was
+ * pressed; the blocks return to their positions.
  */
-const NO_EFFECT: { disconnected: readonly string[]; insertable: string | null; duplicates: boolean } = {
-  disconnected: [],
-  insertable: null,
-  duplicates: false,
+interface DragEffect {
+  disconnected: readonly string[]
+  insertable: string | null
+  duplicates: boolean
+  cancelled: boolean
 }
+
+const NO_EFFECT: DragEffect = { disconnected: [], insertable: null, duplicates: false, cancelled: false }
 
 /**
  * The state of a drag on a sheet: displaced blocks, blocks that change wires, and the wire into which a block
@@ -38,6 +43,8 @@ export function useSheetDrag(blocks: Record<string, SheetBlock>, notes: Record<s
   const [{ disconnected, insertable }, setEffect] = useState(NO_EFFECT)
   /** The effect of the drag, available before the next rendering. */
   const effect = useRef(NO_EFFECT)
+  /** Ends the wait for Escape, which cancels the drag. */
+  const escape = useRef(new AbortController())
   /** The wire into which a dragged block would be inserted. */
   const [targetWire, setTargetWire] = useState<string | null>(null)
   const synchronised = useStudio((s) => s.sent.length === 0)
@@ -45,40 +52,51 @@ export function useSheetDrag(blocks: Record<string, SheetBlock>, notes: Record<s
   useEffect(() => {
     if (synchronised) setDrag((now) => (Object.keys(now).length ? {} : now))
   }, [blocks, notes, synchronised])
-  return { drag, setDrag, disconnected, insertable, effect, setEffect, targetWire, setTargetWire }
+  return { drag, setDrag, disconnected, insertable, effect, escape, setEffect, targetWire, setTargetWire }
 }
 
 export type SheetDrag = ReturnType<typeof useSheetDrag>
 
+/** The start of a drag: its effect on wires depends on the pressed keys; Escape cancels the drag. */
+function startDrag(
+  { effect, escape, setEffect, setTargetWire, setDrag }: SheetDrag,
+  { ctrlKey, metaKey, shiftKey, altKey }: MouseEvent | TouchEvent | React.MouseEvent,
+  dragged: SheetBlock[],
+  wires: Wire[],
+): void {
+  escape.current.abort()
+  escape.current = new AbortController()
+  onEscape(() => {
+    setEffect((effect.current = { ...NO_EFFECT, cancelled: true }))
+    setDrag({})
+    setTargetWire(null)
+    useGuides.setState({ guides: [] })
+    clearCopies()
+  }, escape.current.signal)
+  if (ctrlKey || metaKey) {
+    setEffect((effect.current = { ...NO_EFFECT, duplicates: true }))
+    return
+  }
+  const disconnected = shiftKey || altKey ? dragged.map(({ name }) => name) : []
+  const [first] = dragged
+  const canInsert =
+    dragged.length === 1 &&
+    first &&
+    isInsertable(first, disconnected.length ? disconnectBlocks(dragged, wires) : wires)
+  if (disconnected.length || canInsert)
+    setEffect((effect.current = { ...NO_EFFECT, disconnected, insertable: canInsert ? first.name : null }))
+}
+
 /** The handlers of a drag of blocks on the sheet. */
 export function dragHandlers(
-  { effect, setEffect, setTargetWire, setDrag }: SheetDrag,
+  sheetDrag: SheetDrag,
   blocks: Record<string, SheetBlock>,
   notes: Record<string, SheetNote>,
   wires: Wire[],
   edges: WireEdgeType[],
   zoom: () => number,
 ) {
-  const startDrag = (event: MouseEvent | TouchEvent | React.MouseEvent, _: SheetNode, nodes: SheetNode[]) => {
-    const dragged = blocksByName(
-      blocks,
-      nodes.map(({ id }) => id),
-    )
-    if (event.ctrlKey || event.metaKey) {
-      setEffect((effect.current = { ...NO_EFFECT, duplicates: true }))
-      return
-    }
-    const disconnected = event.shiftKey || event.altKey ? dragged.map(({ name }) => name) : []
-    const [first] = dragged
-    const canInsert =
-      dragged.length === 1 &&
-      first &&
-      isInsertable(first, disconnected.length ? disconnectBlocks(dragged, wires) : wires)
-    if (disconnected.length || canInsert)
-      setEffect(
-        (effect.current = { disconnected, insertable: canInsert ? first.name : null, duplicates: false }),
-      )
-  }
+  const { effect, escape, setEffect, setTargetWire, setDrag } = sheetDrag
   /** Align the dragged blocks, unless Alt is pressed or the drag duplicates them. */
   const aligned = (event: MouseEvent | TouchEvent | React.MouseEvent, nodes: SheetNode[]) =>
     event.altKey || effect.current.duplicates ? NOT_ALIGNED : alignment(nodes, blocks, zoom())
@@ -87,6 +105,7 @@ export function dragHandlers(
     node: SheetNode,
     nodes: SheetNode[],
   ) => {
+    if (effect.current.cancelled) return
     const { dx, dy, guides } = aligned(event, nodes)
     useGuides.setState({ guides })
     if (dx || dy) setDrag((now) => ({ ...now, ...shifted(nodes, dx, dy) }))
@@ -98,6 +117,11 @@ export function dragHandlers(
     node: SheetNode,
     moved: SheetNode[],
   ) => {
+    escape.current.abort()
+    if (effect.current.cancelled) {
+      setEffect((effect.current = NO_EFFECT))
+      return
+    }
     const { dx, dy } = aligned(event, moved)
     useGuides.setState({ guides: [] })
     const positions = shifted(moved, dx, dy)
@@ -128,7 +152,21 @@ export function dragHandlers(
     ).finally(() => setEffect((now) => (now === effect.current ? now : NO_EFFECT)))
     setTargetWire(null)
   }
-  return { onNodeDragStart: startDrag, onNodeDrag: whileDragging, onNodeDragStop: endDrag }
+  return {
+    onNodeDragStart: (
+      event: MouseEvent | TouchEvent | React.MouseEvent,
+      _: SheetNode,
+      nodes: SheetNode[],
+    ): void => {
+      const dragged = blocksByName(
+        blocks,
+        nodes.map(({ id }) => id),
+      )
+      startDrag(sheetDrag, event, dragged, wires)
+    },
+    onNodeDrag: whileDragging,
+    onNodeDragStop: endDrag,
+  }
 }
 
 const NOT_ALIGNED = { dx: 0, dy: 0, guides: [] }

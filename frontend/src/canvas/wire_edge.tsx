@@ -6,6 +6,7 @@ import { change } from '../store'
 import { dragged } from '../model/bends'
 import { drawBranch } from './branching'
 import { GRID } from './insert'
+import { followPointer } from './pointer_drag'
 import { nameSignal } from './signal_names'
 import { isHorizontal, svgPath, type Point, type PortPosition } from '../model/wire_lines'
 
@@ -35,6 +36,11 @@ export interface WireTag extends PortPosition {
 
 /** The wire whose route is being drawn, with its present bends. */
 export const useBending = create<{ wire: Required<Wire> | null }>(() => ({ wire: null }))
+
+/** End the drawing of a route, unless another one has begun. */
+function endBending(wire: Required<Wire>): void {
+  if (useBending.getState().wire === wire) useBending.setState({ wire: null })
+}
 
 /** Distance within which a dragged segment is aligned with a parallel one, px. */
 const SNAP_PX = 7
@@ -146,19 +152,15 @@ function Segment({
         },
       })
     }
-    const end = (pointer: PointerEvent) => {
-      window.removeEventListener('pointermove', move)
-      window.removeEventListener('pointerup', end)
-      window.removeEventListener('pointercancel', end)
-      const { wire } = useBending.getState()
-      if (!wire) return
-      if (pointer.type === 'pointerup')
-        void change({ kind: 'bend', wires: [wire] }).finally(() => useBending.setState({ wire: null }))
-      else useBending.setState({ wire: null })
-    }
-    window.addEventListener('pointermove', move)
-    window.addEventListener('pointerup', end)
-    window.addEventListener('pointercancel', end)
+    followPointer(event, {
+      move,
+      drop: () => {
+        const { wire } = useBending.getState()
+        // The drawn route remains until the server has applied it.
+        if (wire) void change({ kind: 'bend', wires: [wire] }).finally(() => endBending(wire))
+      },
+      finish: (dropped) => dropped || useBending.setState({ wire: null }),
+    })
   }
   return (
     <line

@@ -134,3 +134,9 @@ export function updateStoredRun({ document, run }: EventOf<'run_progress'>, chan
     run: view.run?.run === run ? { ...view.run, ...change } : view.run,
   })
 }
+
+/** Change the displayed data of a run, if its diagram is in another tab. */
+export function changeStoredRun(run: string, change: (run: RunView) => RunView): void {
+  for (const [document, view] of views)
+    if (view.run?.run === run) views.set(document, { ...view, run: change(view.run) })
+}

@@ -4,6 +4,7 @@ import { Refusal } from '../connection'
 import type { ParameterRule, SheetBlock } from '../protocol'
 import { change, connection, openSheet, useStudio } from '../store'
 import { openMask } from '../dialogs'
+import { startOrResume } from '../run/start'
 import { FunctionField } from './function_field'
 import { TableField, tableRows, tableText } from './table_field'
 import { valueText } from './value_text'
@@ -23,13 +24,7 @@ export function BlockDialog() {
 
 function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) {
   const blockType = useStudio((s) => s.library.get(block.type))
-  const [previousFocus] = useState(() => document.activeElement)
-  useEffect(
-    () => () => {
-      if (previousFocus instanceof HTMLElement) previousFocus.focus({ preventScroll: true })
-    },
-    [previousFocus],
-  )
+  useReturnedFocus()
   const rules = useMemo(() => [...(blockType?.parameters ?? []), ...block.mask], [block, blockType])
   const initialTexts = useMemo(
     () =>
@@ -56,6 +51,8 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
     <Modal
       opened
       onClose={onClose}
+      // A click beside the dialog, such as a missed one, does not discard typed values.
+      closeOnClickOutside={!changed.length}
       title={
         <Group gap="xs">
           <b>{block.name}</b>
@@ -70,6 +67,13 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
         onSubmit={(event) => {
           event.preventDefault()
           void apply().then((done) => done && onClose())
+        }}
+        onKeyDown={(event) => {
+          if (event.key !== 'Enter' || !(event.ctrlKey || event.metaKey) || event.shiftKey) return
+          // The key of the run: the typed values are part of the model that runs.
+          event.preventDefault()
+          event.stopPropagation()
+          void apply().then((done) => done && startOrResume())
         }}
       >
         <Stack gap="sm">
@@ -94,6 +98,17 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
         </Stack>
       </form>
     </Modal>
+  )
+}
+
+/** Give the focus back at the end to the element that has it now. */
+function useReturnedFocus(): void {
+  const [previousFocus] = useState(() => document.activeElement)
+  useEffect(
+    () => () => {
+      if (previousFocus instanceof HTMLElement) previousFocus.focus({ preventScroll: true })
+    },
+    [previousFocus],
   )
 }
 

@@ -61,3 +61,18 @@ export function freeInView(
     }
   )
 }
+
+interface Spot {
+  x?: number
+  y?: number
+}
+
+/** The smallest multiple of a shift, px, after which no copy is exactly at the place of another object. */
+export function freeShift(copies: readonly Spot[], places: readonly Spot[], step: number): number {
+  const taken = new Set(places.map(({ x, y }) => `${x} ${y}`))
+  const collides = (shift: number) =>
+    copies.some(({ x, y }) => x !== undefined && y !== undefined && taken.has(`${x + shift} ${y + shift}`))
+  let shift = step
+  while (collides(shift)) shift += step
+  return shift
+}

@@ -1,4 +1,5 @@
 import type { Channel } from '../protocol'
+import { pathAfter, withKeysAfter, type Renamed } from './renames'
 import { firstAfter } from './time_index'
 
 /** The columns of one signal in a frame. */
@@ -29,20 +30,39 @@ export class RunSamples {
   stepBacks = 0
   time = new Float64Array(INITIAL_CAPACITY)
   private data: Float64Array[]
-  private readonly columns = new Map<string, Columns>()
+  private columns = new Map<string, Columns>()
 
   constructor(
     readonly run: string,
     channels: Channel[],
-    private readonly aliases: Record<string, string>,
+    private aliases: Record<string, string>,
   ) {
+    const first = this.name(channels, aliases)
+    this.data = Array.from({ length: first }, () => new Float64Array(INITIAL_CAPACITY))
+  }
+
+  /** Set the names of the signals; returns the number of columns. */
+  name(channels: Channel[], aliases: Record<string, string>): number {
+    this.aliases = aliases
+    this.columns = new Map()
     let first = 0
     for (const channel of channels) {
       const count = channel.shape.reduce((product, n) => product * n, 1)
       this.columns.set(channel.name, { first, count, channel })
       first += count
     }
-    this.data = Array.from({ length: first }, () => new Float64Array(INITIAL_CAPACITY))
+    return first
+  }
+
+  /** Give the signals of renamed blocks their new names. */
+  rename(renamed: Renamed): void {
+    const channels = [...this.columns.values()].map(({ channel }) => ({
+      ...channel,
+      name: pathAfter(channel.name, renamed),
+    }))
+    const aliases = Object.entries(withKeysAfter(this.aliases, renamed))
+    this.name(channels, Object.fromEntries(aliases.map(([alias, name]) => [alias, pathAfter(name, renamed)])))
+    this.version = ++lastVersion
   }
 
   get bytes(): number {

@@ -1,7 +1,7 @@
 import { ActionIcon, Button, NativeSelect, Slider, Text, Tooltip } from '@mantine/core'
 import { IconPlayerPauseFilled, IconPlayerPlayFilled, IconRepeat, IconTag } from '@tabler/icons-react'
 import { ask, useStudio } from '../store'
-import { useShownValues } from './wire_values'
+import { useShownValues } from './shown_values'
 import { pausePlayback, play, shownTime, stepCursor, useCursor } from './cursor'
 
 const RATES = ['0.1', '0.25', '0.5', '1', '2', '5', '10'].map((value) => ({ value, label: `${value} ×` }))

@@ -1,20 +1,14 @@
 import { ActionIcon, Button, Group, Slider, Text, TextInput, Tooltip } from '@mantine/core'
 import { IconArrowBackUp, IconPin, IconPinFilled } from '@tabler/icons-react'
 import { useEffect, useMemo, useState } from 'react'
-import { create } from 'zustand'
 import { valueText } from '../inspector/value_text'
 import type { Tunable } from '../protocol'
 import { useStudio } from '../store'
 import { ParameterSetMenu } from './parameter_set_menu'
+import { usePinnedParameters } from './pinned_parameters'
 import { useRuns } from './runs'
 import { dropTrialValues, keepTrialValues, tryValue, useKnownParameters } from './trial_values'
 
-interface PinnedParameters {
-  pinned: ReadonlySet<string>
-  ranges: Record<string, [number, number]>
-}
-
-const usePinnedParameters = create<PinnedParameters>(() => ({ pinned: new Set(), ranges: {} }))
 const NUMERIC = ['number', 'array']
 const SLIDER_STEPS = 400
 

@@ -3,7 +3,6 @@ import { IconAntennaBars5, IconPinned, IconPinnedOff, IconRoute, IconTag } from 
 import { useStore } from '@xyflow/react'
 import { useEffect, useMemo, useRef, useState } from 'react'
 import { createPortal } from 'react-dom'
-import { create } from 'zustand'
 import type { Point } from '../model/wire_lines'
 import type { WireEdgeType } from '../canvas/wire_edge'
 import { nameSignal } from '../canvas/signal_names'
@@ -16,16 +15,7 @@ import { samples } from '../samples'
 import { formatNumber, displayUnit, useUnits } from '../scopes/quantity'
 import { change, useStudio } from '../store'
 import { shownTime } from './cursor'
-
-interface ShownValues {
-  /** Whether the values of all outputs are displayed. */
-  all: boolean
-  /** Outputs, `block/port` with the path of their sheet, whose values are pinned. */
-  pinned: ReadonlySet<string>
-}
-
-/** The values shown on wires; a wire under the pointer always shows its value. */
-export const useShownValues = create<ShownValues>(() => ({ all: false, pinned: new Set() }))
+import { useShownValues } from './shown_values'
 
 const MAX_ELEMENTS = 4
 

@@ -56,7 +56,11 @@ class Presenter(ABC, Generic[OpenedT]):
     def on_shown(self, client: StudioClient, open_file: OpenedT, *, known: bool) -> None:
         """Called after a client was sent a document; ``known``: the client showed the document before."""
 
-    def on_changed(self, open_file: OpenedT) -> None:
+    def place_after(self, open_file: OpenedT, before: Any, place: Place) -> Place:
+        """Return the displayed part after a change, which may have another name."""
+        return place
+
+    async def on_edited(self, open_file: OpenedT, before: Any) -> None:
         """Called after a document changed and its clients were notified."""
 
     async def on_saved(self, open_file: OpenedT) -> None:

@@ -213,7 +213,7 @@ class DocumentRequests:
 
     async def _notify_change(self, open_file: OpenFile[Any], before: Any, number: int) -> None:
         await self._notify_versions(open_file, before, number)
-        self._presenters[open_file.document.kind].on_changed(open_file)
+        await self._presenters[open_file.document.kind].on_edited(open_file, before)
 
     async def _notify_versions(self, open_file: OpenFile[Any], before: Any, number: int) -> None:
         """Send each client of a document the changes in the part that the client shows."""
@@ -221,7 +221,9 @@ class DocumentRequests:
         for client in self._clients.showing(open_file.key):
             try:
                 change = presenter.change(open_file, before, client.shows[open_file.key])
-            except UnknownNameError:  # the part was removed, or an undo has just restored it
+            except UnknownNameError:  # the part was removed or renamed, or an undo has just restored it
+                place = presenter.place_after(open_file, before, client.shows[open_file.key])
+                client.shows[open_file.key] = place
                 await self.show(client, open_file, in_front=False)
                 continue
             await client.notify(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from armblocks.diagram import Diagram
@@ -18,6 +18,7 @@ from armblocks.studio.runs.record import RunRecord
 from armblocks.studio.runs.report import report_of
 from armblocks.studio.runs.workers import Workers
 from armblocks.studio.sheet.open_documents import OpenDocuments
+from armblocks.studio.sheet.renames import PathNames
 
 FIRST_WORKER_DELAY_SECONDS = 1.5
 """Delay of the first worker process after a client has connected, so that the client can draw first, s."""
@@ -35,6 +36,7 @@ class DiagramRuns:
         self._diagrams = diagrams
         self._job = job
         self._records: dict[str, RunRecord] = {}
+        self._names: dict[str, PathNames] = {}
         self._send_tasks: set[asyncio.Task[None]] = set()
 
     def register(self, answers: Answers) -> None:
@@ -52,6 +54,14 @@ class DiagramRuns:
         if (run := self.run_key(document)) is not None:
             self._send_later(client, run, 0)
         self.workers.prepare(after=FIRST_WORKER_DELAY_SECONDS)
+
+    async def rename(self, document: str, renamed: Mapping[str, str]) -> None:
+        """Tell the clients that show the run of a diagram which blocks were renamed: old path to new path."""
+        if (run := self.run_key(document)) is None:
+            return
+        self._names[run].rename(renamed)
+        if self._names[run].started:
+            await self._notify_showing(run, document, _renamed(run, renamed))
 
     async def report(self, document: str) -> bytes:
         """Return the report of the last run of a diagram as HTML; raises ``ArmblocksError``."""
@@ -75,20 +85,16 @@ class DiagramRuns:
 
     async def _run(self, _: StudioClient, request: run_messages.Run) -> str:
         open_file = self._diagrams[request.document]
-        key, record = secrets.token_hex(8), RunRecord()
+        key, names = secrets.token_hex(8), PathNames()
 
         async def notify(event: Message | bytes) -> None:
-            payload = event if isinstance(event, bytes) else event.model_dump_json()
-            record.append(payload)
-            for client in [
-                client
-                for client in self._clients.showing(open_file.key)
-                if key not in client.records_in_progress
-            ]:
-                if client.congested:
-                    self._send_later(client, key, len(record) - 1)
-                else:
-                    await client.send(payload)
+            if isinstance(event, run_messages.RunTuned):
+                event = event.model_copy(update={"parameter": names.present(event.parameter)})
+            await self._notify_showing(key, open_file.key, event)
+            if isinstance(event, run_messages.RunStarted):
+                names.started = True
+                for renamed in names.renames:
+                    await self._notify_showing(key, open_file.key, _renamed(key, renamed))
 
         worker = await self.workers.take()
         for other in list(self.processes.values()):
@@ -96,18 +102,36 @@ class DiagramRuns:
                 other.end()
                 del self.processes[other.key]
                 self._records.pop(other.key).close()
+                del self._names[other.key]
         job = {**self._job(open_file.document.diagram), "speed": request.speed, "tuned": request.tuned}
         run = RunProcess(key, open_file.key, worker, notify)
-        self.processes[key], self._records[key] = run, record
+        self.processes[key], self._records[key], self._names[key] = run, RunRecord(), names
         run.start(job)
         return run.key
 
     async def _command(self, _: StudioClient, request: run_messages.RunCommand) -> None:
         if request.run not in self.processes:
             raise UnknownNameError("run", request.run, self.processes)
+        if isinstance(request, run_messages.Tune):
+            names = self._names[request.run]
+            original = {names.original(path): value for path, value in request.values.items()}
+            request = request.model_copy(update={"values": original})
         self.processes[request.run].send_command(request)
 
     # -- messages to clients ---------------------------------------------------------------------------------
+
+    async def _notify_showing(self, run: str, document: str, event: Message | bytes) -> None:
+        """Record a message of a run, and send it to all clients that show the diagram."""
+        payload = event if isinstance(event, bytes) else event.model_dump_json()
+        record = self._records[run]
+        record.append(payload)
+        for client in [
+            client for client in self._clients.showing(document) if run not in client.records_in_progress
+        ]:
+            if client.congested:
+                self._send_later(client, run, len(record) - 1)
+            else:
+                await client.send(payload)
 
     def _send_later(self, client: StudioClient, run: str, begin: int) -> None:
         """Send a client the messages of a run from number ``begin`` on, as fast as the client receives them.
@@ -131,3 +155,7 @@ class DiagramRuns:
             await client.send(record[client.records_in_progress[run] - 1])
             await client.room()
         del client.records_in_progress[run]
+
+
+def _renamed(run: str, renamed: Mapping[str, str]) -> run_messages.RunRenamed:
+    return run_messages.RunRenamed(run=run, renamed=dict(renamed))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import dataclasses
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Protocol
 
 from armblocks.diagram import Diagram
@@ -22,6 +22,7 @@ from armblocks.studio.sheet.drawing_data import outer_comment, sheet, sheet_chan
 from armblocks.studio.sheet.lines import LinesOfSheets, changed_lines
 from armblocks.studio.sheet.nesting import inside, linked_part
 from armblocks.studio.sheet.open_documents import OpenDocument, OpenDocuments
+from armblocks.studio.sheet.renames import path_after, renamed_paths
 
 CHECK_DELAY_SECONDS = 0.15
 """Delay of the background check after the last edit, s."""
@@ -36,6 +37,10 @@ class RunsOfDiagrams(Protocol):
 
     def on_shown(self, client: StudioClient, document: str) -> None:
         """Called after a client was sent a diagram."""
+        ...
+
+    async def rename(self, document: str, renamed: Mapping[str, str]) -> None:
+        """Called after blocks of a diagram were renamed: old path to new path."""
         ...
 
 
@@ -103,12 +108,24 @@ class DiagramPresenter(Presenter[OpenDocument]):
             sheet=sheet_change(old, new, changed_lines(lines.route(old), lines.route(new))),
             settings=dataclasses.asdict(diagram.settings),
             outer_comment=outer_comment(diagram, place),
+            renamed=renamed_paths(before, diagram),
         )
+
+    def place_after(self, open_file: OpenDocument, before: Diagram, place: Place) -> Place:
+        """Return the path of a sheet after a change; the change may have renamed its subsystems."""
+        renamed = renamed_paths(before, open_file.document.diagram)
+        return tuple(path_after("/".join(place), renamed).split("/")) if place else place
 
     def on_shown(self, client: StudioClient, open_file: OpenDocument, *, known: bool) -> None:
         """Send the client the run of the diagram, and start the background check."""
         if not known:
             self._runs.on_shown(client, open_file.key)
+        self.on_changed(open_file)
+
+    async def on_edited(self, open_file: OpenDocument, before: Diagram) -> None:
+        """Tell the run of the diagram which blocks were renamed, and start the background check."""
+        if renamed := renamed_paths(before, open_file.document.diagram):
+            await self._runs.rename(open_file.key, renamed)
         self.on_changed(open_file)
 
     def on_changed(self, open_file: OpenDocument) -> None:

@@ -130,6 +130,14 @@ class RunTuned(RunEvent):
     value: Any
 
 
+class RunRenamed(RunEvent):
+    """Blocks of the diagram of a run were renamed; ``renamed`` has their old and new paths."""
+
+    kind: Literal["run_renamed"] = "run_renamed"
+    run: str
+    renamed: dict[str, str]
+
+
 class RunRewound(RunEvent):
     """A run has returned to an earlier time (s); only the first ``count`` samples remain valid."""
 

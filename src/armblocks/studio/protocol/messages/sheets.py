@@ -202,6 +202,8 @@ class DiagramChange(ContentChange):
     sheet: SheetChange
     settings: dict[str, bool | float | str | None]
     outer_comment: OuterComment | None
+    renamed: dict[str, str] = Field(default_factory=dict[str, str])
+    """Paths of blocks that the change has renamed: old to new, from the top sheet."""
 
 
 class ShowSheet(Request[None]):

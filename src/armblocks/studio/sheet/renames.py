@@ -1,0 +1,63 @@
+"""Blocks that an edit, an undo or a redo has renamed, for views that identify blocks by their paths."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from armblocks.diagram import Diagram, DiagramBlock
+
+
+def renamed_paths(before: Diagram, after: Diagram, path: str = "") -> dict[str, str]:
+    """Return the paths of renamed blocks: old path to new path.
+
+    Each step renames at most one block. For a renamed subsystem the result has its own path only;
+    :func:`path_after` also follows the blocks inside.
+    """
+    if before is after or len(before.blocks) != len(after.blocks):
+        return {}
+    removed, added = before.blocks.keys() - after.blocks.keys(), after.blocks.keys() - before.blocks.keys()
+    if removed:
+        (old, *others), new = removed, next(iter(added))
+        same_type = type(before.blocks[old]) is type(after.blocks[new])
+        return {path + old: path + new} if same_type and not others else {}
+    renamed: dict[str, str] = {}
+    for name, old_block in before.blocks.items():
+        new_block = after.blocks[name]
+        if old_block is new_block or not isinstance(old_block, DiagramBlock):
+            continue
+        if isinstance(new_block, DiagramBlock):
+            renamed |= renamed_paths(old_block.diagram, new_block.diagram, f"{path}{name}/")
+    return renamed
+
+
+def path_after(path: str, renamed: Mapping[str, str]) -> str:
+    """Return the path of a block, port (``block/port``) or parameter (``block.parameter``) after renames."""
+    for old, new in renamed.items():
+        if path == old or path.startswith((f"{old}/", f"{old}.")):
+            return new + path.removeprefix(old)
+    return path
+
+
+class PathNames:
+    """The paths that the blocks of a diagram had at the start of a run, and those that they have now."""
+
+    def __init__(self) -> None:
+        self.renames: list[dict[str, str]] = []
+        self.started = False
+        """Whether clients know the paths at the start of the run."""
+
+    def rename(self, renamed: Mapping[str, str]) -> None:
+        """Follow the next renames: old path to new path."""
+        self.renames.append(dict(renamed))
+
+    def present(self, path: str) -> str:
+        """Return the present path of a block, port or parameter."""
+        for renamed in self.renames:
+            path = path_after(path, renamed)
+        return path
+
+    def original(self, path: str) -> str:
+        """Return the path at the start of the run."""
+        for renamed in reversed(self.renames):
+            path = path_after(path, {new: old for old, new in renamed.items()})
+        return path
