@@ -143,6 +143,9 @@ from armblocks.blocks.robots.basic import Rne as Rne
 from armblocks.blocks.robots.basic import RobotPlot as RobotPlot
 from armblocks.blocks.robots.drives import DcMotor as DcMotor
 from armblocks.blocks.robots.drives import MotorWinding as MotorWinding
+from armblocks.blocks.robots.inverse_kinematics import DifferentialIkine as DifferentialIkine
+from armblocks.blocks.robots.inverse_kinematics import Ikine as Ikine
+from armblocks.blocks.robots.inverse_kinematics import ResolvedRate as ResolvedRate
 from armblocks.blocks.robots.joint_control import ComputedTorque as ComputedTorque
 from armblocks.blocks.robots.joint_control import FeedForward as FeedForward
 from armblocks.blocks.robots.joint_control import GravityCompensation as GravityCompensation

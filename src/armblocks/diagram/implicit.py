@@ -72,13 +72,14 @@ def has_discontinuity(expression: SX, unknowns: SX) -> bool:
         operation, inputs = function.instruction_id(k), function.instruction_input(k)
         if operation == casadi.OP_OUTPUT:
             continue
-        (output,) = function.instruction_output(k)
         if operation == casadi.OP_INPUT:
-            depends[output] = inputs[0] == 0
-            continue
-        depends[output] = operation != casadi.OP_CONST and any(depends[i] for i in inputs)
-        if depends[output] and operation in _DISCONTINUOUS:
-            return True
+            dependent = inputs[0] == 0
+        else:
+            dependent = operation != casadi.OP_CONST and any(depends[i] for i in inputs)
+            if dependent and operation in _DISCONTINUOUS:
+                return True
+        for output in function.instruction_output(k):  # a call of a function has several
+            depends[output] = dependent
     return False
 
 
