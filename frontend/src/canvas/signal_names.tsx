@@ -16,7 +16,7 @@ export function SignalNames({ lines }: { lines: Lines }) {
   const blocks = useStudio((s) => s.document!.blocks)
   const editedPort = useEditedName((s) => s.port)
   const namedLines = Object.entries(lines).filter(
-    ([port, net]) => port === editedPort || Boolean(net.name && net.name_at),
+    ([port, net]) => port === editedPort || Boolean(net.name_at && shownName(net)),
   )
   return (
     <ViewportPortal>
@@ -25,8 +25,12 @@ export function SignalNames({ lines }: { lines: Lines }) {
           {port === editedPort ? (
             <NameField port={port} name={net.name ?? ''} />
           ) : (
-            <span title={`Signal of ${port}`} onDoubleClick={() => nameSignal(port)}>
-              {net.name}
+            <span
+              className={net.name ? '' : 'inherited'}
+              title={`Signal of ${port}${net.name ? '' : `, named ${net.inherited_name} elsewhere`}`}
+              onDoubleClick={() => nameSignal(port)}
+            >
+              {shownName(net)}
             </span>
           )}
         </div>
@@ -34,6 +38,10 @@ export function SignalNames({ lines }: { lines: Lines }) {
     </ViewportPortal>
   )
 }
+
+/** The text at the line of a signal: its name, or `<name>` with its name on another sheet or at a Goto. */
+const shownName = ({ name, inherited_name }: WireLines): string =>
+  name || (inherited_name ? `<${inherited_name}>` : '')
 
 /** The position of a name: on its line, or at the output of a signal without a line. */
 function transformOf(port: string, { name_at }: WireLines, blocks: Record<string, SheetBlock>): string {

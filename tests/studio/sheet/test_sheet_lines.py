@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+from client_requests import Events, run_scenario
+
 import armblocks as ab
 from armblocks.diagram import Connection, PortRef
 from armblocks.drawing.diagram_drawing import drawn_bends, obstacle, wire_nets
 from armblocks.drawing.diagram_layout import boxes
 from armblocks.drawing.wire_routing import route
+from armblocks.studio.server.hub import Hub
 from armblocks.studio.sheet.lines import SheetLines, has_ports
 
 
@@ -49,3 +56,22 @@ def test_wires_with_ports_that_no_longer_exist_are_not_routed() -> None:
         (PortRef("PID", "y"), PortRef("u", "u9"), False),
     ):
         assert has_ports(Connection(source, target), sheet) == possible
+
+
+def test_a_sheet_shows_a_name_that_is_given_on_another_sheet(tmp_path: Path) -> None:
+    async def scenario(_: Hub, ask: Callable[..., Awaitable[Any]], events: Events) -> None:
+        key = await ask("open_shipped", document_kind="diagram", name="van_der_pol_pid")
+        await ask("change", document=key, edit={"kind": "group", "blocks": ["PID"], "name": "S"})
+        await ask(
+            "change", document=key, edit={"kind": "name_signal", "port": "error/y", "name": "deviation"}
+        )
+        await ask("show_sheet", document=key, inside=["S"])
+        lines = [event for event in events if event["kind"] == "opened"][-1]["content"]["sheet"]["lines"]
+        named = [source for source, net in lines.items() if net["inherited_name"] == "deviation"]
+        assert len(named) == 1
+        assert lines[named[0]]["name_at"] is not None
+        await ask("undo", document=key)
+        changed = [event for event in events if event["kind"] == "changed"][-1]
+        assert changed["change"]["sheet"]["lines"][named[0]]["inherited_name"] == ""
+
+    run_scenario(tmp_path, scenario)

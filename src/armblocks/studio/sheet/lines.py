@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from armblocks.diagram import Connection, Diagram
-from armblocks.drawing.diagram_drawing import obstacle, wire_label, wire_nets
+from armblocks.diagram import Connection, Diagram, PortRef
+from armblocks.drawing.diagram_drawing import obstacle, shown_name, wire_label, wire_nets
 from armblocks.drawing.diagram_layout import boxes
 from armblocks.drawing.wire_names import name_position
 from armblocks.drawing.wire_routing import Routing
@@ -13,6 +13,8 @@ from armblocks.drawing.wires import moved_bends
 from armblocks.studio.protocol.messages.sheets import WireLines
 
 Lines = Mapping[str, WireLines]
+InheritedNames = Mapping[PortRef, str]
+NO_NAMES: InheritedNames = {}
 _MAX_SHEETS = 16
 
 
@@ -21,15 +23,15 @@ class SheetLines:
 
     def __init__(self) -> None:
         self._routing = Routing()
-        self._cache: list[tuple[Diagram, Lines]] = []
+        self._cache: list[tuple[Diagram, InheritedNames, Lines]] = []
 
-    def route(self, sheet: Diagram) -> Lines:
-        """Return the lines of a sheet, by output."""
-        for cached, lines in self._cache:
-            if cached is sheet:
+    def route(self, sheet: Diagram, inherited: InheritedNames = NO_NAMES) -> Lines:
+        """Return the lines of a sheet, by output, with the names that signals have on other sheets."""
+        for cached, names, lines in self._cache:
+            if cached is sheet and names == inherited:
                 return lines
-        lines = self.route_dragged(sheet, {}, sheet.connections, sheet.bends, None)
-        self._cache = [*self._cache[-1:], (sheet, lines)]
+        lines = self.route_dragged(sheet, {}, sheet.connections, sheet.bends, None, inherited)
+        self._cache = [*self._cache[-1:], (sheet, inherited, lines)]
         return lines
 
     def route_dragged(
@@ -39,6 +41,7 @@ class SheetLines:
         connections: Iterable[Connection],
         bends: Mapping[Connection, tuple[float, ...]],
         passed: str | None,
+        inherited: InheritedNames = NO_NAMES,
     ) -> Lines:
         """Return the lines of a sheet with some blocks at other positions and with other connections."""
         placed = dict(boxes(sheet))
@@ -63,8 +66,9 @@ class SheetLines:
                 dots=list(routed[str(source)].dots),
                 label=wire_label(sheet, source),
                 name=sheet.signal_names.get(source, ""),
+                inherited_name=inherited.get(source, ""),
                 name_at=name_position(
-                    sheet.signal_names.get(source, ""), routed[str(source)].paths, obstacles.values()
+                    shown_name(sheet, source, inherited), routed[str(source)].paths, obstacles.values()
                 ),
             )
             for source, targets in wires.items()

@@ -8,6 +8,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from typing import Protocol
 
 from armblocks.diagram import Diagram
+from armblocks.diagram.inherited_names import inherited_names
 from armblocks.errors import UnknownNameError
 from armblocks.studio.documents.presenter import Opening, Place, Presenter
 from armblocks.studio.protocol.clients import Clients, StudioClient
@@ -84,7 +85,10 @@ class DiagramPresenter(Presenter[OpenDocument]):
         """Return the sheet at a path."""
         diagram = open_file.document.diagram
         shown_sheet, linked = inside(diagram, place), linked_part(diagram, place)
-        drawn_sheet = sheet(shown_sheet, self._lines.for_sheet(open_file.key, place).route(shown_sheet))
+        names = inherited_names(diagram, "/".join(place))
+        drawn_sheet = sheet(
+            shown_sheet, self._lines.for_sheet(open_file.key, place).route(shown_sheet, names)
+        )
         if linked:
             link = inside(diagram, linked).link
             drawn_sheet = drawn_sheet.model_copy(update={"linked": list(linked), "link": link})
@@ -104,8 +108,12 @@ class DiagramPresenter(Presenter[OpenDocument]):
             inside(diagram, place),
             self._lines.for_sheet(open_file.key, place),
         )
+        old_lines, new_lines = (
+            lines.route(inside(value, place), inherited_names(value, "/".join(place)))
+            for value in (before, diagram)
+        )
         return DiagramChange(
-            sheet=sheet_change(old, new, changed_lines(lines.route(old), lines.route(new))),
+            sheet=sheet_change(old, new, changed_lines(old_lines, new_lines)),
             settings=dataclasses.asdict(diagram.settings),
             outer_comment=outer_comment(diagram, place),
             renamed=renamed_paths(before, diagram),

@@ -7,6 +7,7 @@ from typing import Any
 
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import Diagram, ParameterFormula
+from armblocks.diagram.inherited_names import inherited_names
 from armblocks.diagram.mask import formula_value
 from armblocks.diagram.parameter import Value
 from armblocks.errors import UnknownNameError
@@ -74,9 +75,11 @@ class SheetQueries:
         if request.wires is not None:
             wires = {connection(wire): wire.bends for wire in request.wires}
             connections, bends = tuple(wire for wire in wires if has_ports(wire, sheet)), wires
-        before = lines.route(sheet)
+        diagram = self._diagrams[request.document].document.diagram
+        names = inherited_names(diagram, "/".join(request.inside))
+        before = lines.route(sheet, names)
         places = {name: (corner.x, corner.y) for name, corner in request.places.items()}
-        after = lines.route_dragged(sheet, places, connections, bends, request.passed)
+        after = lines.route_dragged(sheet, places, connections, bends, request.passed, names)
         return {source: shown for source, shown in after.items() if before.get(source) != shown}
 
     async def _outline(self, _: StudioClient, request: sheet_messages.AskOutline) -> sheet_messages.Outline:

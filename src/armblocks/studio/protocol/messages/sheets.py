@@ -98,9 +98,11 @@ class WireLines(Message):
     dots: list[tuple[float, float]]
     label: str
     name: str = ""
-    """The name of the signal; ``name_at`` is its position on the baseline and its anchor, if there is a
-    line."""
+    """The name of the signal."""
+    inherited_name: str = ""
+    """The name that the signal has before a From, In or subsystem, if it has no name here."""
     name_at: tuple[float, float, Literal["start", "middle"]] | None = None
+    """Position of the displayed name on its baseline, and its anchor; ``None`` without a line or name."""
 
 
 class Sheet(Message):
