@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 
 _FASTEST = 1e12
 """Squared path speed where no joint speed is limited."""
+_ROUNDING = 1e-12
+"""Torques that are smaller, relative to their terms, are rounding errors."""
 _ACCEPTED = 1e-3
 """Greatest excess over a limit, relative to the limit, without an error."""
 
@@ -86,8 +88,8 @@ def least_time(
             allowed="an integer of 10 or more: the least number of segments",
             fix="leave out grid for 200 segments",
         )
-    path = _path(via, limits, blend)
-    return sampled(fastest_motion(arm, path, limits, payload, _grid(arm, path, grid)), step)
+    path = path_through(via, limits, blend)
+    return sampled(fastest_motion(arm, path, limits, payload, grid_of(arm, path, grid)), step)
 
 
 def check_joint_space(arm: Arm, where: str) -> None:
@@ -139,7 +141,7 @@ def fastest_motion(
     return _motion(points, np.diff(s), solution.x)
 
 
-def _path(points: Array, limits: MotionLimits, blend: float | None) -> PiecewisePolynomial:
+def path_through(points: Array, limits: MotionLimits, blend: float | None) -> PiecewisePolynomial:
     """The path through the points; joints are scaled by their speed limits, or by their ranges of motion."""
     same = np.flatnonzero((np.diff(points, axis=0) == 0.0).all(axis=1))
     if same.size:
@@ -162,7 +164,7 @@ def _path(points: Array, limits: MotionLimits, blend: float | None) -> Piecewise
     return blended_path(points, scale, blend)
 
 
-def _grid(arm: Arm, path: PiecewisePolynomial, count: int) -> Array:
+def grid_of(arm: Arm, path: PiecewisePolynomial, count: int) -> Array:
     """At least ``count`` segments of the path, with points at its knots and where Coulomb friction jumps."""
     slow = np.full(arm.n, 1e-9)
     dry = np.abs(arm.friction(slow)) + np.abs(arm.friction(-slow)) > 1e-6
@@ -176,53 +178,54 @@ def _grid(arm: Arm, path: PiecewisePolynomial, count: int) -> Array:
     return np.concatenate(grid)
 
 
-def _points(path: PiecewisePolynomial, s: Array) -> tuple[Motion[Array], Motion[Array], Motion[Array]]:
-    """The path and its derivatives (N, n) at the start, the middle and the end of each segment."""
-    middle = (s[:-1] + s[1:]) / 2.0
-    N = len(middle)
-    every = path.at(np.concatenate([s, middle]))
-    start, mid = (Motion(*(part[rows] for part in every)) for rows in (slice(0, N), slice(N + 1, None)))
-    # The curvature may jump at the knots.
-    end = [part[1 : N + 1].copy() for part in every]
-    knots = np.flatnonzero(np.isin(s[1:], path.times))
-    for part, at_knots in zip(end, path.at(s[1:][knots], side="left")):
-        part[knots] = at_knots
-    return start, mid, Motion(*end)
+@dataclass(frozen=True, kw_only=True)
+class _GridPoints:
+    """The path and its derivatives (M, n) at separate points, and the indices (3, N) of start, middle and end
+    of each segment."""
+
+    path: Motion[Array]
+    index: NDArray[np.int64]
+
+    def at(self, values: Array) -> Array:
+        """The values (3, N, …) at start, middle and end of each segment, of values (M, …)."""
+        return values[self.index]
+
+
+def _points(path: PiecewisePolynomial, s: Array) -> _GridPoints:
+    N = len(s) - 1
+    every = np.empty(2 * N + 1)
+    every[::2], every[1::2] = s, (s[:-1] + s[1:]) / 2.0
+    start = 2 * np.arange(N)
+    index = np.stack([start, start + 1, start + 2])
+    motion = path.at(every)
+    # The curvature may jump at the inner knots.
+    knots = np.searchsorted(s, path.times[1:-1])
+    if knots.size:
+        before = path.at(path.times[1:-1], side="left")
+        motion = Motion(*(np.concatenate(pair) for pair in zip(motion, before)))
+        index[2, knots - 1] = 2 * N + 1 + np.arange(len(knots))
+    return _GridPoints(path=motion, index=index)
 
 
 def _problem(
-    arm: Arm,
-    points: tuple[Motion[Array], ...],
-    limits: MotionLimits,
-    payload: Payload | float | None,
-    lengths: Array,
+    arm: Arm, points: _GridPoints, limits: MotionLimits, payload: Payload | float | None, lengths: Array
 ) -> Limits:
     """The linear constraints at the start, the middle and the end of each segment of the grid."""
-    N = len(lengths)
-    q, first, second = (np.concatenate(parts) for parts in zip(*points))
-    zero = np.zeros_like(q)
+    _, first, second = points.path
     bounds = np.concatenate([limits.torque, limits.acceleration])
     rows = np.isfinite(bounds)
-    a = b = c = d = zero
+    shape = (*points.index.shape, arm.n)
+    torques: tuple[Array | float, ...] = (0.0, 0.0, 0.0, 0.0)
     if np.isfinite(limits.torque).any():
-        qd, qdd = np.concatenate([zero, zero, first]), np.concatenate([zero, first, second])
-        gravity, a, b = np.split(_torque(arm, np.tile(q, (3, 1)), qd, qdd, payload), 3)
-        # Friction is the sum of a part that is proportional to the speed and a part that depends on its sign.
-        # A joint that turns at a grid point has the direction of the segment.
-        still = np.abs(first) <= 1e-12 * np.abs(first).max()
-        direction = np.where(still, np.tile(points[1].qd, (3, 1)), first)
-        once, twice, one, two = np.split(
-            arm.friction(np.concatenate([first, 2.0 * first, direction, 2.0 * direction])), 4
-        )
-        a, b, c, d = a - gravity, b - gravity - once, gravity + 2.0 * one - two, twice - once
-    columns = {"a": (a, first), "b": (b, second), "c": (c, zero), "d": (d, zero)}
-    values = {
-        name: np.ascontiguousarray(np.hstack(parts)[:, rows].T.reshape(-1, 3, N).swapaxes(0, 1))
-        for name, parts in columns.items()
-    }
+        torques = _torque_terms(arm, points, payload)
+    along = (points.at(first), points.at(second), 0.0, 0.0)
+    values: list[Array] = []
+    for torque, acceleration in zip(torques, along):
+        both = np.empty((*shape[:2], 2 * arm.n))
+        both[..., : arm.n], both[..., arm.n :] = torque, acceleration
+        values.append(both if rows.all() else both[..., rows])
     with np.errstate(divide="ignore"):
-        squared = (np.abs(first / limits.speed).T.max(axis=0) ** -2.0).reshape(3, N)
-    ends = np.minimum(np.append(squared[0], np.inf), np.append(np.inf, squared[2]))
+        squared = points.at(np.abs(first / limits.speed).max(axis=1) ** -2.0)
     if not rows.any() and not np.isfinite(squared).all():
         raise InputError(
             f"nothing limits the motion of the robot '{arm.name}'",
@@ -230,23 +233,60 @@ def _problem(
             allowed="limits of the speeds, accelerations or torques of the joints that move",
             fix="give speed=, acceleration= or torque=, or limits in the robot's file",
         )
-    fastest, fastest_middle = np.minimum(ends, _FASTEST), np.minimum(squared[1], _FASTEST)
+    ends = np.minimum(np.append(squared[0], np.inf), np.append(np.inf, squared[2]))
     return Limits(
-        lengths=lengths, fastest=fastest, fastest_middle=fastest_middle, bound=bounds[rows, None], **values
+        lengths=lengths,
+        fastest=np.minimum(ends, _FASTEST),
+        fastest_middle=np.minimum(squared[1], _FASTEST),
+        bound=bounds[rows],
+        **dict(zip("abcd", values)),
     )
+
+
+def _torque_terms(arm: Arm, points: _GridPoints, payload: Payload | float | None) -> tuple[Array, ...]:
+    """The terms a, b, c, d (3, N, n) of the torques ``a u + b x + c + d y`` in each segment."""
+    q, first, second = points.path
+    zero = np.zeros_like(q)
+    # Torques at rest, for unit acceleration along the path, and at the path speeds 1 and 2.
+    qd = np.concatenate([zero, zero, first, 2.0 * first])
+    qdd = np.concatenate([zero, first, second, 4.0 * second])
+    gravity, a, once, twice = np.split(_torque(arm, np.concatenate([q, q, q, q]), qd, qdd, payload), 4)
+    coulomb = _coulomb(arm, first)
+    # once = gravity + coulomb + d + b, twice = gravity + coulomb + 2 d + 4 b
+    b = (twice - 2.0 * once + gravity + coulomb) / 2.0
+    d = once - gravity - coulomb - b
+    d[np.abs(d) <= _ROUNDING * (np.abs(once) + np.abs(gravity))] = 0.0
+    a, b, c, d = (points.at(values) for values in (a - gravity, b, gravity + coulomb, d))
+    # A joint that turns at a grid point has the direction of the segment.
+    still = np.abs(points.at(first)) <= 1e-12 * np.abs(first).max()
+    if still.any():
+        middle = first[points.index[1]]
+        of_segment = _coulomb(arm, middle)
+        c += np.where(still, of_segment - points.at(coulomb), 0.0)
+    return a, b, c, d
+
+
+def _coulomb(arm: Arm, qd: Array) -> Array:
+    """The part of the friction that depends on the signs of the speeds; the other part is linear in them."""
+    once, twice = np.split(arm.friction(np.concatenate([qd, 2.0 * qd])), 2)
+    return 2.0 * once - twice
 
 
 def _torque(arm: Arm, q: Array, qd: Array, qdd: Array, payload: Payload | float | None) -> Array:
     return arm.rne(q, qd, qdd) if payload is None else arm.rne(q, qd, qdd, payload=payload)
 
 
-def _motion(points: tuple[Motion[Array], ...], lengths: Array, x: Array) -> PiecewisePolynomial:
+def _motion(points: _GridPoints, lengths: Array, x: Array) -> PiecewisePolynomial:
     """The motion over time; each segment is the quintic with the exact rates at both of its ends."""
     times = np.append(0.0, np.cumsum(segment_times(x, lengths)))
     u = (np.diff(x) / (2.0 * lengths))[:, None]
+    y = np.sqrt(x)
     start, end = (
-        (p.q, p.qd * np.sqrt(squared)[:, None], p.qd * u + p.qdd * squared[:, None])
-        for p, squared in ((points[0], x[:-1]), (points[2], x[1:]))
+        (q, first * speed[:, None], first * u + second * squared[:, None])
+        for (q, first, second), speed, squared in (
+            (tuple(part[points.index[0]] for part in points.path), y[:-1], x[:-1]),
+            (tuple(part[points.index[2]] for part in points.path), y[1:], x[1:]),
+        )
     )
     last = np.array([part[-1] for part in end])
     last[1] = 0.0

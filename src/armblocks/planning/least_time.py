@@ -6,32 +6,46 @@ torque or an acceleration) is ``a u + b x + d y + c``. In a segment of the grid 
 
 ``d y`` is viscous friction. It is linear in the speed and not in ``x``; it is replaced by its tangent at the
 speed of the previous solution, and the solutions are repeated until they do not change: Newton's iteration.
+Where this tangent admits no motion, the iteration continues at half the speed.
+
+In the middle of a segment the quantities may exceed their limits by terms of second order in h. The limits of
+such a segment are reduced by the excess, and the solution is repeated. All iterations are native code.
 """
 
 from __future__ import annotations
 
+import ctypes
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.planning.passes import Rows, fastest_profile
+from armblocks.compiler.native import NativeCode
+from armblocks.planning.passes import NEGLIGIBLE, backward, forward, loaded
+from armblocks.routines.arithmetic import maximum, minimum, select, square_root
+from armblocks.routines.memory import Reals
+from armblocks.routines.routine import Program, Routine
+from armblocks.routines.values import Integer, Real
 
 Array = NDArray[np.float64]
 
 CONVERGED = 1e-7
 """Change of x, relative to its greatest value, below which the iteration has converged."""
-EXCESS = 1e-7
+NEAR = 1e-3
+"""Change of x below which the limits in the middle of the segments are checked."""
+EXCESS = 1e-6
 """Excess over a limit in the middle of a segment, relative to the limit, that is accepted."""
 MAX_ITERATIONS = 60
 
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """The limited quantities at the start, the middle and the end of N segments: arrays (3, R, N).
+    """The limited quantities at the start, the middle and the end of N segments: arrays (3, N, R).
 
-    ``-bound <= a u + b x + d y + c <= bound``, with ``bound`` (R, 1). ``lengths`` (N,): the segments h;
+    ``-bound <= a u + b x + d y + c <= bound``, with ``bound`` (R,). ``lengths`` (N,): the segments h;
     ``fastest`` (N + 1,) and ``fastest_middle`` (N,): bounds of x from speed limits.
     """
 
@@ -43,11 +57,6 @@ class Limits:
     c: Array
     d: Array
     bound: Array
-
-    @cached_property
-    def is_viscous(self) -> bool:
-        """Whether a torque depends linearly on the speed."""
-        return bool(self.d.any())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,69 +73,225 @@ class Solution:
 
 
 def solve(limits: Limits) -> Solution:
-    """The fastest squared path speeds from rest to rest; limits also hold in the middle of the segments.
-
-    There the quantities may exceed their limits by terms of second order in h. The limits of these segments
-    are reduced by the excess.
-    """
-    fastest = limits.fastest
-    margin = np.zeros_like(limits.a[0])
-    guess: Array | None = None
-    excess, change, iteration = np.inf, 0.0, 0
-    x = fastest
-    while iteration < MAX_ITERATIONS:
-        iteration += 1
-        found = fastest_profile(rows_of(limits, margin, guess), fastest, 0.0, 0.0)
-        x = found.x
-        if found.failed is not None:
-            return Solution(x=x, failed=found.failed, excess=excess, iterations=iteration)
-        if limits.is_viscous:
-            change = np.inf if guess is None else float(np.abs(x - guess).max() / x.max())
-        guess = x
-        if change > 1e-3:
-            continue
-        beyond, factor = excesses(limits, x)
-        excess = max(float((beyond / limits.bound).max(initial=-1.0)), float(factor.max()) - 1.0)
-        if change <= CONVERGED and excess <= EXCESS:
-            break
-        margin += 1.01 * np.maximum(beyond, 0.0)
-        reduction = np.maximum(factor, 1.0) ** -1.01
-        fastest = fastest * np.minimum(np.append(reduction, 1.0), np.append(1.0, reduction))
-    return Solution(x=x, failed=None, excess=excess, iterations=iteration)
-
-
-def excesses(limits: Limits, x: Array) -> tuple[Array, Array]:
-    """How far each quantity exceeds its limit in the middle of each segment, (R, N), and by which factor x
-    exceeds the speed limits there, (N,)."""
-    middle = (x[:-1] + x[1:]) / 2.0
-    u = (x[1:] - x[:-1]) / (2.0 * limits.lengths)
-    values = limits.a[1] * u + limits.b[1] * middle + limits.c[1]
-    if limits.is_viscous:
-        values += limits.d[1] * np.sqrt(middle)
-    return np.abs(values) - limits.bound, middle / limits.fastest_middle
-
-
-def rows_of(limits: Limits, margin: Array, x: Array | None) -> Rows:
-    """The linear constraints of both ends of each segment, with viscous friction linearised at ``x``.
-
-    Without ``x`` the viscous friction is left out.
-    """
-    half = limits.a[::2] / (2.0 * limits.lengths)
-    here, offset = limits.b[::2], limits.c[::2]
-    if x is not None and limits.is_viscous:
-        y = np.sqrt(np.maximum(x, 1e-12 * x.max()))
-        at_ends = np.stack([y[:-1], y[1:]])[:, None, :]
-        here = here + limits.d[::2] / (2.0 * at_ends)
-        offset = offset + limits.d[::2] * (at_ends / 2.0)
-    alpha, beta = -half, half
-    alpha[0] += here[0]
-    beta[1] += here[1]
-    reduced = limits.bound - margin
-    shape = (-1, len(limits.lengths))
-    return Rows(*(part.reshape(shape) for part in (alpha, beta, -reduced - offset, reduced - offset)))
+    """The fastest squared path speeds from rest to rest; limits also hold in the middle of the segments."""
+    _, N, R = np.shape(limits.a)
+    inputs = [
+        np.ascontiguousarray(part, dtype=np.float64)
+        for part in (limits.a, limits.b, limits.c, limits.d, limits.bound, limits.lengths)
+    ]
+    inputs += [np.array(limits.fastest), np.ascontiguousarray(limits.fastest_middle)]
+    x, result = np.zeros(N + 1), np.array([np.inf, 0.0, 0.0, 0.0])
+    work = np.zeros(7 * N * R + 5 * (N + 1))
+    pointers = [part.ctypes.data for part in (*inputs, x, result, work)]
+    failed = int(_function()(*pointers, N, R, int(limits.d.any())))
+    return Solution(
+        x=x, failed=failed if failed >= 0 else None, excess=float(result[0]), iterations=int(result[1])
+    )
 
 
 def segment_times(x: Array, lengths: Array) -> Array:
     """The duration (N,) of each segment, s."""
     y = np.sqrt(x)
     return 2.0 * lengths / (y[:-1] + y[1:])
+
+
+def _line(
+    r: Routine,
+    alpha: Real,
+    beta: Real,
+    lower: Real,
+    upper: Real,
+    slope: Reals,
+    bottom: Reals,
+    top: Reals,
+    bounds: Reals,
+    k: Integer,
+) -> None:
+    """Solve the constraint ``lower <= alpha x0 + beta x1 <= upper`` for x1: element ``k`` of the lines.
+
+    Without x1, it changes the two ``bounds`` of x0.
+    """  # fmt: skip
+    with r.when(abs(beta) <= abs(alpha) * NEGLIGIBLE):
+        slope[k], bottom[k], top[k] = 0.0, -np.inf, np.inf
+        with r.unless(alpha == 0.0):
+            one, other = lower / alpha, upper / alpha
+            bounds[0] = maximum(minimum(one, other), bounds[0])
+            bounds[1] = minimum(maximum(one, other), bounds[1])
+    with r.unless(abs(beta) <= abs(alpha) * NEGLIGIBLE):
+        one, other = lower / beta, upper / beta
+        slope[k], bottom[k], top[k] = -(alpha / beta), minimum(one, other), maximum(one, other)
+
+
+def _fill_lines(
+    r: Routine,
+    a: Reals,
+    b: Reals,
+    c: Reals,
+    d: Reals,
+    bound: Reals,
+    lengths: Reals,
+    limit: Reals,
+    guess: Reals,
+    margin: Reals,
+    slope: Reals,
+    bottom: Reals,
+    top: Reals,
+    least: Reals,
+    most: Reals,
+    bounds: Reals,
+    N: Integer,
+    R: Integer,
+    linearised: Integer,
+) -> None:
+    """The constraints at both ends of each segment as lines, with viscous friction linearised at ``guess``.
+
+    ``linearised`` is 0 for the first solution, without viscous friction.
+    """  # fmt: skip
+    line = r.program.define(_line, inlined=True)
+    fastest = r.real(0.0)
+    for i in r.range(0, N + 1):
+        fastest.value = maximum(guess[i], fastest.value)
+    floor = maximum(fastest.value * 1e-12, 1e-300)
+    last = N * R * 2
+    for i in r.range(0, N):
+        bounds[0], bounds[1] = r.constant(0.0), limit[i]
+        half = 0.5 / lengths[i]
+        y0, y1 = (square_root(maximum(guess[i + k], floor)) for k in (0, 1))
+        for j in r.range(0, R):
+            k = i * R + j
+            for end, y, place in ((0, y0, 0), (1, y1, R)):
+                at = k + last if end else k
+                rise = a[at] * half
+                here, offset = r.real(b[at]), r.real(c[at])
+                with r.when(linearised > 0):
+                    here.value = here.value + d[at] / (2.0 * y)
+                    offset.value = offset.value + d[at] * (y * 0.5)
+                alpha = -rise if end else here.value - rise
+                beta = rise + here.value if end else rise
+                reduced = bound[j] - margin[k]
+                r.call(
+                    line, alpha, beta, -reduced - offset.value, reduced - offset.value,
+                    slope, bottom, top, bounds, 2 * i * R + j + place,
+                )  # fmt: skip
+        least[i], most[i] = bounds[0], bounds[1]
+
+
+def _reduce_limits(
+    r: Routine,
+    a: Reals,
+    b: Reals,
+    c: Reals,
+    d: Reals,
+    bound: Reals,
+    lengths: Reals,
+    limit: Reals,
+    fastest_middle: Reals,
+    x: Reals,
+    margin: Reals,
+    N: Integer,
+    R: Integer,
+) -> Real:
+    """Reduce the limits of segments in whose middle they are exceeded.
+
+    Returns the greatest excess, relative to the limits.
+    """  # fmt: skip
+    excess = r.real(-1.0)
+    for i in r.range(0, N):
+        x0, x1 = x[i], x[i + 1]
+        middle, u = (x0 + x1) * 0.5, (x1 - x0) * (0.5 / lengths[i])
+        y = square_root(middle)
+        for j in r.range(0, R):
+            k = (N + i) * R + j
+            value = abs(a[k] * u + b[k] * middle + c[k] + d[k] * y)
+            beyond = value - bound[j]
+            excess.value = maximum(beyond / bound[j], excess.value)
+            with r.when(beyond > 0.0):
+                own = i * R + j
+                margin[own] = margin[own] + beyond * 1.01
+        factor = middle / fastest_middle[i]
+        excess.value = maximum(factor - 1.0, excess.value)
+        with r.when(factor > 1.0):
+            reduction = 1.0 / (factor * (factor * 0.01 + 0.99))
+            limit[i], limit[i + 1] = limit[i] * reduction, limit[i + 1] * reduction
+    return excess.value
+
+
+def _solve(
+    r: Routine,
+    a: Reals,
+    b: Reals,
+    c: Reals,
+    d: Reals,
+    bound: Reals,
+    lengths: Reals,
+    limit: Reals,
+    fastest_middle: Reals,
+    x: Reals,
+    result: Reals,
+    work: Reals,
+    N: Integer,
+    R: Integer,
+    viscous: Integer,
+) -> Integer:
+    """Fill ``x`` and ``result``: greatest excess, number of iterations, two numbers of working memory.
+
+    Returns -1, or the index of an impassable point.
+    """  # fmt: skip
+    fill, reduce = r.program.define(_fill_lines), r.program.define(_reduce_limits)
+    back, forth = r.program.define(backward), r.program.define(forward)
+    size, points = N * R, N + 1
+    margin, slope = work, work.after(size)
+    bottom, top = slope.after(2 * size), slope.after(4 * size)
+    least = slope.after(6 * size)
+    most, low, high, guess = (least.after(points * k) for k in range(1, 5))
+    problem = (a, b, c, d, bound, lengths, limit)
+    iteration = r.integer(0)
+    with r.loop() as search:
+        count = iteration.value
+        iteration.value = count + 1
+        result[1] = result[1] + 1.0
+        linearised = select(count > 0, viscous, 0)
+        bounds = result.after(2)
+        r.call(fill, *problem, guess, margin, slope, bottom, top, least, most, bounds, N, R, linearised)
+        low[N], high[N] = r.constant(0.0), r.constant(0.0)
+        failed = r.call(back, slope, bottom, top, least, most, low, high, N, 2 * R)
+        failed = select(failed >= 0, failed, select(low[0] > 0.0, r.constant_integer(0), failed))
+        with r.when(failed >= 0):
+            # The tangent at a fast guess overestimates the friction of slow motions.
+            is_final = (linearised == 0) | (iteration.value >= MAX_ITERATIONS)
+            with r.when(is_final):
+                r.return_(failed)
+            for i in r.range(0, points):
+                guess[i] = guess[i] * 0.25
+            search.again()
+        x[0] = r.constant(0.0)
+        r.call(forth, slope, top, low, high, x, N, 2 * R)
+        change, fastest = r.real(0.0), r.real(0.0)
+        for i in r.range(0, points):
+            change.value = maximum(abs(x[i] - guess[i]), change.value)
+            fastest.value = maximum(x[i], fastest.value)
+            guess[i] = x[i]
+        with r.when(viscous == 0):
+            change.value = r.constant(0.0)
+        search.leave_when(iteration.value >= MAX_ITERATIONS)
+        with r.when(change.value <= fastest.value * NEAR):
+            excess = r.call(reduce, *problem, fastest_middle, x, margin, N, R)
+            result[0] = excess
+            with r.when(excess <= EXCESS):
+                search.leave_when(change.value <= fastest.value * CONVERGED)
+    return r.constant_integer(-1)
+
+
+@cache
+def _code() -> NativeCode:
+    program = Program()
+    program.define(_solve, "solve", public=True)
+    return loaded(program)
+
+
+@cache
+def _function() -> Callable[..., int]:
+    code = _code()
+    kinds = [*[ctypes.c_void_p] * 11, *[ctypes.c_int64] * 3]
+    function: Any = ctypes.CFUNCTYPE(ctypes.c_int64, *kinds)(code.address("solve"))
+    return function

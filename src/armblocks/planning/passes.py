@@ -54,13 +54,42 @@ class Profile(NamedTuple):
     failed: int | None
 
 
+class Lines(NamedTuple):
+    """The constraints solved for x1: ``bottom + slope x0 <= x1 <= top + slope x0``, each array (R, N), and
+    ``least <= x0 <= most`` (N,) from those of x0 alone."""
+
+    slope: Array
+    bottom: Array
+    top: Array
+    least: Array
+    most: Array
+
+
+def lines_of(rows: Rows, limit: Array) -> Lines:
+    """The constraints solved for x1, and the bounds of x0, with its ``limit`` (N,)."""
+    alone = np.abs(rows.beta) <= NEGLIGIBLE * np.abs(rows.alpha)
+    any_alone = bool(alone.any())
+    beta = np.where(alone, 1.0, rows.beta) if any_alone else rows.beta
+    one, other = rows.lower / beta, rows.upper / beta
+    slope = -rows.alpha / beta
+    bottom, top = np.minimum(one, other), np.maximum(one, other)
+    least, most = np.zeros_like(limit), limit
+    if any_alone:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ends = np.stack([rows.lower, rows.upper]) / np.where(alone, rows.alpha, 1.0)
+        least = np.maximum(least, np.where(alone, ends.min(axis=0), 0.0).max(axis=0))
+        most = np.minimum(most, np.where(alone, ends.max(axis=0), np.inf).min(axis=0))
+        slope, bottom, top = (
+            np.where(alone, value, line) for value, line in ((0.0, slope), (-np.inf, bottom), (np.inf, top))
+        )
+    return Lines(slope, bottom, top, least, most)
+
+
 def _gap(
     r: Routine,
-    alpha: Reals,
-    beta: Reals,
-    lower: Reals,
-    upper: Reals,
-    N: Integer,
+    slope: Reals,
+    bottom: Reals,
+    top: Reals,
     R: Integer,
     x0: Real,
     low: Real,
@@ -70,29 +99,31 @@ def _gap(
 
     ``low``, ``high``: the interval of x1 without the constraints.
     """
-    top, top_slope = r.real(high), r.real(0.0)
-    bottom, bottom_slope = r.real(low), r.real(0.0)
-    for j in r.range(0, R):
-        k = j * N
-        b = beta[k]
-        with r.unless(b == 0.0):
-            slope = -(alpha[k] / b)
-            one, other = (upper[k] - alpha[k] * x0) / b, (lower[k] - alpha[k] * x0) / b
-            above, below = select(b > 0.0, one, other), select(b > 0.0, other, one)
-            with r.when(above < top.value):
-                top.value, top_slope.value = above, slope
-            with r.when(below > bottom.value):
-                bottom.value, bottom_slope.value = below, slope
-    return top.value - bottom.value, top_slope.value - bottom_slope.value
+    above, above_slope = r.real(high), r.real(0.0)
+    below, below_slope = r.real(low), r.real(0.0)
+    for k in r.range(0, R):
+        rise = slope[k]
+        shift = rise * x0
+        upper, lower = top[k] + shift, bottom[k] + shift
+        is_lower, is_higher = upper < above.value, lower > below.value
+        above.value, above_slope.value = (
+            select(is_lower, upper, above.value),
+            select(is_lower, rise, above_slope.value),
+        )
+        below.value, below_slope.value = (
+            select(is_higher, lower, below.value),
+            select(is_higher, rise, below_slope.value),
+        )
+    return above.value - below.value, above_slope.value - below_slope.value
 
 
 def backward(
     r: Routine,
-    alpha: Reals,
-    beta: Reals,
-    lower: Reals,
-    upper: Reals,
-    limit: Reals,
+    slope: Reals,
+    bottom: Reals,
+    top: Reals,
+    least: Reals,
+    most: Reals,
     low: Reals,
     high: Reals,
     N: Integer,
@@ -105,64 +136,44 @@ def backward(
     gap = r.program.define(_gap, inlined=False)
     for k in r.range(0, N):
         i = N - 1 - k
-        rows = (alpha.after(i), beta.after(i), lower.after(i), upper.after(i))
-        least, most = r.real(0.0), r.real(limit[i])
-        for j in r.range(0, R):  # constraints of x0 alone
-            a = rows[0][j * N]
-            with r.when(rows[1][j * N] == 0.0):
-                one, other = rows[3][j * N] / a, rows[2][j * N] / a
-                with r.when(a > 0.0):
-                    most.value, least.value = minimum(most.value, one), maximum(least.value, other)
-                with r.when(a < 0.0):
-                    most.value, least.value = minimum(most.value, other), maximum(least.value, one)
+        first = i * R
+        lines = (slope.after(first), bottom.after(first), top.after(first))
+        begin, end = r.real(least[i]), r.real(most[i])
         end_low, end_high = low[i + 1], high[i + 1]
         # Rounding errors of x1, relative to the sizes of both ends, do not make a point infeasible.
-        margin = (end_high + most.value) * -1e-13
-        for bound, sign in ((most, 1.0), (least, -1.0)):
+        margin = (end_high + end.value) * -1e-13
+        for bound, sign in ((end, 1.0), (begin, -1.0)):
             steps = r.integer(0)
             with r.loop() as search:
-                length, slope = r.call(gap, *rows, N, R, bound.value, end_low, end_high)
+                length, rise = r.call(gap, *lines, R, bound.value, end_low, end_high)
                 search.leave_when(length >= margin)
                 steps.value = steps.value + 1
-                with r.unless(slope * sign < 0.0):
+                with r.unless(rise * sign < 0.0):
                     r.return_(i)
                 with r.when(steps.value > MAX_NEWTON):
                     r.return_(i)
-                step = length / slope
+                step = length / rise
                 bound.value = bound.value - step
                 # Where x1 has almost no effect, the gap has large rounding errors, but not its zero.
                 search.leave_when(abs(step) <= abs(bound.value) * 1e-13)
-        with r.when(most.value < least.value):
-            with r.when(least.value - most.value > 1e-12 * least.value):
+        with r.when(end.value < begin.value):
+            with r.when(begin.value - end.value > 1e-12 * begin.value):
                 r.return_(i)
-            most.value = least.value
-        low[i], high[i] = least.value, most.value
+            end.value = begin.value
+        low[i], high[i] = begin.value, end.value
     return r.constant_integer(-1)
 
 
 def forward(
-    r: Routine,
-    alpha: Reals,
-    beta: Reals,
-    lower: Reals,
-    upper: Reals,
-    low: Reals,
-    high: Reals,
-    x: Reals,
-    N: Integer,
-    R: Integer,
+    r: Routine, slope: Reals, top: Reals, low: Reals, high: Reals, x: Reals, N: Integer, R: Integer
 ) -> None:
     """Fill ``x`` (N + 1,) from the given first element on: the largest reachable squared speeds."""
     for i in r.range(0, N):
-        x0 = x[i]
+        x0, first = x[i], i * R
         most = r.real(high[i + 1])
         for j in r.range(0, R):
-            k = j * N + i
-            a, b = alpha[k], beta[k]
-            with r.when(b > 0.0):
-                most.value = minimum(most.value, (upper[k] - a * x0) / b)
-            with r.when(b < 0.0):
-                most.value = minimum(most.value, (lower[k] - a * x0) / b)
+            k = first + j
+            most.value = minimum(top[k] + slope[k] * x0, most.value)
         x[i + 1] = maximum(most.value, low[i + 1])
 
 
@@ -172,20 +183,19 @@ def fastest_profile(rows: Rows, limit: Array, start: float, end: float) -> Profi
     ``limit`` (N + 1,): bounds of x from limits of the speeds alone.
     """
     R, N = rows.alpha.shape
-    data = [np.ascontiguousarray(part, dtype=np.float64) for part in rows]
-    data[1] = np.where(np.abs(data[1]) <= NEGLIGIBLE * np.abs(data[0]), 0.0, data[1])
-    limit = np.ascontiguousarray(limit, dtype=np.float64)
+    lines = [np.ascontiguousarray(part.T, dtype=np.float64) for part in lines_of(rows, limit[:-1])]
     low, high, x = np.zeros(N + 1), np.zeros(N + 1), np.zeros(N + 1)
     low[-1] = high[-1] = end
-    pointers = [part.ctypes.data for part in data]
+    slope, bottom, top, least, most = (part.ctypes.data for part in lines)
     back, forth = _functions()
-    failed = int(back(*pointers, limit.ctypes.data, low.ctypes.data, high.ctypes.data, N, R))
+    intervals = low.ctypes.data, high.ctypes.data
+    failed = int(back(slope, bottom, top, least, most, *intervals, N, R))
     if failed < 0 and not low[0] * (1.0 - 1e-9) - 1e-300 <= start <= high[0] * (1.0 + 1e-9):
         failed = 0
     if failed >= 0:
         return Profile(x, failed)
     x[0] = start
-    forth(*pointers, low.ctypes.data, high.ctypes.data, x.ctypes.data, N, R)
+    forth(slope, top, *intervals, x.ctypes.data, N, R)
     return Profile(x, None)
 
 
@@ -194,17 +204,21 @@ def _code() -> NativeCode:
     program = Program()
     program.define(backward, public=True, distinct=True)
     program.define(forward, public=True, distinct=True)
-    parts = definitions(program)
-    return load_code(("least time", *parts.values()), lambda: "\n\n".join(parts.values()))
+    return loaded(program)
 
 
 @cache
 def _functions() -> tuple[Callable[..., int], Callable[..., None]]:
     code = _code()
-    arrays = [ctypes.c_void_p] * 7
-    sizes = [ctypes.c_int64] * 2
+    array, sizes = ctypes.c_void_p, [ctypes.c_int64] * 2
     result: list[Any] = [
-        ctypes.CFUNCTYPE(ctypes.c_int64, *arrays, *sizes)(code.address("backward")),
-        ctypes.CFUNCTYPE(None, *arrays, *sizes)(code.address("forward")),
+        ctypes.CFUNCTYPE(ctypes.c_int64, *[array] * 7, *sizes)(code.address("backward")),
+        ctypes.CFUNCTYPE(None, *[array] * 5, *sizes)(code.address("forward")),
     ]
     return result[0], result[1]
+
+
+def loaded(program: Program) -> NativeCode:
+    """The machine code of a program."""
+    parts = definitions(program)
+    return load_code(("least time", *parts.values()), lambda: "\n\n".join(parts.values()))

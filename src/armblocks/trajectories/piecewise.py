@@ -83,15 +83,16 @@ class PiecewisePolynomial:
 
 
 def _polynomials(coefficients: Array, u: Array) -> tuple[Array, Array, Array]:
-    """Values and two derivatives at ``u`` (…) of polynomials with the coefficients (…, m, n), by Horner."""
-    u = u[..., None]
-    q = np.zeros(coefficients.shape[:-2] + coefficients.shape[-1:])
-    qd, half = np.zeros_like(q), np.zeros_like(q)
-    for power in range(coefficients.shape[-2] - 1, -1, -1):
-        half = half * u + qd
-        qd = qd * u + q
-        q = q * u + coefficients[..., power, :]
-    return q, qd, 2.0 * half
+    """Values and two derivatives at ``u`` (…) of polynomials with the coefficients (…, m, n)."""
+    m = coefficients.shape[-2]
+    powers = np.ones((*u.shape, m))
+    for k in range(1, m):
+        np.multiply(powers[..., k - 1], u, out=powers[..., k])
+    derived = [powers, np.zeros_like(powers), np.zeros_like(powers)]
+    derived[1][..., 1:] = powers[..., :-1] * np.arange(1.0, m)
+    derived[2][..., 2:] = powers[..., :-2] * (np.arange(2.0, m) * np.arange(1.0, m - 1))
+    q, qd, qdd = (np.einsum("...m,...mn->...n", part, coefficients) for part in derived)
+    return q, qd, qdd
 
 
 def hermite(
