@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from armblocks.face.linearizing import frequency_response, linearize
     from armblocks.face.model import CompiledDiagram, begin, compile_diagram, simulate
     from armblocks.face.motor_catalogue import load_drives
+    from armblocks.face.parametric import ParametricArm
     from armblocks.face.payload import Payload
     from armblocks.face.planned_trajectories import point_to_point, spline_trajectory
     from armblocks.face.reporting import draw_diagram, write_files, write_report
@@ -127,6 +128,7 @@ else:
             "Motor": "armblocks.robot",
             "NamedFrame": "armblocks.robot",
             "OperatingPoint": "armblocks.analysis.operating_point",
+            "ParametricArm": "armblocks.face.parametric",
             "Payload": "armblocks.face.payload",
             "Planar": "armblocks.robot",
             "PlanarClosure": "armblocks.robot",
@@ -231,6 +233,7 @@ __all__ = [
     "Motor",
     "NamedFrame",
     "OperatingPoint",
+    "ParametricArm",
     "Payload",
     "Planar",
     "PlanarClosure",

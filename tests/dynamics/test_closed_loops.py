@@ -137,6 +137,28 @@ def test_parallelograms_are_singular_when_flat() -> None:
     assert mobility.instantaneous == 3
 
 
+@pytest.mark.parametrize("count", [1, 2])
+def test_the_branches_of_a_bifurcation_are_motions_of_the_mechanism(count: int) -> None:
+    """Flat squares: the parallelogram motion, and one fold about each post: count + 1 branches."""
+    robot = parallelograms(count)
+    flat = robot.neutral
+    flat[: count + 1], flat[count + 1 :] = -np.pi / 2, np.pi / 2
+    state = ab.Arm(robot).assemble(flat)
+    assert state.bifurcation and len(state.branches) == count + 1
+    assert f"bifurcation: {count + 1} branches of the motion cross here" in str(state)
+    assert f"at this configuration, of the joints {', '.join(state.free_joints)}" in str(state)
+    assert set(state.free_joints) == set(robot.joint_names)
+    mechanism = Mechanism(robot)
+    for direction in state.branches:
+        assert np.linalg.norm(direction) == pytest.approx(1.0)
+        assert np.abs(mechanism.jacobian(state.q) @ direction).max() < 0.05
+        # The residual along a branch is small to second order: the mechanism moves there.
+        other = mechanism.assembled(mechanism.moved(state.q, 0.2 * direction))
+        assert np.linalg.norm(other - state.q - 0.2 * direction) < 0.05
+    ordinary = ab.Arm(robot).assemble()
+    assert not ordinary.bifurcation and ordinary.free_joints == () and ordinary.branches.shape == (0, robot.n)
+
+
 @pytest.mark.parametrize("build", [four_bar, slider_crank, bricard])
 def test_assembly_finds_a_configuration_and_keeps_locked_joints(build: Callable[[], Robot]) -> None:
     robot = build()

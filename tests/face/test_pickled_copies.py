@@ -79,6 +79,7 @@ def examples() -> Mapping[str, Any]:
             ),
             ab.Coupling(name="c", terms=(("a", 1.0), ("b", 2.0))),
             arm.assemble(),
+            arm.parametric(["link1"]),
             arm.ikine(arm.fkine([0.1, 0.2])),
             arm.ikine_all(arm.fkine([0.1, 0.2])),
         ),

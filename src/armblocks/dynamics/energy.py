@@ -45,11 +45,11 @@ def kinetic_energy(tree: KinematicTree, joints: Sequence[JointMotion], qd: Seque
     return 0.5 * doubled_energy
 
 
-def first_moment(tree: KinematicTree, joints: Sequence[JointMotion]) -> tuple[float, Vector]:
+def first_moment(tree: KinematicTree, joints: Sequence[JointMotion]) -> tuple[Scalar, Vector]:
     """Total mass (kg), and ``sum m c`` of the whole robot in the base frame (kg m)."""
     moments: list[Vector] = [body.inertia.first for body in tree.bodies]
-    masses = [float(body.inertia.mass) for body in tree.bodies]
-    total, moment = float(tree.grounded.mass), tree.grounded.first
+    masses: list[Scalar] = [body.inertia.mass for body in tree.bodies]
+    total, moment = tree.grounded.mass, tree.grounded.first
     for i in reversed(range(tree.n)):
         parent = tree.bodies[i].parent
         carried = add(joints[i].to_parent(moments[i]), scale(masses[i], joints[i].p))
@@ -57,7 +57,7 @@ def first_moment(tree: KinematicTree, joints: Sequence[JointMotion]) -> tuple[fl
             total, moment = total + masses[i], add(moment, carried)
         else:
             moments[parent] = add(moments[parent], carried)
-            masses[parent] += masses[i]
+            masses[parent] = masses[parent] + masses[i]
     return total, moment
 
 

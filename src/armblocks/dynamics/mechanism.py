@@ -15,7 +15,7 @@ import numpy as np
 from casadi import SX, Function, vertcat
 from numpy.typing import NDArray
 
-from armblocks.dynamics.ball_joints import integrated, normalised
+from armblocks.dynamics.ball_joints import difference, integrated, normalised
 from armblocks.dynamics.constraint_equations import attached_frame, constraint_equations
 from armblocks.dynamics.joint_motion import entries
 from armblocks.dynamics.kinematics import body_poses, constant_pose, frame_pose
@@ -43,6 +43,13 @@ WIDE_STARTS = 40
 """Number of starts anywhere within the ranges of the joints, where no guess is given."""
 MOTIONS = 6
 """Number of configurations at which the rank of the Jacobian is determined."""
+
+BRANCH_STARTS = 24
+"""Number of motions in random directions by which branches are searched."""
+BRANCH_STEP = 0.03
+"""Length of these motions, rad or m."""
+SAME_BRANCH = 0.98
+"""Cosine of the angle above which two directions belong to one branch."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +89,9 @@ class Mechanism:
         self._evaluate = Function("closures", [q], [equations.residual_vector, J])
         moved = vertcat(*integrated(robot, entries(q), entries(step), 1.0))
         self._move = Function("move", [q, step], [moved])
+        q1 = SX.sym("q1", robot.nq)
+        between = vertcat(*difference(robot, entries(q), entries(q1)))
+        self._difference = Function("difference", [q, q1], [between])
         self._normalise = Function("normalise", [q], [vertcat(*normalised(robot, entries(q)))])
         ground = constant_pose(Transform())
         bodies = body_poses(tree, entries(tree_q), ground)
@@ -188,6 +198,37 @@ class Mechanism:
             tuple(independent),
             tuple(self.names[i] for i in others),
         )
+
+    def free_joints(self, q: Array) -> tuple[str, ...]:
+        """The joints that the first derivatives of the constraints permit to move at ``q``."""
+        J = self.jacobian(q)
+        motion = np.eye(self.robot.nv) - np.column_stack([_least_squares(J, column) for column in J.T])
+        owners = [link.name for link in self.robot.moving_links for _ in link.joint.speeds]
+        return tuple(dict.fromkeys(name for name, row in zip(owners, motion) if np.abs(row).max() > 1e-6))
+
+    def branches(self, q: Array) -> list[Array]:
+        """The directions (n,), each of length 1, of the curves of assembled configurations through ``q``.
+
+        For a mechanism with one degree of freedom. Several directions at a singular configuration: it is a
+        bifurcation, where branches of the motion cross. No direction: it cannot move from ``q``.
+        """
+        random, J = np.random.default_rng(3), self.jacobian(q)
+        found: list[Array] = []
+        for _ in range(BRANCH_STARTS):
+            step = random.normal(size=self.robot.nv)
+            step -= _least_squares(J, J @ step)
+            length = float(np.linalg.norm(step))
+            if length < 1e-9:
+                return []
+            other = self._descend(self.moved(q, BRANCH_STEP / length * step), [*range(self.robot.nv)])
+            chord = np.asarray(self._difference(q, other).full())[:, 0]
+            size = float(np.linalg.norm(chord))
+            is_assembled = np.abs(self.residuals(other)).max(initial=0.0) <= RESIDUAL_TOLERANCE
+            if is_assembled and size > 0.2 * BRANCH_STEP:
+                direction = chord / size
+                if all(abs(float(direction @ known)) < SAME_BRANCH for known in found):
+                    found.append(direction)
+        return found
 
     def gaps(self, q: Array) -> dict[str, str]:
         """The violation of each closure at ``q`` in words, in mm and degrees."""

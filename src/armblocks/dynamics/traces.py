@@ -40,24 +40,30 @@ from armblocks.dynamics.jacobian import jacobian_matrix, tool_columns, world_col
 from armblocks.dynamics.joint_motion import entries, joint_motions
 from armblocks.dynamics.joint_wrenches import reaction_wrenches
 from armblocks.dynamics.kinematics import body_poses, constant_pose, frame_pose
-from armblocks.dynamics.loads import PAYLOAD_SLOT, WRENCH_SLOT, tip_loads, tip_wrench, with_payload
+from armblocks.dynamics.loads import tip_loads, tip_wrench, with_payload
 from armblocks.dynamics.mechanism import Array
 from armblocks.dynamics.pose_error import trace_pose_error_in_tool, trace_pose_error_in_world
 from armblocks.dynamics.reduction import (
-    in_independent_coordinates,
     reduced_columns,
     tree_coordinates,
     tree_speeds,
 )
 from armblocks.dynamics.rnea import NO_WRENCH, rnea
+from armblocks.dynamics.robot_trace import (
+    body_of_speed,
+    column_sum,
+    differences,
+    matrix_of_rows,
+    robot_inputs,
+    robot_trace,
+)
 from armblocks.dynamics.springs import spring_energy, spring_torques
-from armblocks.equations import Signature, TracedFunction, signature
-from armblocks.equations.signatures import Slot
+from armblocks.equations import TracedFunction, signature
 from armblocks.errors import RobotError
 from armblocks.robot.robot import Robot
 from armblocks.robot.tree import KinematicTree
 from armblocks.spatial.inertia import RigidInertia
-from armblocks.spatial.vectors import Scalar, add, rotate, scale
+from armblocks.spatial.vectors import add, rotate, scale
 
 
 def trace_fkine(robot: Robot, frame: str | None = None) -> TracedFunction:
@@ -68,7 +74,7 @@ def trace_fkine(robot: Robot, frame: str | None = None) -> TracedFunction:
         ground = constant_pose(tree.base)
         return frame_pose(tree.tool, body_poses(tree, entries(q), ground), ground).matrix()
 
-    return _trace("fkine", robot, ("q",), ("T", (4, 4), "m"), equations)
+    return robot_trace("fkine", robot, ("q",), ("T", (4, 4), "m"), equations)
 
 
 def trace_link_poses(robot: Robot) -> TracedFunction:
@@ -81,7 +87,7 @@ def trace_link_poses(robot: Robot) -> TracedFunction:
         poses = [frame_pose(frame, bodies, ground) for frame in (*tree.links, tree.tool)]
         return SX(vertcat(*(pose.matrix() for pose in (ground, *poses))))
 
-    return _trace("link_poses", robot, ("q",), ("poses", (len(robot.links) + 2, 4, 4), "m"), equations)
+    return robot_trace("link_poses", robot, ("q",), ("poses", (len(robot.links) + 2, 4, 4), "m"), equations)
 
 
 def trace_jacob0(robot: Robot, frame: str | None = None) -> TracedFunction:
@@ -94,7 +100,7 @@ def trace_jacob0(robot: Robot, frame: str | None = None) -> TracedFunction:
     def equations(q: SX) -> SX:
         return jacobian_matrix(world_columns(tree, entries(q)))
 
-    return _trace("jacob0", robot, ("q",), ("J", (6, robot.n), ""), equations)
+    return robot_trace("jacob0", robot, ("q",), ("J", (6, robot.n), ""), equations)
 
 
 def trace_jacobe(robot: Robot, frame: str | None = None) -> TracedFunction:
@@ -107,7 +113,7 @@ def trace_jacobe(robot: Robot, frame: str | None = None) -> TracedFunction:
     def equations(q: SX) -> SX:
         return jacobian_matrix(tool_columns(tree, q))
 
-    return _trace("jacobe", robot, ("q",), ("J", (6, robot.n), ""), equations)
+    return robot_trace("jacobe", robot, ("q",), ("J", (6, robot.n), ""), equations)
 
 
 def trace_manipulability(robot: Robot) -> TracedFunction:
@@ -122,7 +128,7 @@ def trace_manipulability(robot: Robot) -> TracedFunction:
         columns = [entries(SX(reduced[:, k])) for k in range(robot.nv)]
         return yoshikawa([((vx, vy, vz), (wx, wy, wz)) for vx, vy, vz, wx, wy, wz in columns])
 
-    return _trace("manipulability", robot, ("q",), ("w", (), ""), equations, of_tree=False)
+    return robot_trace("manipulability", robot, ("q",), ("w", (), ""), equations, of_tree=False)
 
 
 @of_motors
@@ -134,9 +140,9 @@ def trace_rne(robot: Robot) -> TracedFunction:
         rates, accelerations = entries(qd), entries(qdd)
         rigid = rnea(tree, joint_motions(tree, q), rates, accelerations, tree.gravity)
         of_motors = rotor_torques(tree.robot, accelerations), joint_friction(tree.robot, rates)
-        return _sum(rigid, *of_motors, spring_torques(tree, q))
+        return column_sum(rigid, *of_motors, spring_torques(tree, q))
 
-    return _trace("rne", robot, ("q", "qd", "qdd"), ("tau", (robot.n,), "N m"), equations)
+    return robot_trace("rne", robot, ("q", "qd", "qdd"), ("tau", (robot.n,), "N m"), equations)
 
 
 @of_motors
@@ -151,10 +157,10 @@ def trace_rne_loaded(robot: Robot) -> TracedFunction:
             loaded, joint_motions(loaded, q), rates, accelerations, tree.gravity, tip_wrench(tree, wrench)
         )
         of_motors = rotor_torques(tree.robot, accelerations), joint_friction(tree.robot, rates)
-        return _sum(rigid, *of_motors, spring_torques(tree, q))
+        return column_sum(rigid, *of_motors, spring_torques(tree, q))
 
     inputs = ("q", "qd", "qdd", "wrench", "payload")
-    return _trace("rne", robot, inputs, ("tau", (robot.n,), "N m"), equations)
+    return robot_trace("rne", robot, inputs, ("tau", (robot.n,), "N m"), equations)
 
 
 @of_motors
@@ -165,9 +171,9 @@ def trace_gravload(robot: Robot) -> TracedFunction:
     def equations(q: SX) -> SX:
         no_motion = [0.0] * tree.n
         rigid = rnea(tree, joint_motions(tree, q), no_motion, no_motion, tree.gravity)
-        return _sum(rigid, spring_torques(tree, q))
+        return column_sum(rigid, spring_torques(tree, q))
 
-    return _trace("gravload", robot, ("q",), ("tau", (robot.n,), "N m"), equations)
+    return robot_trace("gravload", robot, ("q",), ("tau", (robot.n,), "N m"), equations)
 
 
 def trace_joint_wrenches(robot: Robot, near: Array | None = None) -> TracedFunction:
@@ -206,19 +212,19 @@ def _joint_wrenches(robot: Robot, inputs: Sequence[str], near: Array | None) -> 
 
     rows = len(robot.links) + len(robot.closures)
     output = ("wrenches", (rows, 6), "")
-    return _trace("joint_wrenches", robot, inputs, output, equations, of_tree=False)
+    return robot_trace("joint_wrenches", robot, inputs, output, equations, of_tree=False)
 
 
 def trace_inertia(robot: Robot) -> TracedFunction:
     """``M (n, n)``: joint-space inertia, rotors included; kg m2, kg m or kg."""
     tree = regrouped(KinematicTree.of(robot))
-    body_of_speed = _body_of_speed(tree)
+    bodies = body_of_speed(tree)
 
     def equations(q: SX) -> SX:
         M = crba(tree, joint_motions(tree, q))
-        return _matrix([[M[i][j] for j in body_of_speed] for i in body_of_speed])
+        return matrix_of_rows([[M[i][j] for j in bodies] for i in bodies])
 
-    return _trace("inertia", robot, ("q",), ("M", (robot.n, robot.n), "kg m2"), equations)
+    return robot_trace("inertia", robot, ("q",), ("M", (robot.n, robot.n), "kg m2"), equations)
 
 
 def trace_coriolis(robot: Robot) -> TracedFunction:
@@ -230,7 +236,7 @@ def trace_coriolis(robot: Robot) -> TracedFunction:
     in these speeds: ``C = (dc/dqd + M W) / 2`` with W of :func:`structure_matrix`.
     """
     tree = regrouped(KinematicTree.of(robot))
-    body_of_speed = _body_of_speed(tree)
+    bodies = body_of_speed(tree)
 
     def equations(q: SX, qd: SX) -> SX:
         zero_gravity = (0.0, 0.0, 0.0)
@@ -238,15 +244,15 @@ def trace_coriolis(robot: Robot) -> TracedFunction:
         # The speeds of the tree are expressions if couplings determine them, and symbols otherwise.
         speeds = SX.sym("speeds", tree.n) if robot.couplings else qd
         joints, rates = joint_motions(tree, q), entries(speeds)
-        twice = jacobian(_sum(rnea(tree, joints, rates, no_acceleration, zero_gravity)), speeds)
+        twice = jacobian(column_sum(rnea(tree, joints, rates, no_acceleration, zero_gravity)), speeds)
         W = structure_matrix(tree, rates)
         if W is not None:
             M = crba(tree, joints)
-            twice = twice + mtimes(_matrix([[M[i][j] for j in body_of_speed] for i in body_of_speed]), W)
+            twice = twice + mtimes(matrix_of_rows([[M[i][j] for j in bodies] for i in bodies]), W)
         C = SX(0.5 * twice)
         return SX(substitute(C, speeds, qd)) if robot.couplings else C
 
-    return _trace("coriolis", robot, ("q", "qd"), ("C", (robot.n, robot.n), "N m s"), equations)
+    return robot_trace("coriolis", robot, ("q", "qd"), ("C", (robot.n, robot.n), "N m s"), equations)
 
 
 def trace_friction(robot: Robot) -> TracedFunction:
@@ -256,9 +262,9 @@ def trace_friction(robot: Robot) -> TracedFunction:
     """
 
     def equations(qd: SX) -> SX:
-        return _sum(joint_friction(robot.uncoupled, entries(qd)))
+        return column_sum(joint_friction(robot.uncoupled, entries(qd)))
 
-    return _trace("friction", robot, ("qd",), ("tau", (robot.n,), "N m"), equations)
+    return robot_trace("friction", robot, ("qd",), ("tau", (robot.n,), "N m"), equations)
 
 
 def trace_accel(robot: Robot, near: Array | None = None) -> TracedFunction:
@@ -274,10 +280,12 @@ def trace_accel(robot: Robot, near: Array | None = None) -> TracedFunction:
         if robot.constraints:
             return constrained_motion(robot, tree, q, qd, tau, near=near).qdd
         rates = entries(qd)
-        net_torque = _difference(entries(tau), joint_friction(robot, rates), spring_torques(tree, q))
-        return _sum(forward_dynamics(tree, q, rates, net_torque))
+        net_torque = differences(entries(tau), joint_friction(robot, rates), spring_torques(tree, q))
+        return column_sum(forward_dynamics(tree, q, rates, net_torque))
 
-    return _trace("accel", robot, ("q", "qd", "tau"), ("qdd", (robot.n,), "rad/s2"), equations, of_tree=False)
+    return robot_trace(
+        "accel", robot, ("q", "qd", "tau"), ("qdd", (robot.n,), "rad/s2"), equations, of_tree=False
+    )
 
 
 def trace_accel_loaded(robot: Robot, near: Array | None = None) -> TracedFunction:
@@ -296,11 +304,11 @@ def trace_accel_loaded(robot: Robot, near: Array | None = None) -> TracedFunctio
             motion = constrained_motion(robot, loaded, q, qd, tau, near=near, on_bodies=wrenches, loads=loads)
             return motion.qdd
         rates = entries(qd)
-        net_torque = _difference(entries(tau), joint_friction(robot, rates), spring_torques(tree, q))
-        return _sum(forward_dynamics(loaded, q, rates, net_torque, wrenches))
+        net_torque = differences(entries(tau), joint_friction(robot, rates), spring_torques(tree, q))
+        return column_sum(forward_dynamics(loaded, q, rates, net_torque, wrenches))
 
     inputs = ("q", "qd", "tau", "wrench", "payload")
-    return _trace("accel", robot, inputs, ("qdd", (robot.n,), "rad/s2"), equations, of_tree=False)
+    return robot_trace("accel", robot, inputs, ("qdd", (robot.n,), "rad/s2"), equations, of_tree=False)
 
 
 def trace_constrained_motion(robot: Robot, near: Array | None = None) -> TracedFunction:
@@ -320,7 +328,9 @@ def trace_constrained_motion(robot: Robot, near: Array | None = None) -> TracedF
     outputs = signature(
         ("q", nq, ""), ("qd", n, ""), ("qdd", n, ""), ("q_rates", nq, ""), ("qd_rates", n, "")
     )
-    return TracedFunction.trace("constrained_motion", _inputs(robot, ("q", "qd", "tau")), outputs, equations)
+    return TracedFunction.trace(
+        "constrained_motion", robot_inputs(robot, ("q", "qd", "tau")), outputs, equations
+    )
 
 
 def trace_kinetic_energy(robot: Robot) -> TracedFunction:
@@ -330,7 +340,7 @@ def trace_kinetic_energy(robot: Robot) -> TracedFunction:
     def equations(q: SX, qd: SX) -> SX:
         return SX(kinetic_energy(tree, joint_motions(tree, q), entries(qd)))
 
-    return _trace("kinetic_energy", robot, ("q", "qd"), ("energy", (), "J"), equations)
+    return robot_trace("kinetic_energy", robot, ("q", "qd"), ("energy", (), "J"), equations)
 
 
 def trace_potential_energy(robot: Robot) -> TracedFunction:
@@ -343,7 +353,7 @@ def trace_potential_energy(robot: Robot) -> TracedFunction:
     def equations(q: SX) -> SX:
         return SX(potential_energy(tree, joint_motions(tree, q)) + spring_energy(tree, q))
 
-    return _trace("potential_energy", robot, ("q",), ("energy", (), "J"), equations)
+    return robot_trace("potential_energy", robot, ("q",), ("energy", (), "J"), equations)
 
 
 def trace_centre_of_mass(robot: Robot) -> TracedFunction:
@@ -362,43 +372,47 @@ def trace_centre_of_mass(robot: Robot) -> TracedFunction:
         centre = scale(1.0 / mass, moment)
         return SX(vertcat(*add(tree.base.translation, rotate(tree.base.rotation, centre))))
 
-    return _trace("centre_of_mass", robot, ("q",), ("centre", (3,), "m"), equations)
+    return robot_trace("centre_of_mass", robot, ("q",), ("centre", (3,), "m"), equations)
 
 
 def trace_position_rates(robot: Robot) -> TracedFunction:
     """``rates (nq,)``: dq/dt for the speeds ``qd``, which are these rates but for quaternions."""
 
     def equations(q: SX, qd: SX) -> SX:
-        return _sum(position_rates(robot, entries(q), entries(qd)))
+        return column_sum(position_rates(robot, entries(q), entries(qd)))
 
-    return _trace("position_rates", robot, ("q", "qd"), ("rates", (robot.nq,), ""), equations, of_tree=False)
+    return robot_trace(
+        "position_rates", robot, ("q", "qd"), ("rates", (robot.nq,), ""), equations, of_tree=False
+    )
 
 
 def trace_integrate(robot: Robot) -> TracedFunction:
     """``q (nq,)`` after the time ``dt`` (s) at constant ``qd``, with quaternions of length 1."""
 
     def equations(q: SX, qd: SX, dt: SX) -> SX:
-        return _sum(integrated(robot, entries(q), entries(qd), dt))
+        return column_sum(integrated(robot, entries(q), entries(qd), dt))
 
-    return _trace("integrate", robot, ("q", "qd", "dt"), ("q", (robot.nq,), ""), equations, of_tree=False)
+    return robot_trace(
+        "integrate", robot, ("q", "qd", "dt"), ("q", (robot.nq,), ""), equations, of_tree=False
+    )
 
 
 def trace_difference(robot: Robot) -> TracedFunction:
     """``qd (n,)`` that leads from ``q0`` to ``q1`` in one second; a ball joint rotates by at most π."""
 
     def equations(q0: SX, q1: SX) -> SX:
-        return _sum(difference(robot, entries(q0), entries(q1)))
+        return column_sum(difference(robot, entries(q0), entries(q1)))
 
-    return _trace("difference", robot, ("q0", "q1"), ("qd", (robot.n,), ""), equations, of_tree=False)
+    return robot_trace("difference", robot, ("q0", "q1"), ("qd", (robot.n,), ""), equations, of_tree=False)
 
 
 def trace_normalised(robot: Robot) -> TracedFunction:
     """``q (nq,)`` with quaternions of length 1."""
 
     def equations(q: SX) -> SX:
-        return _sum(normalised(robot, entries(q)))
+        return column_sum(normalised(robot, entries(q)))
 
-    return _trace("normalised", robot, ("q",), ("q", (robot.nq,), ""), equations, of_tree=False)
+    return robot_trace("normalised", robot, ("q",), ("q", (robot.nq,), ""), equations, of_tree=False)
 
 
 FRAMED = ("fkine", "jacob0", "jacobe", "pose_error_in_world", "pose_error_in_tool")
@@ -437,65 +451,3 @@ TRACES: Mapping[str, Callable[..., TracedFunction]] = {
 }
 """The trace functions by name: ``TRACES["rne"](robot)``; those in ``FRAMED`` also take ``frame``, those
 in ``ASSEMBLED`` also ``near``."""
-
-
-def _trace(
-    name: str,
-    robot: Robot,
-    inputs: Sequence[str],
-    output: tuple[str, tuple[int, ...], str],
-    equations: Callable[..., SX],
-    *,
-    of_tree: bool = True,
-) -> TracedFunction:
-    """The trace of ``equations``, which have the coordinates of the tree (``of_tree``) or of the robot."""
-    if robot.n == 0:
-        raise RobotError(
-            f"no joint moves, so there is no {name}",
-            where=f"robot '{robot.name}'",
-            allowed="at least one joint that is not fixed",
-            fix="give the robot a joint that moves",
-        )
-    if robot.couplings and of_tree:
-        equations = in_independent_coordinates(robot.coordinate_map, inputs, output[0], equations)
-    return TracedFunction.trace(name, _inputs(robot, inputs), signature(output), equations)
-
-
-def _inputs(robot: Robot, names: Sequence[str]) -> Signature:
-    """Slots of the named inputs; joint quantities have a unit if it is the same for all joints."""
-    units = {entry.unit for entry in robot.speeds}
-    unit = units.pop() if len(units) == 1 else ""
-    force = {"rad": "N m", "m": "N"}.get(unit, "")
-    n = (robot.n,)
-    position_unit = unit if robot.nq == robot.nv else ""
-    slots = {
-        **{name: Slot(name, (robot.nq,), position_unit) for name in ("q", "q0", "q1")},
-        "dt": Slot("dt", (), "s"),
-        "qd": Slot("qd", n, f"{unit}/s" if unit else ""),
-        "qdd": Slot("qdd", n, f"{unit}/s2" if unit else ""),
-        "tau": Slot("tau", n, force),
-        "wrench": WRENCH_SLOT,
-        "payload": PAYLOAD_SLOT,
-    }
-    return Signature(tuple(slots[name] for name in names))
-
-
-def _body_of_speed(tree: KinematicTree) -> list[int]:
-    """For each entry of qd, the index of its body."""
-    indices = [0] * tree.n
-    for i, body in enumerate(tree.bodies):
-        indices[body.speed] = i
-    return indices
-
-
-def _sum(*terms: Sequence[Scalar]) -> SX:
-    """A column of the elementwise sums."""
-    return SX(vertcat(*(sum(entry, SX(0.0)) for entry in zip(*terms))))
-
-
-def _difference(a: Sequence[Scalar], b: Sequence[Scalar], c: Sequence[Scalar]) -> list[Scalar]:
-    return [x - y - z for x, y, z in zip(a, b, c)]
-
-
-def _matrix(rows: Sequence[Sequence[Scalar]]) -> SX:
-    return SX(vertcat(*(vertcat(*(SX(entry) for entry in row)).T for row in rows)))

@@ -30,6 +30,7 @@ from armblocks.face.assembly import Assembly, assemble, coordinates
 from armblocks.face.ikine_branches import ClosedForm, IkineBranches, chosen_branch, configuration_of
 from armblocks.face.ikine_result import IkineResult
 from armblocks.face.notebook_views import robot_view
+from armblocks.face.parametric import ParametricArm
 from armblocks.face.payload import Payload, payload_numbers
 from armblocks.robot import FrictionModel, Robot
 from armblocks.robot.dh_table import kinematics_text
@@ -327,6 +328,14 @@ class Arm(metaclass=ArgumentErrors):
     def centre_of_mass(self) -> ConfigurationFunction:
         """``centre_of_mass(q)`` → (3,) m: centre of mass of all links, in the world."""
         return self._entry("centre_of_mass")
+
+    def parametric(self, links: Sequence[str]) -> ParametricArm:
+        """The dynamics as functions of the masses, centres of mass and inertias of the named ``links``.
+
+        The functions are compiled once for all values, for sweeps, tuning and identification; see
+        :class:`ParametricArm`. Raises UnknownNameError for an unknown link.
+        """
+        return ParametricArm(self.robot, links, self._near, self._description_key)
 
     # ---- views -------------------------------------------------------------------------------------------
     def plot(

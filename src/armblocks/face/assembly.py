@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,7 +24,9 @@ class Assembly(metaclass=ArgumentErrors):
     ``q`` (nq,) rad or m and ``qd`` (n,) rad/s or m/s. ``degrees_of_freedom``: of the mechanism at
     configurations in general; ``instantaneous_mobility``: at ``q``, larger where q is singular.
     ``redundant``: by constraint, how many of its equations follow from the others. ``residual``: the largest
-    residual, m or cosine of an angle.
+    residual, m or cosine of an angle. ``free_joints``: the joints that can move at a singular ``q``.
+    ``branches`` (b, n): for one degree of freedom, the directions of the motions through a singular q, each
+    of length 1; with two or more, q is a bifurcation, where the mechanism can change to another branch.
     """
 
     q: Array
@@ -33,6 +35,13 @@ class Assembly(metaclass=ArgumentErrors):
     instantaneous_mobility: int
     redundant: dict[str, int]
     residual: float
+    free_joints: tuple[str, ...] = ()
+    branches: Array = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @property
+    def bifurcation(self) -> bool:
+        """Whether several motions of a mechanism with one degree of freedom cross at ``q``."""
+        return len(self.branches) > 1
 
     @property
     def singular(self) -> bool:
@@ -43,7 +52,11 @@ class Assembly(metaclass=ArgumentErrors):
         dof = self.degrees_of_freedom
         lines = [counted(dof, "degree of freedom", "degrees of freedom")]
         if self.singular:
-            lines.append(f"singular: {self.instantaneous_mobility} degrees of freedom at this configuration")
+            joints = ", ".join(self.free_joints)
+            mobility = counted(self.instantaneous_mobility, "degree of freedom", "degrees of freedom")
+            lines.append(f"singular: {mobility} at this configuration, of the joints {joints}")
+            if self.bifurcation:
+                lines.append(f"bifurcation: {len(self.branches)} branches of the motion cross here")
         for name, count in self.redundant.items():
             equations = counted(count, "equation follows", "equations follow")
             lines.append(f"constraint '{name}': {equations} from the others")
@@ -59,6 +72,8 @@ def assemble(robot: Robot, q: ArrayLike | None, qd: ArrayLike | None, locked: Se
     functions = mechanism(robot)
     found = functions.assembled(guess, locked)
     mobility = functions.mobility(found)
+    one = mobility.singular and mobility.degrees_of_freedom == 1
+    directions = functions.branches(found) if one else []
     return Assembly(
         q=found,
         qd=functions.consistent_speeds(found, speeds, locked),
@@ -66,6 +81,8 @@ def assemble(robot: Robot, q: ArrayLike | None, qd: ArrayLike | None, locked: Se
         instantaneous_mobility=mobility.instantaneous,
         redundant=dict(Counter(mobility.redundant)),
         residual=float(np.abs(functions.residuals(found)).max(initial=0.0)),
+        free_joints=functions.free_joints(found) if mobility.singular else (),
+        branches=np.array(directions).reshape(-1, robot.nv),
     )
 
 
