@@ -113,6 +113,8 @@ def content(value: Any) -> object:
         return type(value), {name: content(getattr(value, name)) for name in fields}
     if isinstance(value, ab.Arm):
         return ab.Arm, content(value.robot)
+    if isinstance(value, ab.ParametricArm):
+        return ab.ParametricArm, content(value.robot), value.links
     if isinstance(value, ab.CompiledDiagram):
         return ab.CompiledDiagram, content(value.diagram)
     if isinstance(value, ab.DiagramBuilder):
