@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from armblocks.face.motor_catalogue import load_drives
     from armblocks.face.parametric import ParametricArm
     from armblocks.face.payload import Payload
+    from armblocks.face.pick_and_place import CyclePhase, PickAndPlaceCycle, pick_and_place
     from armblocks.face.planned_trajectories import point_to_point, spline_trajectory
     from armblocks.face.reporting import draw_diagram, write_files, write_report
     from armblocks.face.robots import list_robots, load_robot, save_robot
@@ -105,6 +106,7 @@ else:
             "BindingInterval": "armblocks.face.trajectory_report",
             "CompiledDiagram": "armblocks.face.model",
             "Coupling": "armblocks.robot",
+            "CyclePhase": "armblocks.face.pick_and_place",
             "Cylindrical": "armblocks.robot",
             "CylindricalClosure": "armblocks.robot",
             "DhRow": "armblocks.robot",
@@ -130,6 +132,7 @@ else:
             "OperatingPoint": "armblocks.analysis.operating_point",
             "ParametricArm": "armblocks.face.parametric",
             "Payload": "armblocks.face.payload",
+            "PickAndPlaceCycle": "armblocks.face.pick_and_place",
             "Planar": "armblocks.robot",
             "PlanarClosure": "armblocks.robot",
             "PointOnLine": "armblocks.robot",
@@ -179,6 +182,7 @@ else:
             "modified_dh": "armblocks.robot",
             "mstraj": "armblocks.face.toolbox_trajectories",
             "mtraj": "armblocks.face.toolbox_trajectories",
+            "pick_and_place": "armblocks.face.pick_and_place",
             "point_to_point": "armblocks.face.planned_trajectories",
             "robot_widget": "armblocks.studio.notebook",
             "run_widget": "armblocks.studio.notebook",
@@ -210,6 +214,7 @@ __all__ = [
     "BindingInterval",
     "CompiledDiagram",
     "Coupling",
+    "CyclePhase",
     "Cylindrical",
     "CylindricalClosure",
     "DhRow",
@@ -235,6 +240,7 @@ __all__ = [
     "OperatingPoint",
     "ParametricArm",
     "Payload",
+    "PickAndPlaceCycle",
     "Planar",
     "PlanarClosure",
     "PointOnLine",
@@ -284,6 +290,7 @@ __all__ = [
     "modified_dh",
     "mstraj",
     "mtraj",
+    "pick_and_place",
     "point_to_point",
     "robot_widget",
     "run_widget",

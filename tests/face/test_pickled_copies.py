@@ -62,6 +62,8 @@ def examples() -> Mapping[str, Any]:
     drive = ab.Drive(name="a", gear_ratio=20.0, stall_torque=1.0, max_speed=300.0)
     report = ab.trajectory_report(arm, ab.jtraj([0, 0], [1, 1], 5), speed=1.0)
     sizing = ab.size_drives(arm, ab.jtraj([0, 0], [1, 1], 5), [drive])
+    phase = ab.CyclePhase(name="grip", start=0.0, end=1.0, loaded=True)
+    cycle = ab.PickAndPlaceCycle(trajectory=ab.jtraj([0, 0], [1, 1], 5), phases=(phase,))
     values = [
         *(arm, robot, robot.links[0], ab.Motor(inertia=1.0), ab.Revolute(), ab.Prismatic(), ab.Fixed()),
         *(
@@ -87,6 +89,7 @@ def examples() -> Mapping[str, Any]:
         *(ab.FrictionModel.RELEASE_6, ab.JointLimits(speed=1.0), ab.standard_dh("one", a=1.0).dh),
         *(ab.Payload(mass=2.0), ab.Transform(), ab.jtraj([0, 0], [1, 1], 5)),
         *(report, report.binding[0]),
+        *(cycle, cycle.phases[0]),
         *(sizing, sizing.loads[0], sizing.loads[0].drive),
         *(diagram, small_builder(), compiled, ab.SimulationOptions(step=0.1), ab.formula("2*k")),
         *(result, result.final_state, system, system.point, system.margins(), system.transfer_function()),

@@ -203,7 +203,7 @@ def ctraj(T0: ArrayLike | Transform, T1: ArrayLike | Transform, s: ArrayLike | i
     speed of :func:`lspb`, as in releases 9 and 10; releases up to 8 have equal steps: ``np.linspace(0, 1,
     N)``. The rotation is about one axis by the shorter angle. Translations are in the unit of ``T0``.
     """
-    first, last = _pose("T0", T0), _pose("T1", T1)
+    first, last = pose_of("T0", T0, "ctraj"), pose_of("T1", T1, "ctraj")
     if isinstance(s, int):
         fractions = lspb(0.0, 1.0, s).q[:, 0]
     else:
@@ -228,7 +228,8 @@ def _at(curve: PiecewisePolynomial, times: Array, side: str = "right") -> JointT
     return JointTrajectory(t=times, q=motion.q, qd=motion.qd, qdd=motion.qdd, curve=curve)
 
 
-def _pose(name: str, value: ArrayLike | Transform) -> Array:
+def pose_of(name: str, value: ArrayLike | Transform, where: str) -> Array:
+    """A pose (4, 4), finite and with a rotation matrix."""
     matrix = value.matrix if isinstance(value, Transform) else value
     T = as_array(matrix)
     is_pose = T.shape == (4, 4) and np.isfinite(T).all() and (T[3] == (0.0, 0.0, 0.0, 1.0)).all()
@@ -236,7 +237,7 @@ def _pose(name: str, value: ArrayLike | Transform) -> Array:
     if not is_pose or np.abs(R @ R.T - np.eye(3)).max() > 1e-6 or np.linalg.det(R) < 0.0:
         raise InputError(
             f"{name} is not a pose",
-            where="ctraj",
+            where=where,
             allowed="a (4, 4) matrix with a rotation matrix and a last row 0 0 0 1",
             fix="use a result of fkine, or a Transform",
         )

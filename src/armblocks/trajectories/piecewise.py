@@ -118,6 +118,18 @@ def hermite(
     return PiecewisePolynomial(times=times, coefficients=np.stack(powers, axis=1), end=end)
 
 
+def chained(parts: Sequence[PiecewisePolynomial]) -> PiecewisePolynomial:
+    """The motions one after the other, from the time 0."""
+    degree = max(part.coefficients.shape[1] for part in parts)
+    coefficients = [
+        np.pad(part.coefficients, ((0, 0), (0, degree - part.coefficients.shape[1]), (0, 0)))
+        for part in parts
+    ]
+    lengths = np.concatenate([np.diff(part.times) for part in parts])
+    times = np.append(0.0, np.cumsum(lengths))
+    return PiecewisePolynomial(times=times, coefficients=np.concatenate(coefficients), end=parts[-1].end)
+
+
 def joined(joints: Sequence[PiecewisePolynomial]) -> PiecewisePolynomial:
     """The motion of several joints as one; each has its own times, with the same start and end."""
     if len(joints) == 1:

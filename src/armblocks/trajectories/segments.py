@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.trajectories.piecewise import PiecewisePolynomial
+from armblocks.trajectories.piecewise import PiecewisePolynomial, chained
 from armblocks.trajectories.profiles import at_rest, quintic
 
 Array = NDArray[np.float64]
@@ -70,7 +70,7 @@ def multi_segment(
     if half:
         parts.append(quintic(q, previous, half * dt, qd, qd1))
         clock += half
-    return SegmentMotion(_chained(parts) if parts else at_rest(start), clock, np.array(arrivals))
+    return SegmentMotion(chained(parts) if parts else at_rest(start), clock, np.array(arrivals))
 
 
 def _steps(duration: float, dt: float) -> int:
@@ -81,15 +81,3 @@ def _steps(duration: float, dt: float) -> int:
 def _linear(start: Array, velocity: Array, duration: float) -> PiecewisePolynomial:
     coefficients = np.array([start, velocity])[None]
     return PiecewisePolynomial(times=np.array([0.0, duration]), coefficients=coefficients)
-
-
-def _chained(parts: list[PiecewisePolynomial]) -> PiecewisePolynomial:
-    """The parts one after the other."""
-    degree = max(part.coefficients.shape[1] for part in parts)
-    coefficients = [
-        np.pad(part.coefficients, ((0, 0), (0, degree - part.coefficients.shape[1]), (0, 0)))
-        for part in parts
-    ]
-    lengths = np.concatenate([np.diff(part.times) for part in parts])
-    times = np.append(0.0, np.cumsum(lengths))
-    return PiecewisePolynomial(times=times, coefficients=np.concatenate(coefficients), end=parts[-1].end)
