@@ -208,10 +208,11 @@ MJCF = """<mujoco><compiler eulerseq="zyx"/><default><motor armature="0.02" damp
 <body pos="0 0 1"><joint name="j" axis="0 1 0" ref="10" stiffness="3" springref="40"/>
 <joint name="s" type="slide" axis="1 0 0" springdamper="0.1 1.2" damping="7" armature="0.4"/>
 <geom size="0.1" pos="0.3 0 0"/><site name="b" pos="0.5 0.1 0"/>
-<body pos="0.4 0 0"><joint name="k" axis="0 0.6 0.8" springdamper="0.3 0.7"/><geom size="0.1" pos="0 0.2 0"/>
+<body pos="0.4 0 0"><joint name="k" axis="0 0.6 0.8" ref="-20" springdamper="0.3 0.7"/>
+<joint name="l" axis="1 0 0" ref="30"/><geom size="0.1" pos="0 0.2 0"/>
 <site name="c" pos="0 0.1 0.2"/></body></body></worldbody>
 <tendon><spatial name="t"><site site="w"/><site site="b"/></spatial>
-<spatial springlength="0.3"><site site="w"/><site site="c"/></spatial></tendon>
+<spatial name="u"><site site="w"/><site site="c"/></spatial><spatial springlength="0.3"><site site="w"/><site site="c"/></spatial></tendon>
 <actuator><motor joint="s" gear="-3" armature="2"/><motor joint="s"/><general jointinparent="j" gear="2"/>
 <general joint="k" damping="0.2"/></actuator></mujoco>"""
 

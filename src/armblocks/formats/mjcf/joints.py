@@ -24,12 +24,16 @@ _TRANSMISSIONS_OF_TENDONS = ("tendon", "cranksite", "slidersite")
 
 
 class PlacedJoint(NamedTuple):
-    """A joint, the ``position`` of its axis in the frame of its body (m), its motor and its spring."""
+    """A joint, the ``position`` of its axis in the frame of its body (m), its motor and its spring.
+
+    ``rest``: the coordinate of a hinge or slide at which tendons have their default rest length, rad or m.
+    """
 
     joint: Joint
     position: Vector3
     motor: Motor | None
     spring: GivenSpring | None
+    rest: float = 0.0
 
 
 class Actuation(NamedTuple):
@@ -80,7 +84,8 @@ def joint_of(
     torque = driven.torque if driven.torque is not None else _force_limit(element, "actuatorfrcrange")
     limits = JointLimits(position=_range(element, unit, settings, context), torque=torque)
     joint = _KINDS[kind](axis=axis, offset=-unit * element.number("ref", 0.0), limits=limits)
-    return PlacedJoint(joint, position, _motor_of(element, driven, context), spring)
+    rest = unit * element.number("springref", 0.0)
+    return PlacedJoint(joint, position, _motor_of(element, driven, context), spring, rest)
 
 
 def _first(element: Element, attribute: str) -> float:

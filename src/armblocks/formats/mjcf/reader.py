@@ -26,7 +26,6 @@ from armblocks.formats.mjcf.settings import MAIN, Defaults, Settings, settings_o
 from armblocks.formats.mjcf.shapes import Geom, drawn, geom_of, is_collision_only, site_pose
 from armblocks.formats.mjcf.springs import (
     GivenSpring,
-    initial_coordinates,
     line_springs,
     with_joint_springs,
 )
@@ -147,6 +146,7 @@ class _Model:
         self.sites: dict[str, Attachment] = {}
         self.joints: dict[str, str] = {}
         self.given_springs: dict[str, GivenSpring] = {}
+        self.rests: dict[str, float] = {}
         self._note_left_out()
 
     def links(self) -> list[Link]:
@@ -204,6 +204,7 @@ class _Model:
             is_last = index == len(inside.joints) - 1
             link = name if is_last else self._free_name(element.attributes.get("name", ""), f"{name} joint")
             self.joints[element.attributes.get("name", "").strip()] = link
+            self.rests[link] = placed.rest
             if placed.spring is not None:
                 self.given_springs[link] = placed.spring
             series.append(
@@ -267,9 +268,7 @@ class _Model:
         driven = {name: link for name, link in self.joints.items() if name in self.actuation}
         damping = {link: self.actuation[name].damping for name, link in driven.items()}
         links, springs = with_joint_springs(links, self.given_springs, damping)
-        rests = {link.name: initial_coordinates(link)[0] for link in links if link.joint.nv == 1}
-        rests |= {name: spring.rest for name, spring in self.given_springs.items()}
-        lines = line_springs(self.root, self.defaults, links, self.sites, rests, self.context)
+        lines = line_springs(self.root, self.defaults, links, self.sites, self.rests, self.context)
         used = {spring.name for spring in springs}
         return links, (*springs, *(replace(line, name=free_name(line.name, used)) for line in lines))
 

@@ -97,7 +97,7 @@ def _inertias(links: Sequence[Link]) -> dict[str, float]:
     It is that of the initial configuration: the inverse of the diagonal of the inverse inertia matrix.
     """
     robot = Robot(name="springs", links=tuple(links))
-    q = [value for link in robot.moving_links for value in initial_coordinates(link)]
+    q = [value for link in robot.moving_links for value in _initial_coordinates(link)]
     M = np.asarray(trace_inertia(robot).casadi_function()(np.array(q)).full()).reshape(robot.n, robot.n)
     diagonal = iter((1.0 / np.diag(np.linalg.pinv(M))).tolist())
     inertias: dict[str, float] = {}
@@ -106,7 +106,7 @@ def _inertias(links: Sequence[Link]) -> dict[str, float]:
     return inertias
 
 
-def initial_coordinates(link: Link) -> tuple[float, ...]:
+def _initial_coordinates(link: Link) -> tuple[float, ...]:
     """The coordinates of a joint in the initial configuration: ``ref``, which is minus the offset."""
     joint = link.joint
     return (-joint.offset,) if joint.nv == 1 else joint.neutral
@@ -122,8 +122,8 @@ def line_springs(
 ) -> list[Spring]:
     """The spatial tendons between two sites; a finding for the forces of other tendons.
 
-    ``links``: parents before children. ``rests``: the coordinates of joints whose springs are at rest, by the
-    name of the link.
+    ``links``: parents before children. ``rests``: the coordinates of joints (``springref``) at which
+    tendons have their default rest length, by the name of the link.
     """
     springs: list[Spring] = []
     used: set[str] = set()
