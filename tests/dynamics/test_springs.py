@@ -212,7 +212,8 @@ MJCF = """<mujoco><compiler eulerseq="zyx"/><default><motor armature="0.02" damp
 <joint name="l" axis="1 0 0" ref="30"/><geom size="0.1" pos="0 0.2 0"/>
 <site name="c" pos="0 0.1 0.2"/></body></body></worldbody>
 <tendon><spatial name="t"><site site="w"/><site site="b"/></spatial>
-<spatial name="u"><site site="w"/><site site="c"/></spatial><spatial springlength="0.3"><site site="w"/><site site="c"/></spatial></tendon>
+<spatial name="u"><site site="w"/><site site="c"/></spatial>
+<spatial springlength="0.3"><site site="w"/><site site="c"/></spatial></tendon>
 <actuator><motor joint="s" gear="-3" armature="2"/><motor joint="s"/><general jointinparent="j" gear="2"/>
 <general joint="k" damping="0.2"/></actuator></mujoco>"""
 

@@ -6,15 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from casadi import SX, Function
 from scipy.integrate import solve_ivp
 
 import armblocks as ab
 from armblocks import blocks
+from armblocks.dynamics.held_mechanism import MechanismEquations, check_lockable
 from armblocks.dynamics.mechanism import Mechanism
 from armblocks.errors import InputError, RobotError
 from armblocks.robot import Coupling, JointLimits, Motor, Revolute, Robot, Screw
 from maximal_coordinates import accelerations
-from mechanisms_for_tests import four_bar, slider_crank
+from mechanisms_for_tests import four_bar, random_mechanism, slider_crank
 
 BREAK = 12.0
 """Coulomb friction of the crank, N m: it holds the four-bar at some positions only."""
@@ -45,6 +47,26 @@ def test_without_dry_friction_it_is_forward_dynamics() -> None:
     result = ab.simulate(builder.build(), stop_time=1.0, rtol=1e-9, atol=1e-11)
     for port in ("q", "qd", "qdd"):
         assert result[f"held/{port}"] == pytest.approx(result[f"free/{port}"], abs=2e-6)
+
+
+@pytest.mark.parametrize("seed", [20, 23, 27])
+def test_locked_joints_are_held_by_the_torque_that_gives_them_no_acceleration(seed: int) -> None:
+    """Random spatial mechanisms at rest, each independent joint locked: against maximal coordinates."""
+    robot, q = random_mechanism(seed)
+    symbols = [SX.sym(name, size) for name, size in (("q", robot.nq), *((k, robot.n) for k in "vtf"))]
+    equations = MechanismEquations(robot, symbols[0], symbols[1], None, None, q)
+    motion = Function("motion", symbols, equations.motion(*symbols[2:]))
+    rest, tau = np.zeros(robot.n), np.random.default_rng(seed).normal(size=robot.n)
+    for k in range(robot.n):
+        try:
+            check_lockable(robot, [k], q, "test")
+        except RobotError:
+            continue
+        free = np.where(np.arange(robot.n) == k, 0.0, 1.0)
+        qdd, held = (np.asarray(value.full())[:, 0] for value in motion(q, rest, tau, free))
+        assert qdd[k] == 0.0
+        expected = accelerations(robot, q, rest, tau - np.where(free == 0.0, held, 0.0))
+        assert qdd == pytest.approx(expected, abs=1e-8 * max(1.0, np.abs(expected).max()))
 
 
 def test_a_payload_and_a_wrench_act_on_a_mechanism() -> None:
