@@ -5,7 +5,7 @@ import type { ParameterRule, TableColumn, TablePreview } from '../protocol'
 import { connection } from '../store'
 import { withColumnNames, type TableChoice } from '../canvas/table_choice'
 import { DataFileSelect } from './data_file_select'
-import { TablePlot } from './table_plot'
+import { TablePlot, traceTone } from './table_plot'
 
 interface Props {
   rule: ParameterRule
@@ -135,7 +135,12 @@ function Columns({ preview, choice, choose }: ColumnsProps) {
           <Checkbox
             key={column.name}
             size="xs"
-            label={titleOf(column)}
+            label={
+              <>
+                <Swatch curve={preview.chosen.slice(0, preview.curves.length).indexOf(column.name)} />
+                {titleOf(column)}
+              </>
+            }
             description={column.fault || undefined}
             disabled={(column.fault !== '' || column.kind === 'date') && !chosen.includes(column.name)}
             checked={chosen.includes(column.name)}
@@ -151,6 +156,12 @@ function Columns({ preview, choice, choose }: ColumnsProps) {
 function titleOf({ name, unit, kind }: TableColumn): string {
   const title = unit && !name.includes(unit) ? `${name} [${unit}]` : name
   return kind === 'number' ? title : `${title} (${kind})`
+}
+
+/** The colour of a column's curve in the plot; nothing for a column without a curve. */
+function Swatch({ curve }: { curve: number }) {
+  if (curve < 0) return null
+  return <i className="data-swatch" style={{ background: `var(--${traceTone(curve)})` }} aria-hidden />
 }
 
 /** Plot, first rows, and notes on the interpretation of the file. */

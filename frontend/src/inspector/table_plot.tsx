@@ -5,6 +5,9 @@ const WIDTH = 560
 const HEIGHT = 96
 const COLOURS = 8
 
+/** The tone of a curve, `trace-0`. */
+export const traceTone = (curve: number): string => `trace-${curve % COLOURS}`
+
 /** A small plot of all values over time, on one common scale. */
 export function TablePlot({ preview: { times, curves, chosen } }: { preview: TablePreview }) {
   const values = curves.flat()
@@ -25,7 +28,7 @@ export function TablePlot({ preview: { times, curves, chosen } }: { preview: Tab
           <polyline
             key={chosen[number]}
             points={curve.map((value, k) => `${x(times[k]!).toFixed(2)},${y(value).toFixed(2)}`).join(' ')}
-            className={`s-trace-${number % COLOURS}`}
+            className={`s-${traceTone(number)}`}
             fill="none"
             strokeWidth={1.3}
             vectorEffect="non-scaling-stroke"

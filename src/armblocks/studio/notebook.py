@@ -100,6 +100,9 @@ def _record(views: Sequence[tuple[str, View]], result: SimulationResult) -> tupl
     signal_names = [f"{name}/{signal}" for name, view in views for signal in view.signals]
     aliases = {name: result.resolve(name) for name in signal_names}
     names = list(dict.fromkeys(aliases.values()))
+    # A block with one output names its signal in legends, as in the studio.
+    blocks = {name.rpartition("/")[0]: name for name in names}
+    aliases |= {block: name for block, name in blocks.items() if result.aliases.get(block) == name}
     values = [np.asarray(result[name], dtype=np.float64) for name in names]
     signals = np.concatenate([value.reshape(result.time.size, -1).T for value in values])
     run = {

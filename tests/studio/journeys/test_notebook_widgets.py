@@ -168,3 +168,10 @@ def test_widgets_that_cannot_be_shown_raise_errors_with_the_reason(monkeypatch: 
     with pytest.raises(MissingLibraryError, match=r"'anywidget' is not installed.*armblocks\[notebook\]"):
         ab.robot_widget(ab.load_robot("puma560"))
     notebook._widget_class.cache_clear()
+
+
+def test_legends_name_signals_by_their_blocks_as_in_the_studio(notebook: Page) -> None:
+    diagram = ab.load_diagram("van_der_pol_pid")
+    (widget,) = show(notebook, ab.run_widget(diagram, ab.simulate(diagram, stop_time=1.0)))
+    entries = widget.locator('.chart[data-view="Scope"] .legend button')
+    expect(entries).to_have_text(["reference", "x1"])
