@@ -228,7 +228,7 @@ def test_a_run_in_progress_cannot_be_pickled() -> None:
         with pytest.raises(errors.InputError, match=r"a run in progress cannot be copied.*initial_state"):
             method(run)
     with pytest.raises(errors.InputError, match=r"native code cannot be pickled"):
-        pickle.dumps(ab.load_robot("twolink")._kernel("fkine").entry)
+        pickle.dumps(ab.load_robot("twolink")._code.kernel("fkine").entry)
     assert isinstance(pickle.loads(pickle.dumps(run.samples())), Samples)
 
 

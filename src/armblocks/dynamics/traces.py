@@ -37,6 +37,7 @@ from armblocks.dynamics.energy import first_moment, kinetic_energy, potential_en
 from armblocks.dynamics.forward import check_accelerations_exist, forward_dynamics
 from armblocks.dynamics.friction import joint_friction, rotor_torques
 from armblocks.dynamics.jacobian import jacobian_matrix, tool_columns, world_columns, yoshikawa
+from armblocks.dynamics.jacobian_derivatives import JACOBIAN_DERIVATIVES
 from armblocks.dynamics.joint_motion import entries, joint_motions
 from armblocks.dynamics.joint_wrenches import reaction_wrenches
 from armblocks.dynamics.kinematics import body_poses, constant_pose, frame_pose
@@ -415,7 +416,7 @@ def trace_normalised(robot: Robot) -> TracedFunction:
     return robot_trace("normalised", robot, ("q",), ("q", (robot.nq,), ""), equations, of_tree=False)
 
 
-FRAMED = ("fkine", "jacob0", "jacobe", "pose_error_in_world", "pose_error_in_tool")
+FRAMED = ("fkine", "jacob0", "jacobe", "pose_error_in_world", "pose_error_in_tool", *JACOBIAN_DERIVATIVES)
 """The functions that take ``frame``, the name of a frame in the place of the tool."""
 ASSEMBLED = (
     *("rne", "rne_loaded", "gravload", "accel", "accel_loaded"),
@@ -430,6 +431,7 @@ TRACES: Mapping[str, Callable[..., TracedFunction]] = {
     "pose_error_in_world": trace_pose_error_in_world,
     "pose_error_in_tool": trace_pose_error_in_tool,
     "branches": trace_branches,
+    **JACOBIAN_DERIVATIVES,
     "manipulability": trace_manipulability,
     "rne": trace_rne,
     "rne_loaded": trace_rne_loaded,

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from functools import cache, cached_property
+from collections.abc import Iterator, Sequence
+from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,42 +11,46 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.argument_errors import ArgumentErrors
-from armblocks.compiler import Kernel, OperationCount, cached_kernel
-from armblocks.compiler.arguments import check_count, in_order
-from armblocks.errors import InputError, UnknownNameError, counted
+from armblocks.compiler import OperationCount
+from armblocks.errors import UnknownNameError, counted
 from armblocks.face.arm_functions import (
     ConfigurationFunction,
     DifferenceFunction,
     DrivenStateFunction,
+    FramedStateFunction,
     FrameFunction,
     IntegrateFunction,
     MotionFunction,
     SpeedFunction,
     StateFunction,
 )
+from armblocks.face.arm_kernels import ArmKernels, traces
+from armblocks.face.arm_measures import (
+    Ellipsoid,
+    force_ellipsoid,
+    has_spherical_wrist,
+    manipulability_of,
+    operational_inertia,
+    outside_limits,
+    perturbed,
+    velocity_ellipsoid,
+)
 from armblocks.face.assembly import Assembly, assemble, coordinates
+from armblocks.face.forward_simulation import ArmMotionResult, TorqueLaw, simulate_arm
 from armblocks.face.ikine_branches import ClosedForm, IkineBranches, chosen_branch, configuration_of
 from armblocks.face.ikine_result import IkineResult
 from armblocks.face.notebook_views import robot_view
 from armblocks.face.parametric import ParametricArm
-from armblocks.face.payload import Payload, payload_numbers
-from armblocks.robot import FrictionModel, Robot
+from armblocks.robot import FrictionModel, Link, Robot
 from armblocks.robot.dh_table import kinematics_text
 from armblocks.robot.fields import check_kind
 
 if TYPE_CHECKING:
-    from armblocks.equations import TracedFunction
-    from armblocks.face.ikine_search import ArmSearch
     from armblocks.face.ikine_targets import Target
     from armblocks.face.trajectory import JointTrajectory
     from armblocks.pictures.film import FilmProgress
 
 Array = NDArray[np.float64]
-
-
-_NO_WRENCH = np.zeros(6)
-_NO_WRENCH.flags.writeable = False
-_OPTIONS = ("wrench", "payload", "out", "threads")
 
 
 class Arm(metaclass=ArgumentErrors):
@@ -79,8 +81,7 @@ class Arm(metaclass=ArgumentErrors):
         check_kind(robot, Robot, where="Arm")
         self.robot = robot
         self._near = None if near is None else coordinates(robot, "near", near, robot.nq)
-        self._kernels: dict[str, Kernel] = {}
-        self._searches: dict[tuple[str | None, str], ArmSearch] = {}
+        self._code = ArmKernels(robot, self._near, self.__reduce__())
 
     def __reduce__(self) -> tuple[type[Arm], tuple[object, ...]]:
         """Pickle and copy the robot alone; code is compiled again or loaded from the cache."""
@@ -119,6 +120,10 @@ class Arm(metaclass=ArgumentErrors):
         robot = self.robot.nofriction(coulomb=which != "viscous", viscous=which != "coulomb")
         return Arm(robot, self._near)
 
+    def perturb(self, amount: float = 0.1, *, seed: int = 0) -> Arm:
+        """The arm with each mass and inertia scaled by ``1 ± amount`` at random, for tests of controllers."""
+        return Arm(perturbed(self.robot, amount, seed), self._near)
+
     def with_friction_model(self, model: FrictionModel | str) -> Arm:
         """The arm with the friction formula of another toolbox release, see :class:`FrictionModel`."""
         if isinstance(model, str):
@@ -136,12 +141,12 @@ class Arm(metaclass=ArgumentErrors):
         ``frame=`` the name of another frame in the place of the tool: a named frame of the robot, or a link.
         ``robot.frame_names`` lists them.
         """
-        return self._framed_method("fkine")
+        return self._code.framed("fkine")
 
     @cached_property
     def link_poses(self) -> ConfigurationFunction:
         """``link_poses(q)`` → (L + 2, 4, 4): poses in the world of the base, the L links and the tool."""
-        return self._entry("link_poses")
+        return self._code.entry("link_poses")
 
     @cached_property
     def jacob0(self) -> FrameFunction:
@@ -149,7 +154,7 @@ class Arm(metaclass=ArgumentErrors):
 
         Rows: linear velocity x y z in m/s, then angular velocity x y z in rad/s. ``frame=`` as for ``fkine``.
         """
-        return self._framed_method("jacob0")
+        return self._code.framed("jacob0")
 
     @cached_property
     def jacobe(self) -> FrameFunction:
@@ -157,12 +162,56 @@ class Arm(metaclass=ArgumentErrors):
 
         ``frame=`` as for ``fkine``; the axes are those of the frame.
         """
-        return self._framed_method("jacobe")
+        return self._code.framed("jacobe")
+
+    @cached_property
+    def jacob0_dot(self) -> FramedStateFunction:
+        """``jacob0_dot(q, qd)`` → dJ/dt (6, n): the time derivative of ``jacob0``."""
+        return self._code.framed("jacob0_dot")
+
+    @cached_property
+    def jacob_dot(self) -> FramedStateFunction:
+        """``jacob_dot(q, qd)`` → dJ/dt qd (6,): acceleration of the tool for ``qdd = 0``, m/s² and rad/s²."""
+        return self._code.framed("jacob_dot")
+
+    @cached_property
+    def hessian0(self) -> FrameFunction:
+        """``hessian0(q)`` → H (n, 6, n): ``H[k]`` is the derivative of ``jacob0`` for a unit speed k."""
+        return self._code.framed("hessian0")
+
+    def maniplty(self, q: ArrayLike, kind: str = "yoshikawa", axes: str = "all") -> Array:
+        """A measure of the mobility of the tool at ``q`` (nq,) or (N, nq); 0 at a singularity.
+
+        ``"yoshikawa"``: product of the singular values of the Jacobian; ``"asada"``: smallest over largest
+        eigenvalue of ``cinertia``; ``"condition"``: smallest over largest singular value; ``"smallest"``
+        singular value. ``axes``: ``"all"``, ``"trans"`` or ``"rot"``. The units of ``"all"`` are mixed.
+        """
+        return manipulability_of(self.jacob0, self.inertia, q, kind, axes, f"maniplty of robot '{self.name}'")
+
+    def velocity_ellipsoid(self, q: ArrayLike, axes: str = "trans") -> Ellipsoid:
+        """The velocities of the tool, m/s or rad/s (``"rot"``), for joint speeds ``|qd| = 1``."""
+        return velocity_ellipsoid(self.jacob0(q), axes, f"velocity_ellipsoid of robot '{self.name}'")
+
+    def force_ellipsoid(self, q: ArrayLike, axes: str = "trans") -> Ellipsoid:
+        """The forces, N or N m (``"rot"``), that joint torques ``|tau| = 1`` balance without other loads."""
+        return force_ellipsoid(self.jacob0(q), axes, f"force_ellipsoid of robot '{self.name}'")
+
+    def __iter__(self) -> Iterator[Link]:
+        """The links with a joint that moves, in the order of q."""
+        return iter(self.robot.moving_links)
+
+    def islimit(self, q: ArrayLike) -> NDArray[np.bool_]:
+        """For each coordinate of ``q`` (nq,) or (N, nq) whether it is outside the limits of its joint."""
+        return outside_limits(self.robot, q)
+
+    def isspherical(self) -> bool:
+        """Whether the arm has a spherical wrist: its last three axes are revolute and meet in a point."""
+        return has_spherical_wrist(self.robot)
 
     @cached_property
     def manipulability(self) -> ConfigurationFunction:
         """``manipulability(q)`` → one number, Yoshikawa's sqrt(det(J J')): 0 at a singularity."""
-        return self._entry("manipulability")
+        return self._code.entry("manipulability")
 
     @cached_property
     def integrate(self) -> IntegrateFunction:
@@ -170,22 +219,22 @@ class Arm(metaclass=ArgumentErrors):
 
         A ball rotates about a fixed axis by the angle ``|w| dt``; all other coordinates are ``q + qd dt``.
         """
-        return self._entry("integrate")
+        return self._code.entry("integrate")
 
     @cached_property
     def difference(self) -> DifferenceFunction:
         """``difference(q0, q1)`` → qd (n,) with ``integrate(q0, qd, 1) = q1``; balls rotate by at most π."""
-        return self._entry("difference")
+        return self._code.entry("difference")
 
     @cached_property
     def normalised(self) -> ConfigurationFunction:
         """``normalised(q)`` → q (nq,) with quaternions of length 1."""
-        return self._entry("normalised")
+        return self._code.entry("normalised")
 
     @cached_property
     def position_rates(self) -> StateFunction:
         """``position_rates(q, qd)`` → dq/dt (nq,): ``qd`` itself, and the rates of quaternions."""
-        return self._entry("position_rates")
+        return self._code.entry("position_rates")
 
     def assemble(
         self, q: ArrayLike | None = None, qd: ArrayLike | None = None, *, locked: Sequence[str] = ()
@@ -235,7 +284,7 @@ class Arm(metaclass=ArgumentErrors):
         where = f"ikine of robot '{self.name}'"
         options = checked_options(mask, limits, tolerance, restarts, seed, where)
         axes = check_axes(axes, where) if mask is not None or axes != "tool" else "world"
-        return solve(self._search(frame, axes), T, q0, options, threads)
+        return solve(self._code.search(frame, axes), T, q0, options, threads)
 
     def ikine_all(
         self, T: Target, *, limits: bool = True, tolerance: float = 1e-9, threads: int = 1
@@ -273,7 +322,7 @@ class Arm(metaclass=ArgumentErrors):
         ``wrench=`` [fx fy fz mx my mz] in the last link's frame, ``payload=`` a :class:`Payload` at the tool,
         or the mass (kg) of a point mass at the tool.
         """
-        return self._loaded_method("rne")
+        return self._code.loaded("rne")
 
     @cached_property
     def joint_wrenches(self) -> MotionFunction:
@@ -286,48 +335,71 @@ class Arm(metaclass=ArgumentErrors):
         follow from others, their forces are statically indeterminate and are 0 here. ``wrench=`` and
         ``payload=`` as for ``rne``.
         """
-        return self._loaded_method("joint_wrenches")
+        return self._code.loaded("joint_wrenches")
 
     @cached_property
     def accel(self) -> DrivenStateFunction:
         """``accel(q, qd, tau)`` → qdd (n,) rad/s² or m/s²: accelerations under joint torques and friction."""
-        return self._loaded_method("accel")
+        return self._code.loaded("accel")
+
+    def fdyn(
+        self,
+        duration: float,
+        torque: TorqueLaw | ArrayLike | None = None,
+        q0: ArrayLike | None = None,
+        qd0: ArrayLike | None = None,
+        *,
+        sample_time: float | None = None,
+        dt: float = 0.01,
+        **settings: Any,
+    ) -> ArmMotionResult:
+        """Simulate ``duration`` s from ``q0``, ``qd0`` under joint torques; ``t, q, qd = arm.fdyn(2.0)``.
+
+        ``torque``: none, (n,) constant, or a function with any of the arguments ``t, q, qd``. It is traced
+        and compiled (:class:`PythonFunction`), or with ``sample_time`` (s) called at each tick, and may then
+        branch. Coulomb friction sticks. ``dt``: interval of the samples. ``settings``: of ``ab.simulate``.
+        """
+        return simulate_arm(self.robot, duration, torque, q0, qd0, sample_time, dt, settings)
 
     @cached_property
     def gravload(self) -> ConfigurationFunction:
         """``gravload(q)`` → (n,) N m or N: torques that hold the arm at rest."""
-        return self._entry("gravload")
+        return self._code.entry("gravload")
 
     @cached_property
     def inertia(self) -> ConfigurationFunction:
         """``inertia(q)`` → M (n, n) kg m² or kg: joint-space mass matrix, motor inertia included."""
-        return self._entry("inertia")
+        return self._code.entry("inertia")
+
+    def cinertia(self, q: ArrayLike) -> Array:
+        """The inertia at the tool in world axes (6, 6), ``(J M⁻¹ J')⁻¹``; NaN at singularities."""
+        return operational_inertia(self.jacob0, self.inertia, q)
 
     @cached_property
     def coriolis(self) -> StateFunction:
         """``coriolis(q, qd)`` → C (n, n): ``C qd`` are the velocity torques (N m, N); dM/dt - 2 C is skew."""
-        return self._entry("coriolis")
+        return self._code.entry("coriolis")
 
     @cached_property
     def friction(self) -> SpeedFunction:
         """``friction(qd)`` → (n,) N m or N: joint torques that overcome friction, a part of ``rne``."""
-        return self._entry("friction")
+        return self._code.entry("friction")
 
     @cached_property
     def kinetic_energy(self) -> StateFunction:
         """``kinetic_energy(q, qd)`` → energy in J, including the rotors of the motors."""
-        return self._entry("kinetic_energy")
+        return self._code.entry("kinetic_energy")
 
     @cached_property
     def potential_energy(self) -> ConfigurationFunction:
         """``potential_energy(q)`` → energy in J, zero if the centre of mass is at the height of the
         origin."""
-        return self._entry("potential_energy")
+        return self._code.entry("potential_energy")
 
     @cached_property
     def centre_of_mass(self) -> ConfigurationFunction:
         """``centre_of_mass(q)`` → (3,) m: centre of mass of all links, in the world."""
-        return self._entry("centre_of_mass")
+        return self._code.entry("centre_of_mass")
 
     def parametric(self, links: Sequence[str]) -> ParametricArm:
         """The dynamics as functions of the masses, centres of mass and inertias of the named ``links``.
@@ -335,7 +407,7 @@ class Arm(metaclass=ArgumentErrors):
         The functions are compiled once for all values, for sweeps, tuning and identification; see
         :class:`ParametricArm`. Raises UnknownNameError for an unknown link.
         """
-        return ParametricArm(self.robot, links, self._near, self._description_key)
+        return ParametricArm(self.robot, links, self._near, self._code.description_key)
 
     # ---- views -------------------------------------------------------------------------------------------
     def plot(
@@ -403,116 +475,18 @@ class Arm(metaclass=ArgumentErrors):
     # ---- compilation ---------------------------------------------------------------------------------
     def operation_count(self, method: str) -> OperationCount:
         """Multiplies, adds and other operations in one evaluation of a method, such as ``"rne"``."""
-        if method not in _traces():
-            raise UnknownNameError("compiled method", method, _traces(), where=self.name)
-        return self._kernel(method).count
-
-    @cached_property
-    def _description_key(self) -> str:
-        """The content on which the equations depend: all except appearance and source file."""
-        links = tuple(replace(link, geometry=None) for link in self.robot.links)
-        return hashlib.sha256(repr(replace(self.robot, links=links, source="")).encode()).hexdigest()
-
-    def _kernel(self, method: str) -> Kernel:
-        kernel = self._kernels.get(method)
-        if kernel is None:
-            key, options = f"robot/{method}/{self._description_key}", {}
-            if self._near is not None and method in _assembled():
-                key, options = f"{key}/near {self._near.tolist()}", {"near": self._near}
-            kernel = cached_kernel(key, lambda: _traces()[method](self.robot, **options))
-            self._kernels[method] = kernel
-        return kernel
-
-    def _entry(self, method: str) -> Callable[..., Array]:
-        """The native function of a method; pickling stores the robot and the name of the method."""
-        kernel = self._kernel(method)
-        return kernel.entry_with_fallback(kernel.__call__, maker=self.__reduce__())
-
-    def _framed_method(self, method: str) -> Callable[..., Array]:
-        """A function that calls the kernel of a method for the tool, or for another frame of the robot."""
-        kernel = self._kernel(method)
-
-        def call(
-            *arguments: ArrayLike,
-            frame: str | None = None,
-            out: Array | None = None,
-            threads: int = 1,
-            **named: ArrayLike,
-        ) -> Array:
-            of_frame = kernel if frame is None else self._kernel_at(method, frame)
-            if named:
-                arguments = in_order(method, kernel.inputs, arguments, named, ("frame", "out", "threads"))
-            return (of_frame.entry if named or frame else of_frame)(*arguments, out=out, threads=threads)
-
-        return kernel.entry_with_fallback(call, maker=self.__reduce__())
-
-    def _kernel_at(self, method: str, frame: str) -> Kernel:
-        """The kernel of a method for a frame of the robot. Raises UnknownNameError."""
-        name = f"{method} of {frame}"
-        kernel = self._kernels.get(name)
-        if kernel is None:
-            self.robot.frame(frame)
-            key = f"robot/{name}/{self._description_key}"
-            kernel = cached_kernel(key, lambda: _traces()[method](self.robot, frame))
-            self._kernels[name] = kernel
-        return kernel
+        if method not in traces():
+            raise UnknownNameError("compiled method", method, traces(), where=self.name)
+        return self._code.kernel(method).count
 
     @cached_property
     def _closed_form(self) -> ClosedForm:
-        kernel = self._kernel("branches")
+        kernel = self._code.kernel("branches")
 
         def iterate(targets: Array, starts: Array | None) -> IkineResult:
             return self.ikine(targets, starts, limits=False, restarts=100 if starts is None else 0)
 
         return ClosedForm.of(self.robot, kernel, iterate)
-
-    def _search(self, frame: str | None, axes: str) -> ArmSearch:
-        """The compiled inverse kinematics of the tool or of a frame. Raises UnknownNameError."""
-        search = self._searches.get((frame, axes))
-        if search is None:
-            from armblocks.face.ikine_search import ArmSearch
-
-            name = f"pose_error_in_{axes}"
-            error = self._kernel(name) if frame is None else self._kernel_at(name, frame)
-            fkine = self._kernel("fkine") if frame is None else self._kernel_at("fkine", frame)
-            search = ArmSearch(self.robot, error, fkine, self._kernel("integrate"))
-            self._searches[frame, axes] = search
-        return search
-
-    def _loaded_method(self, method: str) -> Callable[..., Array]:
-        """A function that calls the kernel of a method, or with a wrench or payload a second kernel.
-
-        The second kernel is compiled at its first use.
-        """
-        kernel = self._kernel(method)
-
-        @cache
-        def loaded() -> Callable[..., Array]:
-            return self._kernel(f"{method}_loaded").entry
-
-        def call(
-            *arguments: ArrayLike,
-            wrench: ArrayLike | None = None,
-            payload: Payload | ArrayLike | None = None,
-            out: Array | None = None,
-            threads: int = 1,
-            **named: ArrayLike,
-        ) -> Array:
-            if named:
-                arguments = in_order(method, kernel.inputs, arguments, named, _OPTIONS)
-            if wrench is None and payload is None:
-                return (kernel.entry if named else kernel)(*arguments, out=out, threads=threads)
-            force = _NO_WRENCH if wrench is None else wrench
-            payload_values = payload.numbers if isinstance(payload, Payload) else payload_numbers(payload)
-            try:
-                return loaded()(*arguments, force, payload_values, out=out, threads=threads)
-            except InputError:
-                check_count(
-                    method, kernel.inputs, arguments
-                )  # the message is about positional arguments only
-                raise
-
-        return kernel.entry_with_fallback(call, maker=self.__reduce__())
 
     def __repr__(self) -> str:
         return f"<Arm {self.name}: {counted(len(self.robot.joints), 'joint')} {self.robot.joint_letters}>"
@@ -524,17 +498,3 @@ class Arm(metaclass=ArgumentErrors):
     def _repr_html_(self) -> str:
         """The notebook view: a picture of the arm with all joints at zero, and its table."""
         return robot_view(self.robot)
-
-
-def _assembled() -> Sequence[str]:
-    """The methods whose equations depend on an assembled configuration of the robot."""
-    from armblocks.dynamics.traces import ASSEMBLED
-
-    return ASSEMBLED
-
-
-def _traces() -> Mapping[str, Callable[..., TracedFunction]]:
-    """All traced quantities; imported here, because code from the disk cache needs no tracing."""
-    from armblocks.dynamics import TRACES
-
-    return TRACES

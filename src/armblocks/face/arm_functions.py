@@ -40,6 +40,20 @@ class StateFunction(Protocol):
     ) -> Array: ...
 
 
+class FramedStateFunction(Protocol):
+    """``f(q, qd)`` of the tool, or of the frame with the name ``frame``."""
+
+    def __call__(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        *,
+        frame: str | None = None,
+        out: Array | None = None,
+        threads: int = 1,
+    ) -> Array: ...
+
+
 class IntegrateFunction(Protocol):
     """``f(q, qd, dt)``: ``q`` (nq,) or (N, nq), ``qd`` (n,) or (N, n), ``dt`` a number or (N,)."""
 
