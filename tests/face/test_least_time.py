@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
 import armblocks as ab
-from armblocks.errors import InputError, RobotError
+from armblocks.errors import InputError, LimitWarning, RobotError
 from armblocks.robot import standard_dh
 
 ROBOTS = ("puma560", "iiwa14", "kr180", "stanford", "irb460")
@@ -120,6 +120,14 @@ def test_friction_of_one_joint_agrees_with_the_closed_form(
     ]
     assert abs(errors[0]) < 0.02 * expected
     assert abs(errors[2]) < 0.4 * abs(errors[0]) + 1e-9
+
+
+def test_positions_outside_the_limits_raise_a_warning() -> None:
+    arm = ab.load_robot("puma560")
+    points = np.zeros((2, 6))
+    points[:, 1], points[1, 0] = 1.2, 3.0
+    with pytest.warns(LimitWarning, match=r"link1"):
+        ab.least_time(arm, points, speed=1.0, acceleration=5.0, torque=200.0)
 
 
 def test_speed_limits_alone_give_the_largest_speed_at_each_point() -> None:

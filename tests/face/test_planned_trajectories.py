@@ -138,6 +138,16 @@ def test_positions_alone_are_a_spline_at_rest_at_both_ends(tmp_path: Path) -> No
     )
 
 
+def test_units_of_headers_are_converted(tmp_path: Path) -> None:
+    (tmp_path / "units.csv").write_text("t [ms],q1 [deg],q2 [mm]\n0,0,0\n1000,90,500\n")
+    path = ab.load_trajectory(tmp_path / "units.csv")
+    assert_allclose(path.t, [0.0, 1.0])
+    assert_allclose(path.q[-1], [np.pi / 2, 0.5])
+    (tmp_path / "units.csv").write_text("t,q1 [rev]\n0,0\n1,1\n")
+    with pytest.raises(InputError, match=r"a column has the unit 'rev'.*rates of rad, m, deg"):
+        ab.load_trajectory(tmp_path / "units.csv")
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [

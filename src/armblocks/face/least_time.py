@@ -15,6 +15,7 @@ from armblocks.face.payload import Payload
 from armblocks.face.trajectory import JointTrajectory, sampled
 from armblocks.face.trajectory_arguments import joint_limits, positive, via_points
 from armblocks.planning.least_time import EXCESS, Limits, segment_times, solve
+from armblocks.report.motion_summary import limit_findings, warn_of_limits
 from armblocks.trajectories import Motion, PiecewisePolynomial
 from armblocks.trajectories.paths import blended_path, spline_path, turning_points
 from armblocks.trajectories.piecewise import hermite
@@ -66,7 +67,8 @@ def least_time(
     a point, which strong viscous friction can cause, only the slowest one is used.
 
     Raises InputError where a point of the path cannot be passed, with the joint whose torque does not
-    suffice, and for paths without a limit; RobotError for robots with ball joints or closed loops.
+    suffice, and for paths without a limit; RobotError for robots with ball joints or closed loops. Warns of
+    positions outside the limits of the joints, which a spline may pass between the points.
     """
     where = "least_time"
     robot = arm.robot
@@ -89,7 +91,9 @@ def least_time(
             fix="leave out grid for 200 segments",
         )
     path = path_through(via, limits, blend)
-    return sampled(fastest_motion(arm, path, limits, payload, grid_of(arm, path, grid)), step)
+    result = sampled(fastest_motion(arm, path, limits, payload, grid_of(arm, path, grid)), step)
+    warn_of_limits(limit_findings(robot, result.t, result.q))
+    return result
 
 
 def check_joint_space(arm: Arm, where: str) -> None:

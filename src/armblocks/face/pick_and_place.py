@@ -21,6 +21,7 @@ from armblocks.face.payload import Payload
 from armblocks.face.toolbox_trajectories import ctraj, pose_of
 from armblocks.face.trajectory import JointTrajectory, sampled
 from armblocks.face.trajectory_arguments import check_same_length, joint_vector, positive
+from armblocks.report.motion_summary import limit_findings, warn_of_limits
 from armblocks.spatial import Transform
 from armblocks.trajectories import PiecewisePolynomial
 from armblocks.trajectories.piecewise import chained
@@ -90,7 +91,7 @@ def pick_and_place(
     the second one with the ``payload``. ``mask``: as for ``arm.ikine``. ``dt``: time between samples, s.
 
     Raises InputError for a pose that the arm does not reach, with the reason, and for a vertical line on
-    which the configuration of the arm changes.
+    which the configuration of the arm changes. Warns of positions outside the limits of the joints.
     """
     where = "pick_and_place"
     check_joint_space(arm, where)
@@ -126,7 +127,9 @@ def pick_and_place(
                 )
             )
             clock += part.duration
-    return PickAndPlaceCycle(trajectory=sampled(chained(parts), step), phases=tuple(phases))
+    trajectory = sampled(chained(parts), step)
+    warn_of_limits(limit_findings(arm.robot, trajectory.t, trajectory.q))
+    return PickAndPlaceCycle(trajectory=trajectory, phases=tuple(phases))
 
 
 def _vertical_line(

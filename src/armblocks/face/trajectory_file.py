@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from os import PathLike, fspath
@@ -15,6 +16,9 @@ from armblocks.trajectories.splines import cubic_spline
 
 _COLUMN = re.compile(r"(qdd|qd|q)_?(\d+)(?:\s*[\[(].*)?")
 
+_UNITS = {"": 1.0, "rad": 1.0, "m": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0, "mm": 1e-3}
+"""Factors to rad and m."""
+
 
 def load_trajectory(path: str | PathLike[str], *, dt: float | None = None) -> JointTrajectory:
     """The joint motion in a table file (``.csv``, ``.npz``, ``.mat``, ``.parquet``).
@@ -22,7 +26,8 @@ def load_trajectory(path: str | PathLike[str], *, dt: float | None = None) -> Jo
     Columns: the times ``t`` or ``time`` in s, the positions ``q1`` … ``qn`` in rad or m, and optionally the
     speeds ``qd1`` … and accelerations ``qdd1`` …, as :meth:`JointTrajectory.save` writes them. Between rows
     the motion is the quintic with the values of both rows. Without speeds and accelerations it is the cubic
-    spline through the positions, at rest at both ends. ``dt``: time between samples, s; ``None``: the rows of
+    spline through the positions, at rest at both ends. Units in headers, such as ``q1 [deg]`` or ``qd2
+    [mm/s]``, are converted. ``dt``: time between samples, s; ``None``: the rows of
     the file.
 
     Raises ``FormatError`` and ``UnknownNameError`` as :func:`~armblocks.load_table`, and InputError for
@@ -44,8 +49,11 @@ def load_trajectory(path: str | PathLike[str], *, dt: float | None = None) -> Jo
             allowed="q1 to qn, and for all or no joints qd1 to qdn and qdd1 to qddn",
             fix="rename the columns of the table",
         )
+    factors = np.array(
+        [1.0, *(_factor(unit, fspath(path)) for unit in table.units or [""] * len(table.names))]
+    )
     columns = [found[name][k] for name in ("q", "qd", "qdd")[: 1 + 2 * complete[1]] for k in range(1, n + 1)]
-    rows = rows[:, [0, *columns]]
+    rows = (rows * factors)[:, [0, *columns]]
     if complete[1]:
         curve = curve_through(rows)
     else:
@@ -56,6 +64,19 @@ def load_trajectory(path: str | PathLike[str], *, dt: float | None = None) -> Jo
     times = np.unique(rows[:, 0])
     motion = curve.at(times)
     return JointTrajectory(t=times, q=motion.q, qd=motion.qd, qdd=motion.qdd, curve=curve)
+
+
+def _factor(unit: str, where: str) -> float:
+    """The factor from a unit of a header to rad or m, and s."""
+    position = unit.split("/")[0].strip()
+    if position not in _UNITS:
+        raise InputError(
+            f"a column has the unit '{unit}'",
+            where=where,
+            allowed=f"rates of {', '.join(name for name in _UNITS if name)} per s, or no unit for rad or m",
+            fix="convert the column, or correct its header",
+        )
+    return _UNITS[position]
 
 
 def _listed(names: Sequence[str]) -> str:
