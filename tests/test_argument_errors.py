@@ -5,6 +5,7 @@ import importlib
 import inspect
 import pickle
 import re
+import types
 import warnings
 from collections.abc import Callable
 from enum import Enum
@@ -16,8 +17,11 @@ import pytest
 import armblocks as ab
 from armblocks.argument_errors import ArgumentErrors
 from armblocks.blocks import BLOCKS
+from armblocks.diagram import Block
 from armblocks.errors import ArgumentError, ArmblocksWarning, UnknownArgumentError, UnknownNameError, counted
 from armblocks.robot import Joint
+from armblocks.robot.constraints import Constraint
+from armblocks.robot.springs import Spring
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 
@@ -52,9 +56,43 @@ def public_calls() -> dict[str, Callable[..., object]]:
 PUBLIC = public_calls()
 
 
+def public_methods() -> dict[str, Callable[..., object]]:
+    """The methods of all public classes but those whose methods only the package calls."""
+    classes = {
+        base
+        for value in PUBLIC.values()
+        if inspect.isclass(value) and not issubclass(value, (Block, Joint, Constraint, Spring, Exception))
+        for base in value.__mro__
+        if base.__module__.startswith("armblocks.")
+    }
+    return {
+        f"{cls.__name__}.{name}": getattr(cls, name) if isinstance(member, classmethod) else member
+        for cls in sorted(classes, key=lambda cls: (cls.__module__, cls.__name__))
+        for name, member in vars(cls).items()
+        if not name.startswith("_") and isinstance(member, types.FunctionType | classmethod)
+    }
+
+
+METHODS = public_methods()
+
+
 def test_the_reference_and_the_exports_are_found() -> None:
     assert {"armblocks.simulate", "armblocks.Diagram", "armblocks.robot.palletiser.palletiser"} <= set(PUBLIC)
     assert len(PUBLIC) > 280
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_arguments_of_methods_that_do_not_fit_raise_an_argument_error(name: str) -> None:
+    method, short_name = METHODS[name], name.rpartition(".")[2]
+    of_instance = () if inspect.ismethod(method) else (object(),)
+    kinds = {entry.kind for entry in inspect.signature(method).parameters.values()}
+    if inspect.Parameter.VAR_KEYWORD not in kinds:
+        message = f"^{short_name}: there is no argument named 'no_such'"
+        with pytest.raises(UnknownArgumentError, match=message):
+            method(*of_instance, no_such=1)
+    if inspect.Parameter.VAR_POSITIONAL not in kinds:
+        with pytest.raises(ArgumentError, match=f"^{short_name}: 99 arguments are given without names"):
+            method(*of_instance, *[None] * 99)
 
 
 @pytest.mark.parametrize("name", PUBLIC)

@@ -1,8 +1,8 @@
 """Errors of calls whose arguments do not fit the signature.
 
 Python's TypeError for such a call does not list the valid names. Public classes have the metaclass
-:class:`ArgumentErrors`, which raises :class:`~armblocks.errors.ArgumentError` instead;
-:func:`with_argument_errors` does the same for functions. An ``ArgumentError`` is a TypeError, too.
+:class:`ArgumentErrors`, which raises :class:`~armblocks.errors.ArgumentError` instead, also in their public
+methods; :func:`with_argument_errors` does the same for functions. An ``ArgumentError`` is a TypeError, too.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import types
 from abc import ABCMeta
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar, cast
+from weakref import WeakSet
 
 from armblocks.errors import ArgumentError, UnknownArgumentError, counted, shortened_list
 
@@ -21,10 +22,27 @@ MAX_EXAMPLE = 2
 
 Instance = TypeVar("Instance")
 Function = TypeVar("Function", bound=Callable[..., object])
+_PLAIN_METHODS: WeakSet[type] = WeakSet()
+"""Classes whose methods only the package calls."""
 
 
 class ArgumentErrors(ABCMeta):
-    """Metaclass of public classes: wrong arguments of the constructor raise an ``ArgumentError``."""
+    """Metaclass of public classes: wrong arguments of the constructor and of public methods raise an
+    ``ArgumentError``.
+
+    ``methods=False`` excludes the methods of a class and its subclasses, if only the package calls them.
+    """
+
+    def __new__(
+        mcs, name: str, bases: tuple[type, ...], members: dict[str, Any], *, methods: bool = True
+    ) -> ArgumentErrors:
+        excluded = {cls for base in bases for cls in base.__mro__ if cls in _PLAIN_METHODS}
+        if methods and not excluded:
+            members = {key: _checked(key, member) for key, member in members.items()}
+        cls = super().__new__(mcs, name, bases, members)
+        if not methods:
+            _PLAIN_METHODS.add(cls)
+        return cls
 
     def __call__(cls: type[Instance], *values: Any, **named: Any) -> Instance:
         try:
@@ -51,6 +69,34 @@ def with_argument_errors(function: Function) -> Function:
             raise
 
     return cast("Function", call)
+
+
+def _checked(name: str, member: Any) -> Any:
+    """A member of a class; a public method raises an ``ArgumentError`` for wrong arguments."""
+    if name.startswith("_"):
+        return member
+    if isinstance(member, types.FunctionType):
+        return _method(member)
+    if isinstance(member, classmethod):
+        return classmethod(_method(cast("classmethod[Any, ..., Any]", member).__func__))
+    if isinstance(member, staticmethod):
+        return staticmethod(with_argument_errors(cast("staticmethod[..., Any]", member).__func__))
+    return member
+
+
+def _method(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The function, whose first argument is an object or class, with an ``ArgumentError`` in a call."""
+
+    @functools.wraps(function)
+    def call(*values: Any, **named: Any) -> Any:
+        try:
+            return function(*values, **named)
+        except TypeError:
+            if values:
+                check_arguments(types.MethodType(function, values[0]), values[1:], named)
+            raise
+
+    return call
 
 
 def check_arguments(

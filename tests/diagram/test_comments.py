@@ -156,7 +156,7 @@ def run(diagram: Diagram, **settings: Any) -> ab.SimulationResult:
     return ab.simulate(diagram, stop_time=1.0, sample_time=0.125, **settings)
 
 
-@pytest.mark.parametrize("seed", [0, 4])
+@pytest.mark.parametrize("seed", [1, 4])
 def test_runs_of_both_forms_agree(seed: int) -> None:
     diagram = random_recipe(seed).diagram()
     with warnings.catch_warnings():

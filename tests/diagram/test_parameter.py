@@ -81,7 +81,7 @@ def test_the_kind_of_a_parameter_follows_from_its_default() -> None:
     kinds = {rule.name: rule.kind for rule in JTraj.parameters()}
     assert kinds == {"q0": ParameterKind.ARRAY, "qf": ParameterKind.ARRAY, "tmax": ParameterKind.NUMBER}
     assert all(rule.tunable for rule in JTraj.parameters())
-    assert [rule.required for rule in Fkine.parameters()] == [True]
+    assert {rule.name: rule.required for rule in Fkine.parameters()} == {"robot": True, "frame": False}
     assert Integrator.parameters()[0].default == 0.0
 
 

@@ -30,7 +30,7 @@ Signals = Mapping[str, SX]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Block(ABC, metaclass=ArgumentErrors):
+class Block(ABC, metaclass=ArgumentErrors, methods=False):
     """Base class of block types. Subclasses are final frozen dataclasses whose fields are parameters.
 
     A subclass sets ``title``, declares its parameters with :func:`~armblocks.diagram.parameter.parameter`,

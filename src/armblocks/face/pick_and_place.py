@@ -36,7 +36,7 @@ _MAX_JUMP = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class CyclePhase:
+class CyclePhase(metaclass=ArgumentErrors):
     """A phase from ``start`` to ``end`` (s) of a cycle; ``loaded``: whether the payload is at the tool."""
 
     name: str

@@ -35,7 +35,7 @@ _QUANTITIES = ("speed", "acceleration", "torque")
 
 
 @dataclass(frozen=True, kw_only=True)
-class BindingInterval:
+class BindingInterval(metaclass=ArgumentErrors):
     """A time from ``start`` to ``end`` (s) in which a ``quantity`` of a ``joint`` is nearest to its limit."""
 
     start: float

@@ -22,7 +22,7 @@ MAX_SPRINGS = 300
 
 
 @dataclass(frozen=True, kw_only=True)
-class Spring(ABC, metaclass=ArgumentErrors):
+class Spring(ABC, metaclass=ArgumentErrors, methods=False):
     """A linear spring without mass and damping. ``name`` is unique among the springs of the robot."""
 
     name: str

@@ -30,7 +30,7 @@ class Attachment(metaclass=ArgumentErrors):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Constraint(ABC, metaclass=ArgumentErrors):
+class Constraint(ABC, metaclass=ArgumentErrors, methods=False):
     """Equations that the coordinates of a robot satisfy at all times, in addition to the joints of its tree.
 
     ``name`` is unique in the robot.

@@ -18,7 +18,7 @@ from armblocks.spatial import Transform, Vector3, vector3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Joint(ABC, metaclass=ArgumentErrors):
+class Joint(ABC, metaclass=ArgumentErrors, methods=False):
     """A joint: a sequence of elementary motions from the parent to the link.
 
     Its coordinates q (nq,) are those of its motions, one after the other, and its speeds qd (nv,) as well.
