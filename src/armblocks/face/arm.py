@@ -37,7 +37,7 @@ from armblocks.face.arm_measures import (
 )
 from armblocks.face.assembly import Assembly, assemble, coordinates
 from armblocks.face.forward_simulation import ArmMotionResult, TorqueLaw, simulate_arm
-from armblocks.face.ikine_branches import ClosedForm, IkineBranches, chosen_branch, configuration_of
+from armblocks.face.ikine_branches import IkineBranches
 from armblocks.face.ikine_result import IkineResult
 from armblocks.face.notebook_views import robot_view
 from armblocks.face.parametric import ParametricArm
@@ -46,6 +46,7 @@ from armblocks.robot.dh_table import kinematics_text
 from armblocks.robot.fields import check_kind
 
 if TYPE_CHECKING:
+    from armblocks.face.arm_inverse import ArmInverse
     from armblocks.face.ikine_targets import Target
     from armblocks.face.trajectory import JointTrajectory
     from armblocks.pictures.film import FilmProgress
@@ -279,12 +280,7 @@ class Arm(metaclass=ArgumentErrors):
         joints held at their limits (Chan and Lawrence 1988; Sugihara, IEEE T-RO 27, 2011). Raises InputError
         for targets that are not poses, RobotError for robots with closed loops.
         """
-        from armblocks.face.ikine import check_axes, checked_options, solve
-
-        where = f"ikine of robot '{self.name}'"
-        options = checked_options(mask, limits, tolerance, restarts, seed, where)
-        axes = check_axes(axes, where) if mask is not None or axes != "tool" else "world"
-        return solve(self._code.search(frame, axes), T, q0, options, threads)
+        return self._inverse.call(mask, limits, frame, axes, tolerance, restarts, seed)(T, q0, threads)
 
     def ikine_all(
         self, T: Target, *, limits: bool = True, tolerance: float = 1e-9, threads: int = 1
@@ -297,7 +293,7 @@ class Arm(metaclass=ArgumentErrors):
         for :meth:`ikine`; of angles that differ by whole turns, the one within the limits is given, else
         the one nearest to zero. Raises RobotError that names the reason for other arms.
         """
-        return self._closed_form.branches(T, limits, tolerance, threads)
+        return self._inverse.closed_form.branches(T, limits, tolerance, threads)
 
     def ikine6s(
         self, T: Target, configuration: str = "lun", *, limits: bool = False, threads: int = 1
@@ -309,8 +305,7 @@ class Arm(metaclass=ArgumentErrors):
         release 10 and the Python toolbox. The arm is right-handed if the centre of the wrist is on the side
         of ``z1 × z2`` of axis 1, where z1 and z2 are the directions of axes 1 and 2.
         """
-        index = configuration_of(self._closed_form, configuration)
-        return chosen_branch(self.robot, self._closed_form.branches(T, limits, 1e-9, threads), index)
+        return self._inverse.with_letters(T, configuration, limits, threads)
 
     # ---- dynamics ----------------------------------------------------------------------------------------
     @cached_property
@@ -480,13 +475,10 @@ class Arm(metaclass=ArgumentErrors):
         return self._code.kernel(method).count
 
     @cached_property
-    def _closed_form(self) -> ClosedForm:
-        kernel = self._code.kernel("branches")
+    def _inverse(self) -> ArmInverse:
+        from armblocks.face.arm_inverse import ArmInverse
 
-        def iterate(targets: Array, starts: Array | None) -> IkineResult:
-            return self.ikine(targets, starts, limits=False, restarts=100 if starts is None else 0)
-
-        return ClosedForm.of(self.robot, kernel, iterate)
+        return ArmInverse(self._code)
 
     def __repr__(self) -> str:
         return f"<Arm {self.name}: {counted(len(self.robot.joints), 'joint')} {self.robot.joint_letters}>"

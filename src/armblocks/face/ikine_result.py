@@ -53,6 +53,13 @@ class IkineResult(metaclass=ArgumentErrors):
     lost_direction: Array
     names: tuple[str, ...]
 
+    @classmethod
+    def trusted(cls, **values: object) -> IkineResult:
+        """A result with all fields by name, without checks: the constructor takes as long as a search."""
+        result = object.__new__(cls)
+        vars(result).update(values)
+        return result
+
     def __reduce__(self) -> tuple[object, ...]:
         return partial(IkineResult, **self.__dict__), ()
 

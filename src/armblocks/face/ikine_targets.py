@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, cast
+from typing import Any, TypeGuard, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,7 +26,7 @@ def target_array(T: Target, where: str) -> tuple[Array, bool]:
 
     Raises InputError for other shapes and types.
     """
-    if type(T) is np.ndarray and T.dtype == np.float64 and T.flags.c_contiguous and T.shape[-2:] == (4, 4):
+    if is_plain(T) and T.shape[-2:] == (4, 4):
         if T.ndim == 2:
             return T, False
         if T.ndim == 3:
@@ -61,7 +61,13 @@ def target_array(T: Target, where: str) -> tuple[Array, bool]:
             allowed=_ALLOWED,
             fix="give homogeneous matrices [R p; 0 0 0 1]",
         )
-    return np.ascontiguousarray(array, dtype=np.float64), array.ndim == 3
+    plain = np.ascontiguousarray(array, dtype=np.float64)
+    return plain if plain.flags.aligned else plain.copy(), array.ndim == 3
+
+
+def is_plain(T: object) -> TypeGuard[Array]:
+    """Whether native code can read the array in place."""
+    return type(T) is np.ndarray and T.dtype == np.float64 and T.flags.c_contiguous and T.flags.aligned
 
 
 def checked_poses(T: Target, where: str) -> tuple[Array, bool]:

@@ -24,7 +24,7 @@ from armblocks.inverse_kinematics.layout import (
 from armblocks.inverse_kinematics.nearest_start import is_pose, nearest
 from armblocks.routines.arithmetic import fma, in_all_lanes, select, square_root
 from armblocks.routines.lanes import LaneArray, Lanes, Mask
-from armblocks.routines.memory import Integers, Reals
+from armblocks.routines.memory import Addresses, Integers, Reals
 from armblocks.routines.routine import Program, Routine, external
 from armblocks.routines.values import Boolean, Integer, Real
 
@@ -84,6 +84,28 @@ def define_search(program: Program, sizes: SearchSizes, symbol: str) -> None:
         _Search(r, sizes, dict(zip(ARRAYS, arrays)), stop).write(start)
 
     program.define(search, symbol, public=True, rest=ARRAYS)
+
+
+def define_single(program: Program, sizes: SearchSizes, symbol: str, search: str) -> None:
+    """Define ``void symbol(ptr constant, ptr target, ptr results)``: one target, with few arguments.
+
+    ``constant`` are the addresses of settings, limits, table and poses; ``results`` has q, then the numbers,
+    then the counts as doubles.
+    """
+
+    def whole(r: Routine, start: Integer, stop: Integer, samples: Integer, *arrays: Reals) -> None:
+        """The function of :func:`define_search`."""
+
+    def single(r: Routine, constant: Addresses, target: Reals, results: Reals) -> None:
+        zero, one = r.constant_integer(0), r.constant_integer(1)
+        given = [constant[k].reals for k in range(4)]
+        numbers = results.after(sizes.positions)
+        counts = numbers.after(int(Number.COUNT))
+        r.call(external(whole, search), zero, one, one, target, results, *given, results, numbers, counts)
+        for k in range(Count.COUNT):
+            counts[k] = counts.integers[k].to_real()
+
+    program.define(single, symbol, public=True)
 
 
 class _Search:

@@ -20,8 +20,8 @@ from armblocks.compiler.lane_function import emit_lane_function
 from armblocks.compiler.native import NativeCode, load_code
 from armblocks.compiler.program_text import add_program
 from armblocks.compiler.target import host_target
-from armblocks.inverse_kinematics.layout import Count, Limit, Number, SearchSizes, Setting
-from armblocks.inverse_kinematics.native_search import ARRAYS, define_nearest, define_search
+from armblocks.inverse_kinematics.layout import TARGET, Count, Limit, Number, SearchSizes, Setting
+from armblocks.inverse_kinematics.native_search import ARRAYS, define_nearest, define_search, define_single
 from armblocks.inverse_kinematics.nearest_start import BLOCK
 from armblocks.routines.routine import Program
 
@@ -32,7 +32,7 @@ MIN_TARGETS_PER_THREAD = 64
 MIN_SHARE = 16
 """Minimum number of targets of a share."""
 _NUMBERS, _COUNTS, _HAS_STARTS = int(Number.COUNT), int(Count.COUNT), int(Setting.HAS_STARTS)
-VERSION = "3"
+VERSION = "4"
 """Changes with the code of the search, for the disk cache of machine code."""
 
 
@@ -154,6 +154,33 @@ class InverseKinematics:
             evaluate_in_threads(shares, N, addresses, workers, code=code, minimum=MIN_SHARE)
         return Solutions(q=q, numbers=numbers, counts=counts)
 
+    def of_one_target(
+        self, settings: Array, bounds: Array, table: StartTable
+    ) -> Callable[[Array], tuple[Array, list[float]]]:
+        """A function of one target (4, 4): :meth:`solve` from the table, with less overhead.
+
+        It returns q (nq,), and the numbers in the order of ``Number`` and the counts in that of ``Count``.
+        """
+        settings = settings.copy()
+        settings[_HAS_STARTS] = 0.0
+        code = self._loaded(1)[0]
+        search = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)(code.address("single"))
+        nq = self.sizes.positions
+        # Arrays of ctypes are passed faster than the addresses of NumPy arrays are found.
+        memory, of_target = ctypes.c_double * (nq + _NUMBERS + _COUNTS), ctypes.c_double * TARGET
+        constant = np.array([_address(settings), _address(bounds), *table.addresses], dtype=np.uint64)
+        kept = code, settings, bounds, table  # the memory at these addresses
+        addresses = _address(constant)
+
+        def one(target: Array) -> tuple[Array, list[float]]:
+            _ = kept
+            results: Any = memory()
+            writable: Any = target if target.flags.writeable else target.copy()
+            search(addresses, of_target.from_buffer(writable), results)
+            return np.frombuffer(results, dtype=np.float64, count=nq), results[nq:]
+
+        return one
+
     def bounds_array(self, bounds: Bounds) -> Array:
         """The array of limits for :meth:`solve`."""
         rows = np.zeros((int(Limit.COUNT), max(self.sizes.positions, self.sizes.speeds)))
@@ -186,6 +213,8 @@ class InverseKinematics:
         add_program(module, of_table)
         program = Program(lanes)
         define_search(program, self.sizes, "search")
+        if lanes == 1:
+            define_single(program, self.sizes, "single", "search")
         add_program(module, program)
         emit_shares(module, ARRAYS, "search")
         return module.text
