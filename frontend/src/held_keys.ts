@@ -33,10 +33,10 @@ export function setConnected(state: boolean): void {
 
 const areHeld = (): boolean => connected && operations > 0
 
-/** Whether a key belongs to the sheet: nothing else has the focus. */
+/** Whether a key belongs to the sheet: the sheet or an element around it has the focus. */
 function isForSheet({ target }: KeyboardEvent): boolean {
   if (!(target instanceof Element) || target.closest('input, textarea, [role="dialog"]')) return false
-  return target === document.body || target.closest('.canvas') !== null
+  return target.closest('.canvas') !== null || target.querySelector('.canvas') !== null
 }
 
 const isModifier = ({ key }: KeyboardEvent): boolean =>

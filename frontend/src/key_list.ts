@@ -85,7 +85,7 @@ export const KEYS: KeyGroup[] = [
       'scopes/inspector.tsx',
       'run/tune_panel.tsx',
       'run/parameter_sets_dialog.tsx',
-      'robot/editor/joints_panel.tsx',
+      'robot/joint_slider.tsx',
     ],
     keys: [
       ['↑, ↓', 'Move through the list'],

@@ -88,7 +88,8 @@ export function useSheetKeys(
     )
       return
     if (event.defaultPrevented) return
-    const forSheet = focused === window.document.body || sheet.current?.contains(focused)
+    // After the selection by a rectangle, the panel around the sheet has the focus.
+    const forSheet = sheet.current?.contains(focused) || focused?.contains(sheet.current)
     if (!forSheet && (BUTTON_KEYS.has(event.key) || (event.key.length > 1 && !isButton(focused)))) return
     const command = commandOf(event, true)
     if (command) {

@@ -56,9 +56,9 @@ export function onBlocksRenamed(document: string, inside: string[], renamed: Ren
   useShownValues.setState(({ pinned }) => ({ pinned: pathsAfter(pinned, renamed) }))
   const prefix = inside.map((name) => `${name}/`).join('')
   const nameAfter = (name: string) => pathAfter(prefix + name, renamed).slice(prefix.length)
+  const isRenamed = (name: string) => nameAfter(name) !== name && !nameAfter(name).includes('/')
   const { selection, editing } = useStudio.getState()
-  useStudio.setState({
-    selection: new Set([...selection].map(nameAfter)),
-    editing: editing === null ? null : nameAfter(editing),
-  })
+  if ([...selection].some(isRenamed))
+    useStudio.setState({ selection: new Set([...selection].map(nameAfter)) })
+  if (editing !== null && isRenamed(editing)) useStudio.setState({ editing: nameAfter(editing) })
 }

@@ -94,6 +94,21 @@ def test_escape_cancels_a_drag_of_a_block_a_wire_segment_a_new_wire_and_a_corner
     expect(sheet.get_by_role("button", name="Nothing to undo")).to_be_disabled()
 
 
+def test_keys_move_and_delete_blocks_that_are_selected_by_a_rectangle(sheet: Page) -> None:
+    pane = sheet.locator(".react-flow__pane").bounding_box()
+    assert pane is not None
+    before, count = position(sheet, "PID"), sheet.locator(".react-flow__node").count()
+    sheet.mouse.move(pane["x"] + 3, pane["y"] + 3)
+    sheet.mouse.down()
+    sheet.mouse.move(pane["x"] + pane["width"] - 20, pane["y"] + pane["height"] - 5, steps=6)
+    sheet.mouse.up()
+    expect(sheet.locator(".react-flow__node.selected")).to_have_count(count)
+    sheet.keyboard.press("ArrowRight")
+    wait_until(sheet, lambda: position(sheet, "PID") == (before[0] + 5, before[1]))
+    sheet.keyboard.press("Delete")
+    expect(sheet.locator(".react-flow__node")).to_have_count(0)
+
+
 def test_the_run_key_in_a_dialog_runs_with_the_typed_value(sheet: Page) -> None:
     select_block(sheet, "PID")
     sheet.keyboard.press("Enter")

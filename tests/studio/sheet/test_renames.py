@@ -61,7 +61,6 @@ def test_other_edits_rename_nothing() -> None:
         MoveBlocks(places={"a": Place(x=9, y=9)}),
         SetParameters(block="a", values={"gain": 3.0}),
         RemoveBlocks(blocks=["c"]),
-        GroupBlocks(blocks=["a"], name="S"),  # the names change, and the type of the block
         AddBlocks(blocks=[NewBlock(name="n", type="Gain", place=Place(x=0, y=90))]),
     ]
     document = drawing()
@@ -70,6 +69,17 @@ def test_other_edits_rename_nothing() -> None:
         document.edit(edit)
         assert renamed_paths(before, document.diagram) == {}
         assert renamed_paths(document.diagram, before) == {}
+
+
+def test_blocks_that_are_grouped_and_ungrouped_by_undo_are_followed() -> None:
+    document = drawing()
+    before = document.diagram
+    document.edit(GroupBlocks(blocks=["a", "c"], name="S"))
+    after = document.diagram
+    assert renamed_paths(before, after) == {"a": "S/a", "c": "S/c"}
+    assert renamed_paths(after, before) == {"S/a": "a", "S/c": "c"}
+    document.edit(GroupBlocks(blocks=["a"], name="T"), ("S",))
+    assert renamed_paths(after, document.diagram) == {"S/a": "S/T/a"}
 
 
 def test_paths_follow_renames_forward_and_back() -> None:

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
-from armblocks.diagram import Diagram, DiagramBlock
+from armblocks.diagram import Block, Diagram, DiagramBlock
 
 
 def renamed_paths(before: Diagram, after: Diagram, path: str = "") -> dict[str, str]:
     """Return the paths of renamed blocks: old path to new path.
 
-    Each step renames at most one block. For a renamed subsystem the result has its own path only;
-    :func:`path_after` also follows the blocks inside.
+    Each step renames at most one block, or moves blocks into a new subsystem. For a renamed subsystem the
+    result has its own path only; :func:`path_after` also follows the blocks inside.
     """
-    if before is after or len(before.blocks) != len(after.blocks):
+    if before is after:
         return {}
     removed, added = before.blocks.keys() - after.blocks.keys(), after.blocks.keys() - before.blocks.keys()
-    if removed:
-        (old, *others), new = removed, next(iter(added))
-        same_type = type(before.blocks[old]) is type(after.blocks[new])
-        return {path + old: path + new} if same_type and not others else {}
+    if removed or added:
+        if len(removed) == len(added) == 1:
+            (old,), (new,) = removed, added
+            if _is_same(before.blocks[old], after.blocks[new]):
+                return {path + old: path + new}
+        grouped = _moved_inside(before, removed, after, added)
+        ungrouped = _moved_inside(after, added, before, removed)
+        return {path + old: path + new for old, new in grouped.items()} or {
+            path + old: path + new for new, old in ungrouped.items()
+        }
     renamed: dict[str, str] = {}
     for name, old_block in before.blocks.items():
         new_block = after.blocks[name]
@@ -28,6 +34,28 @@ def renamed_paths(before: Diagram, after: Diagram, path: str = "") -> dict[str, 
         if isinstance(new_block, DiagramBlock):
             renamed |= renamed_paths(old_block.diagram, new_block.diagram, f"{path}{name}/")
     return renamed
+
+
+def _is_same(before: Block, after: Block) -> bool:
+    """Whether a block with another name can be the same: its type, and the blocks inside a subsystem."""
+    if isinstance(before, DiagramBlock) and isinstance(after, DiagramBlock):
+        return before.diagram.blocks.keys() == after.diagram.blocks.keys()
+    return type(before) is type(after)
+
+
+def _moved_inside(
+    before: Diagram, removed: Collection[str], after: Diagram, added: Collection[str]
+) -> dict[str, str]:
+    """The new paths of removed blocks that are inside the only added block, a subsystem."""
+    if len(added) != 1 or not removed:
+        return {}
+    (name,) = added
+    part = after.blocks[name]
+    if not isinstance(part, DiagramBlock):
+        return {}
+    inner = part.diagram.blocks
+    is_moved = all(inner.get(old) is before.blocks[old] for old in removed)
+    return {old: f"{name}/{old}" for old in removed} if is_moved else {}
 
 
 def path_after(path: str, renamed: Mapping[str, str]) -> str:
