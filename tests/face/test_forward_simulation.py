@@ -85,8 +85,9 @@ def test_joints_with_coulomb_friction_stick() -> None:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        ({"duration": 0.0}, "the duration is 0 s and dt is 0.01 s"),
-        ({"duration": 1.0, "dt": -1.0}, "positive numbers of seconds"),
+        ({"duration": 0.0}, "duration = 0.0"),
+        ({"duration": [0.1, 0.2]}, r"duration = \[0.1, 0.2\]. Allowed: a finite number above 0, in s"),
+        ({"duration": 1.0, "dt": -1.0}, "dt = -1.0. Allowed: a finite number above 0, in s"),
         ({"duration": 1.0, "q0": [0.0, 1.0]}, r"q0 has the shape \(2,\)"),
         ({"duration": 1.0, "torque": [0.0, 1.0]}, r"torque has the shape \(2,\)"),
         ({"duration": 1.0, "torque": lambda robot, t: 0.0}, "the torque function has the argument 'robot'"),

@@ -61,3 +61,7 @@ def test_angles_that_are_probably_in_degrees_raise_a_warning() -> None:
     builder.add("plot", RobotPlot(robot=ab.load_robot("twolink")), angles)
     with pytest.warns(ArmblocksWarning, match=r"angles/y at the start: an angle of 45 rad"):
         ab.simulate(builder.build())
+
+
+def test_a_trajectory_is_shown_as_a_summary() -> None:
+    assert repr(ab.jtraj([0, 0], [1, 2], 50)) == "<JointTrajectory: 2 joints, 50 samples from 0 s to 1 s>"

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from armblocks.argument_errors import ArgumentErrors
 from armblocks.errors import InputError
 from armblocks.face.assembly import coordinates
+from armblocks.face.trajectory_arguments import positive
 from armblocks.robot import Robot
 
 Array = NDArray[np.float64]
@@ -58,13 +59,7 @@ def simulate_arm(
     from armblocks.face.model import simulate
 
     where = f"fdyn of robot '{robot.name}'"
-    if not (np.isfinite(duration) and duration > 0.0 and np.isfinite(dt) and dt > 0.0):
-        raise InputError(
-            f"the duration is {duration:g} s and dt is {dt:g} s",
-            where=where,
-            allowed="positive numbers of seconds",
-            fix="give arm.fdyn(2.0)",
-        )
+    duration, dt = positive("duration", duration, "s", where), positive("dt", dt, "s", where)
     q = robot.neutral if q0 is None else coordinates(robot, "q0", q0, robot.nq)
     qd = np.zeros(robot.nv) if qd0 is None else coordinates(robot, "qd0", qd0, robot.nv)
     builder = DiagramBuilder("fdyn")
@@ -80,7 +75,7 @@ def simulate_arm(
         constant = np.zeros(robot.nv) if torque is None else coordinates(robot, "torque", torque, robot.nv)
         source = builder.add("torque", blocks.Constant(value=constant))
     builder.connect(source[_OUTPUT if callable(torque) else "y"], plant["tau"])
-    result = simulate(builder.build(), stop_time=float(duration), sample_time=dt, **settings)
+    result = simulate(builder.build(), stop_time=duration, sample_time=dt, **settings)
     tau = np.asarray(result["arm/tau"]).reshape(len(result.time), robot.nv)
     return ArmMotionResult(
         t=result.time, q=result["arm/q"], qd=result["arm/qd"], qdd=result["arm/qdd"], tau=tau

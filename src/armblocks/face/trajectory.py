@@ -30,7 +30,7 @@ _JUMP = 1e-9
 """Rates that differ by less, relative to the greatest one, are continuous between two pieces."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class JointTrajectory(metaclass=ArgumentErrors):
     """Samples of a joint motion: ``t`` (N,) s, ``q`` (N, n) rad or m, ``qd`` and ``qdd`` (N, n) its rates.
 
@@ -55,6 +55,11 @@ class JointTrajectory(metaclass=ArgumentErrors):
                 allowed="(N,) and three times (N, n)",
                 fix="give one row of joint values for each time",
             )
+
+    def __repr__(self) -> str:
+        joints = counted(self.q.shape[1], "joint")
+        samples = counted(len(self.t), "sample")
+        return f"<JointTrajectory: {joints}, {samples} from {self.t[0]:g} s to {self.t[-1]:g} s>"
 
     def __len__(self) -> int:
         return len(self.t)
