@@ -11,25 +11,11 @@ and Control 1(3), 1978; Corke, Robotics Toolbox, releases 7 to 10 (rpy2tr, eul2t
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from casadi import SX, atan2, cos, dot, hypot, if_else, sin, sqrt, vertcat
 
-from armblocks.spatial.rotation import SINGULAR
-
-RPY_CONVENTIONS: Mapping[str, tuple[str, bool]] = {
-    "zyx": ("zyx", True),
-    "xyz": ("xyz", True),
-    "yxz": ("yxz", True),
-    "release 9": ("xyz", False),
-    "release 7": ("zyx", False),
-}
-"""Order of the axes from the left, and whether roll is the last angle (else it is the first).
-
-``zyx``: R = Rz(yaw) Ry(pitch) Rx(roll), the toolbox's default since release 10; ``xyz`` and ``yxz`` are that
-release's other orders. ``release 9`` (and 8): R = Rx(roll) Ry(pitch) Rz(yaw). ``release 7``: R = Rz(roll)
-Ry(pitch) Rx(yaw), which releases 8 and 9 call ``zyx``.
-"""
+from armblocks.spatial.rotation import RPY_CONVENTIONS, SINGULAR
 
 
 def rotation_about_axis(axis: str, angle: SX) -> SX:

@@ -7,6 +7,7 @@ perpendicular axes then have exact zeros, and the traced equations omit the term
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TypeAlias
 
 import numpy as np
@@ -26,6 +27,21 @@ SINGULAR = 2.2e-15
 """Maximum cosine of the middle one of three angles at which the orientation is singular: ten roundings.
 
 Only the sum or the difference of the other two angles is then determined.
+"""
+
+
+RPY_CONVENTIONS: Mapping[str, tuple[str, bool]] = {
+    "zyx": ("zyx", True),
+    "xyz": ("xyz", True),
+    "yxz": ("yxz", True),
+    "release 9": ("xyz", False),
+    "release 7": ("zyx", False),
+}
+"""Order of the axes from the left, and whether roll is the last angle (else it is the first).
+
+``zyx``: R = Rz(yaw) Ry(pitch) Rx(roll), the toolbox's default since release 10; ``xyz`` and ``yxz`` are that
+release's other orders. ``release 9`` (and 8): R = Rx(roll) Ry(pitch) Rz(yaw). ``release 7``: R = Rz(roll)
+Ry(pitch) Rx(yaw), which releases 8 and 9 call ``zyx``.
 """
 
 
