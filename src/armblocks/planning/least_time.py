@@ -72,17 +72,21 @@ class Solution:
     iterations: int
 
 
-def solve(limits: Limits) -> Solution:
-    """The fastest squared path speeds from rest to rest; limits also hold in the middle of the segments."""
+def solve(limits: Limits, margin: Array | None = None) -> Solution:
+    """The fastest squared path speeds from rest to rest; limits also hold in the middle of the segments.
+
+    ``margin`` (N, R): by how much the limits of each segment are reduced; it is increased in place.
+    """
     _, N, R = np.shape(limits.a)
     inputs = [
         np.ascontiguousarray(part, dtype=np.float64)
         for part in (limits.a, limits.b, limits.c, limits.d, limits.bound, limits.lengths)
     ]
     inputs += [np.array(limits.fastest), np.ascontiguousarray(limits.fastest_middle)]
+    margin = np.zeros((N, R)) if margin is None else margin
     x, result = np.zeros(N + 1), np.array([np.inf, 0.0, 0.0, 0.0])
-    work = np.zeros(7 * N * R + 5 * (N + 1))
-    pointers = [part.ctypes.data for part in (*inputs, x, result, work)]
+    work = np.zeros(6 * N * R + 5 * (N + 1))
+    pointers = [part.ctypes.data for part in (*inputs, x, result, margin, work)]
     failed = int(_function()(*pointers, N, R, int(limits.d.any())))
     return Solution(
         x=x, failed=failed if failed >= 0 else None, excess=float(result[0]), iterations=int(result[1])
@@ -228,6 +232,7 @@ def _solve(
     fastest_middle: Reals,
     x: Reals,
     result: Reals,
+    margin: Reals,
     work: Reals,
     N: Integer,
     R: Integer,
@@ -240,7 +245,7 @@ def _solve(
     fill, reduce = r.program.define(_fill_lines), r.program.define(_reduce_limits)
     back, forth = r.program.define(backward), r.program.define(forward)
     size, points = N * R, N + 1
-    margin, slope = work, work.after(size)
+    slope = work
     bottom, top = slope.after(2 * size), slope.after(4 * size)
     least = slope.after(6 * size)
     most, low, high, guess = (least.after(points * k) for k in range(1, 5))
@@ -292,6 +297,6 @@ def _code() -> NativeCode:
 @cache
 def _function() -> Callable[..., int]:
     code = _code()
-    kinds = [*[ctypes.c_void_p] * 11, *[ctypes.c_int64] * 3]
+    kinds = [*[ctypes.c_void_p] * 12, *[ctypes.c_int64] * 3]
     function: Any = ctypes.CFUNCTYPE(ctypes.c_int64, *kinds)(code.address("solve"))
     return function
