@@ -177,6 +177,25 @@ def test_targets_may_have_any_form() -> None:
     assert arm.ikine(T[0], T[0, 0, 0] * np.ones(6), limits=False).success
 
 
+def test_single_calls_keep_their_memory_and_share_none() -> None:
+    arm = arm_of("ur5")
+    T = arm.fkine(configurations(arm, 200))
+    first = arm.ikine(T[0])
+    kept = first.q.copy()
+    junk = [np.full(k, np.nan) for k in range(1, 200)]  # occupies memory that was freed
+    results = [arm.ikine(t) for t in T]
+    assert len(junk) == 199 and all(result.success for result in results)
+    results[0].q[:] = 0.0
+    assert np.array_equal(first.q, kept) and np.array_equal(arm.ikine(T[0]).q, kept)
+    frozen = T[0].copy()
+    frozen.flags.writeable = False
+    unaligned = np.zeros(129, dtype=np.uint8)[1:].view(np.float64).reshape(4, 4)
+    unaligned[...] = T[0]
+    for same in (frozen, unaligned, T[0].astype(">f8"), arm_of("ur5").fkine(kept)):
+        assert np.allclose(arm.ikine(same).q, kept, atol=1e-8)
+    assert arm.ikine(np.stack([unaligned, unaligned])).success.all()
+
+
 def test_a_restart_finds_what_the_first_start_does_not() -> None:
     arm = arm_of("panda")
     T = arm.fkine(configurations(arm, 100))

@@ -124,12 +124,16 @@ class ArmSearch:
         return known
 
     def _largest_steps(self, size: float) -> Array:
-        steps = [
-            LARGEST_STEP * (1.0 if not isinstance(motion, AxisMotion) or motion.angular else size)
-            for joint in self.robot.joints
-            for motion in joint.motions
-            for _ in motion.speeds
-        ]
+        """Steps (n,) of one iteration; translations without limits have none, because they are linear."""
+        limited = iter(self.robot.limits)
+        steps: list[float] = []
+        for joint in self.robot.joints:
+            for motion in joint.motions:
+                ranges = [next(limited).position for _ in motion.speeds]
+                if not isinstance(motion, AxisMotion) or motion.angular:
+                    steps += [LARGEST_STEP] * len(ranges)
+                else:
+                    steps += [LARGEST_STEP * size if entry else np.inf for entry in ranges]
         return np.array(steps)
 
 

@@ -169,7 +169,7 @@ class InverseKinematics:
         # Arrays of ctypes are passed faster than the addresses of NumPy arrays are found.
         memory, of_target = ctypes.c_double * (nq + _NUMBERS + _COUNTS), ctypes.c_double * TARGET
         constant = np.array([_address(settings), _address(bounds), *table.addresses], dtype=np.uint64)
-        kept = code, settings, bounds, table  # the memory at these addresses
+        kept = code, settings, bounds, table, constant  # the memory at these addresses
         addresses = _address(constant)
 
         def one(target: Array) -> tuple[Array, list[float]]:
