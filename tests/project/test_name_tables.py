@@ -1,8 +1,12 @@
 """All armblocks names in the tables for users of Simulink and of the Robotics Toolbox exist."""
 
 import ast
+import contextlib
 import inspect
+import io
 import re
+import warnings
+import webbrowser
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,8 +15,10 @@ import pytest
 from typer.main import get_command
 
 import armblocks as ab
+from armblocks import spatial
 from armblocks.blocks import BLOCKS
 from armblocks.cli.main import app
+from armblocks.errors import ArmblocksWarning
 from armblocks.simulation.tableaux import TABLEAUX
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -20,7 +26,10 @@ PAGES = ("from-simulink", "from-robotics-toolbox")
 OBJECTS: dict[str, object] = {
     "ab": ab,
     "np": np,
+    "f": lambda t: 0.0 * t,
+    "list": list,
     "print": print,
+    "spatial": spatial,
     "arm": ab.Arm,
     "builder": ab.DiagramBuilder,
     "result": ab.SimulationResult,
@@ -74,6 +83,39 @@ def test_every_name_of_the_tables_exists(page: str) -> None:
             assert code.split()[1] in commands, code
         else:
             check(ast.parse(code, mode="eval").body)
+
+
+def test_every_expression_for_users_of_the_toolbox_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(webbrowser, "open", lambda link: True)
+    arm = ab.load_robot("puma560")
+    q, T = np.array([0.1, 0.4, -2.0, 0.3, 0.5, 0.2]), arm.fkine([0.1, 0.4, -2.0, 0.3, 0.5, 0.2])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ArmblocksWarning)
+        ab.save_robot(arm, "arm.urdf")
+    motion = {"q": q, "qf": q, "q0": np.zeros(6), "points": np.stack([np.zeros(6), q])}
+    rates = {name: np.ones(6) for name in ("qd", "qdd", "tau", "w", "S")} | {"qd0": np.zeros(6)}
+    poses = {"T": T, "T0": T, "T1": np.eye(4), "R": T[:3, :3], "p": T[:3, 3]}
+    times = {"t": np.linspace(0, 1, 5), "dt": 0.05, "N": 4, "s": 0.5, "qdmax": 1.0, "tacc": 0.2}
+    frames = {"links": arm.robot.links, "base": ab.Transform(), "tool": ab.Transform()}
+    modules = {"ab": ab, "np": np, "spatial": spatial, "arm": arm, "robot": arm.robot}
+    law = {"f": lambda t: np.zeros(6)}
+    variables: dict[str, object] = {**motion, **rates, **poses, **times, **frames, **modules, **law}
+    count = 0
+    for code in names_here("from-robotics-toolbox"):
+        if code.startswith("armblocks ") or code in BLOCKS or not ("(" in code or "." in code):
+            continue
+        if code == 'arm.animate(q, dt, save="arm.mp4")':
+            variables["q"] = np.stack([q, q])
+        with warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
+            warnings.simplefilter("ignore", ArmblocksWarning)
+            value = eval(code, dict(variables))  # noqa: S307
+        assert value is not None or code.startswith("print"), code
+        variables["q"] = q
+        count += 1
+    assert count > 90
 
 
 def test_the_check_detects_a_missing_name() -> None:
