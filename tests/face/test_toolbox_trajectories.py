@@ -87,6 +87,7 @@ def test_tpoly_counts_samples_where_jtraj_normalises_time() -> None:
             expected = quintic_by_solving(*arguments)
             assert_allclose([part[:, k] for part in motion], expected, rtol=0, atol=1e-11)
     assert_allclose(ab.tpoly(0, 1, 6).qd * 5, ab.jtraj(0, 1, 6).qd, rtol=1e-14)
+    assert_array_equal(ab.tpoly(0, 1, np.int64(6)).q, ab.tpoly(0, 1, 6).q)
 
 
 @pytest.mark.parametrize("t", [10, 11, np.linspace(0.0, 3.0, 40)])

@@ -17,6 +17,7 @@ from armblocks.face.trajectory_arguments import (
     joint_limits,
     joint_vector,
     positive,
+    sample_count,
     sample_times,
     via_points,
 )
@@ -204,7 +205,7 @@ def ctraj(T0: ArrayLike | Transform, T1: ArrayLike | Transform, s: ArrayLike | i
     N)``. The rotation is about one axis by the shorter angle. Translations are in the unit of ``T0``.
     """
     first, last = pose_of("T0", T0, "ctraj"), pose_of("T1", T1, "ctraj")
-    if isinstance(s, int):
+    if sample_count(s) is not None:
         fractions = lspb(0.0, 1.0, s).q[:, 0]
     else:
         fractions = joint_vector("s", s, "ctraj")

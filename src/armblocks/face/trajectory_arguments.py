@@ -113,15 +113,16 @@ def ascending(name: str, value: ArrayLike, count: int, where: str) -> Array:
 
 def sample_times(t: ArrayLike | int, where: str, *, step: float | None = None) -> Array:
     """Times from 0, or those of a number of samples: 0 to 1, or multiples of ``step``."""
-    if isinstance(t, int):
-        if t < 2:
+    count = sample_count(t)
+    if count is not None:
+        if count < 2:
             raise InputError(
-                f"t = {counted(t, 'sample')}",
+                f"t = {counted(count, 'sample')}",
                 where=where,
                 allowed="2 or more, or a vector of times",
                 fix="use np.linspace(0, T, N) for times in s",
             )
-        return np.linspace(0.0, 1.0, t) if step is None else step * np.arange(t, dtype=np.float64)
+        return np.linspace(0.0, 1.0, count) if step is None else step * np.arange(float(count))
     times = as_array(t)
     is_ascending = times.ndim == 1 and times.size >= 2 and bool((np.diff(times) > 0).all())
     if not (is_ascending and np.isfinite(times).all() and times[0] == 0.0):
@@ -132,6 +133,12 @@ def sample_times(t: ArrayLike | int, where: str, *, step: float | None = None) -
             fix="use np.linspace(0, T, N)",
         )
     return times
+
+
+def sample_count(t: ArrayLike | int) -> int | None:
+    """A number of samples, an integer of Python or NumPy; ``None`` for times."""
+    value = np.asarray(t)
+    return int(value) if value.ndim == 0 and value.dtype.kind in "iu" else None
 
 
 def as_array(value: ArrayLike) -> Array:
