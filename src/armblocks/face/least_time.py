@@ -27,7 +27,7 @@ _FASTEST = 1e12
 _ROUNDING = 1e-12
 """Torques that are smaller, relative to their terms, are rounding errors."""
 _QUARTERS = np.array([0.25, 0.75])
-_SMALL, _ACCEPTED = 3e-4, 2e-2
+_SMALL, _ACCEPTED = 8e-4, 2e-2
 """Excess over a limit between grid points, relative to it: without correction, and without an error."""
 _ROUNDS, _CORRECTION = 8, 1.3
 """Number of corrections of the limits, and their part of the excess."""
