@@ -48,10 +48,10 @@ export const KEYS: KeyGroup[] = [
     ],
   },
   {
-    title: 'Names and notes',
-    sources: ['canvas/block_node.tsx', 'canvas/note_node.tsx', 'canvas/signal_names.tsx'],
+    title: 'Names, notes and the stop time',
+    sources: ['canvas/block_node.tsx', 'canvas/note_node.tsx', 'canvas/signal_names.tsx', 'run/top_bar.tsx'],
     keys: [
-      ['Enter', 'Accept the name'],
+      ['Enter', 'Accept the name or the stop time'],
       ['Ctrl+Enter', 'Accept the note'],
       ['Esc', 'Discard the change'],
     ],

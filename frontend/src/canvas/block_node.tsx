@@ -3,6 +3,7 @@ import { IconAlertCircleFilled, IconLink } from '@tabler/icons-react'
 import { Handle, type Node, type NodeProps } from '@xyflow/react'
 import { memo } from 'react'
 import { create } from 'zustand'
+import { isCommandKey } from '../model/field_keys'
 import type { Finding, SheetPort, SheetBlock } from '../protocol'
 import { change } from '../store'
 import { ResizeHandles } from './resize_handles'
@@ -129,7 +130,7 @@ function Name({ block }: { block: SheetBlock }) {
       onFocus={(event) => event.target.select()}
       onBlur={(event) => done(event.target.value.trim())}
       onKeyDown={(event) => {
-        event.stopPropagation()
+        if (!isCommandKey(event)) event.stopPropagation()
         if (event.key === 'Enter') event.currentTarget.blur()
         if (event.key === 'Escape') close()
       }}

@@ -3,6 +3,7 @@ import { memo, useEffect, useRef, useState } from 'react'
 import { create } from 'zustand'
 import type { SheetNote } from '../protocol'
 import { holdKeys } from '../held_keys'
+import { isCommandKey } from '../model/field_keys'
 import { change, selectIfUnchanged, useStudio } from '../store'
 
 export type NoteNodeType = Node<{ note: SheetNote }, 'note'>
@@ -81,7 +82,8 @@ function NoteEditor({ id, note }: { id: string; note: SheetNote }) {
       onChange={(event) => setText(event.target.value)}
       onBlur={commit}
       onKeyDown={(event) => {
-        event.stopPropagation()
+        // Ctrl+Enter accepts the note; it does not run the model.
+        if (!isCommandKey(event) || event.key === 'Enter') event.stopPropagation()
         if (event.key === 'Enter' && (event.ctrlKey || event.metaKey)) event.currentTarget.blur()
         if (event.key === 'Escape') useNoteEditing.setState({ id: null })
       }}

@@ -1,5 +1,6 @@
 import { ViewportPortal } from '@xyflow/react'
 import { create } from 'zustand'
+import { isCommandKey } from '../model/field_keys'
 import type { Lines } from '../model/wire_lines'
 import { blockOf, portOf } from '../model/wires'
 import type { SheetBlock, WireLines } from '../protocol'
@@ -70,7 +71,7 @@ function NameField({ port, name }: { port: string; name: string }) {
       onFocus={(event) => event.target.select()}
       onBlur={(event) => commit(event.target.value.trim())}
       onKeyDown={(event) => {
-        event.stopPropagation()
+        if (!isCommandKey(event)) event.stopPropagation()
         if (event.key === 'Enter') event.currentTarget.blur()
         if (event.key === 'Escape') commit(null)
       }}

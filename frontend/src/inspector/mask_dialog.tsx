@@ -47,6 +47,7 @@ export function MaskDialog() {
     <Modal
       opened={opened}
       onClose={close}
+      closeOnClickOutside={false}
       closeButtonProps={{ 'aria-label': 'Close' }}
       title={<b>{block ? `Mask of ${block}` : 'Parameters of the model'}</b>}
       size={940}

@@ -12,7 +12,13 @@ export function Configuration() {
   const opened = useDialogs((s) => s.open === 'configuration')
   const close = () => showDialog(null)
   return (
-    <Modal opened={opened} onClose={close} title={<b>Configuration parameters</b>} size="md">
+    <Modal
+      opened={opened}
+      onClose={close}
+      closeOnClickOutside={false}
+      title={<b>Configuration parameters</b>}
+      size="md"
+    >
       {opened && <Form onClose={close} />}
     </Modal>
   )

@@ -27,6 +27,13 @@ const SPEEDS = [
   ...['0.1', '0.25', '0.5', '1', '2', '5', '10'].map((value) => ({ value, label: `${value} × real time` })),
 ]
 
+/** Accept the text in the field that has the focus: a command such as the run acts on what is displayed. */
+function acceptTypedText(): void {
+  const { activeElement } = document
+  const isField = activeElement instanceof HTMLInputElement || activeElement instanceof HTMLTextAreaElement
+  if (isField && !activeElement.closest('[role="dialog"]')) activeElement.blur()
+}
+
 export function TopBar() {
   const hasDocument = useStudio((s) => s.document !== null)
 
@@ -35,6 +42,7 @@ export function TopBar() {
       const command = commandOf(event, false)
       if (!command) return
       event.preventDefault()
+      acceptTypedText()
       if (command.enabled?.() ?? true) command.run()
     }
     addEventListener('keydown', onKey)
@@ -170,6 +178,7 @@ function StopTime() {
       aria-label="Stop time, s"
       inputMode="decimal"
       defaultValue={text}
+      onKeyDown={({ key, currentTarget }) => key === 'Enter' && currentTarget.blur()}
       onBlur={({ currentTarget }) => {
         const seconds = Number.parseFloat(currentTarget.value)
         currentTarget.value = `${seconds > 0 ? seconds : value} s`

@@ -157,3 +157,39 @@ def test_scopes_values_and_tried_values_follow_renamed_blocks(sheet: Page) -> No
     if not IN_FIREFOX:
         sheet.reload()
         wait_until(sheet, lambda: charts() == ["Control", "Phase", "Scope"])
+
+
+def test_commands_accept_the_text_of_the_field_that_has_the_focus(sheet: Page) -> None:
+    stop_time = sheet.get_by_role("textbox", name="Stop time, s")
+    stop_time.fill("5")
+    stop_time.press("Control+Enter")
+    last_edit(sheet, "change the settings")
+    expect(sheet.locator(".run-state")).to_contain_text("5.00 s")
+    expect(sheet.locator(".run-state")).to_contain_text("done", ignore_case=True)
+    stop_time.fill("6")
+    stop_time.press("Enter")
+    expect(stop_time).to_have_value("6 s")
+    select_block(sheet, "PID")
+    sheet.keyboard.press("F2")
+    field = sheet.get_by_role("textbox", name="Name of PID")
+    field.fill("controller")
+    field.press("Control+Enter")
+    expect(block(sheet, "controller")).to_be_visible()
+    expect(sheet.locator(".run-state")).to_contain_text("6.00 s")
+    sheet.keyboard.press('"')
+    note = sheet.get_by_role("textbox", name="Note")
+    note.fill("hello")
+    note.press("Control+Shift+S")
+    expect(sheet.get_by_role("dialog").get_by_role("combobox", name="File")).to_be_visible()
+    sheet.keyboard.press("Escape")
+    expect(sheet.locator(".note")).to_have_text("hello")
+
+
+def test_a_click_beside_the_configuration_parameters_keeps_the_typed_values(sheet: Page) -> None:
+    sheet.keyboard.press("Control+e")
+    field = sheet.get_by_role("dialog").get_by_role("textbox").first
+    field.fill("12")
+    sheet.mouse.click(5, 300)
+    expect(field).to_have_value("12")
+    sheet.keyboard.press("Escape")
+    expect(sheet.get_by_role("dialog")).to_have_count(0)

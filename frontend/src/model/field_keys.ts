@@ -1,0 +1,14 @@
+/** Keys with Ctrl that edit the text of a field. */
+const TEXT_KEYS = new Set([
+  ...['a', 'c', 'v', 'x', 'y', 'z', 'backspace', 'delete', 'insert', 'home', 'end'],
+  ...['arrowleft', 'arrowright', 'arrowup', 'arrowdown', 'control', 'shift', 'meta'],
+])
+
+/** Whether a key is not for the field that has the focus but a command, such as Ctrl+S or Ctrl+Enter. */
+export const isCommandKey = ({
+  key,
+  ctrlKey,
+  metaKey,
+  altKey,
+}: Pick<KeyboardEvent, 'key' | 'ctrlKey' | 'metaKey' | 'altKey'>): boolean =>
+  (ctrlKey || metaKey) && !altKey && !TEXT_KEYS.has(key.toLowerCase())
