@@ -1,8 +1,10 @@
 /** Keys with Ctrl that edit the text of a field. */
-const TEXT_KEYS = new Set([
-  ...['a', 'c', 'v', 'x', 'y', 'z', 'backspace', 'delete', 'insert', 'home', 'end'],
-  ...['arrowleft', 'arrowright', 'arrowup', 'arrowdown', 'control', 'shift', 'meta'],
-])
+const TEXT_KEYS = new Set(
+  (
+    'a c v x y z backspace delete insert home end arrowleft arrowright arrowup arrowdown ' +
+    'control shift meta'
+  ).split(' '),
+)
 
 /** Whether a key is not for the field that has the focus but a command, such as Ctrl+S or Ctrl+Enter. */
 export const isCommandKey = ({
