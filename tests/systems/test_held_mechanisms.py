@@ -122,6 +122,27 @@ def test_a_four_bar_with_dry_friction_comes_to_rest_as_in_maximal_coordinates() 
     assert max(np.abs(mechanism.residuals(q)).max() for q in result["held/q"]) < 1e-12
 
 
+def test_a_mechanism_at_rest_stays_at_rest_until_its_friction_is_overcome() -> None:
+    """A crank that starts at rest: the other joints are free although their modes start at 0."""
+    robot = with_motor(four_bar(), "crank", coulomb_friction=BREAK)
+    weight = ab.Arm(with_motor(four_bar(), "crank")).gravload(np.zeros(3))[0]
+    assert 1.0 < weight < BREAK
+    builder = ab.DiagramBuilder("rest")
+    ramp = builder.add("ramp", blocks.Ramp(slope=10.0))
+    passive = builder.add("passive", blocks.Constant(value=(0.0, 0.0)))
+    torque = builder.add("torque", blocks.Mux(inputs=2), ramp, passive)
+    builder.add("held", blocks.ArmPlant(robot=robot), torque)
+    result = ab.simulate(builder.build(), stop_time=3.0)
+    begins = (BREAK + weight) / 10.0  # s
+    assert begins < 3.0
+    still = result.time < begins - 1e-3
+    assert not result["held/qd"][still, 0].any() and not result["held/q"][still, 0].any()
+    assert np.abs(result["held/qd"][still]).max() < 1e-14  # the others have rounding errors
+    assert (result["held/qd"][result.time > begins + 1e-2, 0] > 0.0).all()
+    holding = 10.0 * result.time[still] - weight
+    assert result["held/friction"][still, 0] == pytest.approx(holding, abs=1e-8)
+
+
 def test_a_crank_at_its_hard_stop_holds_the_mechanism() -> None:
     crank = Revolute(limits=JointLimits(position=(-1.2, 0.3)))
     robot = four_bar().with_link("crank", joint=crank)

@@ -416,8 +416,19 @@ class ArmPlant(Block):
         return SX(np.where(np.isfinite(limits), limits, 0.0))
 
     def _mode(self, x: Signals) -> SX:
-        """The friction modes (n,); 1 if no joint can be locked."""
-        return x["mode"] if self._lockable_joints() else SX.ones(self.robot.n)
+        """The friction modes (n,); 1 if no joint can be locked.
+
+        In closed loops the other joints are free from the start on: with all joints locked the equations of
+        the loops have no solution.
+        """
+        lockable = self._lockable_joints()
+        if not lockable:
+            return SX.ones(self.robot.n)
+        if self.robot.closures:
+            mode = SX.ones(self.robot.n)
+            mode[list(lockable)] = x["mode"][list(lockable)]
+            return mode
+        return x["mode"]
 
     def _contact(self, x: Signals) -> SX:
         """The contacts with the end stops (n,); 0 if there are no stops."""
