@@ -15,12 +15,15 @@ DOCUMENTED = {
     "bouncing_ball",
     "dc_motor_sampled_pid",
     "falling_pendulum",
+    "four_bar_spring",
     "kr180_pick_and_place",
     "kr180model",
+    "palletiser_cycle",
     "puma560_computed_torque",
     "puma560_multirate",
     "puma560_payload_drop",
     "robertson_kinetics",
+    "slider_crank",
     "stick_slip",
     "van_der_pol_pid",
 }
@@ -185,3 +188,36 @@ def test_stick_slip_has_its_analytical_period() -> None:
     clear = np.minimum(abs(phase - slips), np.minimum(phase, period - phase)) > 1e-6
     assert result["mass/v"][moves & clear] == pytest.approx(v[moves & clear], abs=1e-6)
     assert not result["mass/v"][~moves & clear].any()
+
+
+def test_the_four_bar_linkage_stays_closed_and_loses_the_energy_of_its_friction() -> None:
+    """The coupler and the rocker meet at the pin; energy decreases by the work of 0.05 N m s at the crank."""
+    result = ab.simulate("four_bar_spring")
+    robot = load_diagram("four_bar_spring", BLOCKS).blocks["linkage"].parameter_value("robot")
+    poses = ab.Arm(robot).link_poses(result["linkage/q"])
+    ends = [poses[:, k] @ (length, 0, 0, 1) for k, length in ((2, 0.9), (3, 0.7))]
+    np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-12)
+    power = 0.05 * result["linkage/qd"][:, 0] ** 2
+    work = np.concatenate(([0.0], np.cumsum((power[1:] + power[:-1]) / 2 * np.diff(result.time))))
+    total = result["total/y"]
+    np.testing.assert_allclose(total[0] - total, work, rtol=0, atol=5e-3)
+    assert total[-1] < total[0] - 0.4
+
+
+def test_the_slider_has_the_position_of_its_crank_and_sticks() -> None:
+    """x = 0.2 cos a + sqrt(0.5^2 - (0.2 sin a)^2) with the crank at a = q + 0.5 rad."""
+    result = ab.simulate("slider_crank")
+    angle = result["mechanism/q"][:, 0] + 0.5
+    expected = 0.2 * np.cos(angle) + np.sqrt(0.25 - 0.04 * np.sin(angle) ** 2)
+    np.testing.assert_allclose(result["position/x"], expected, rtol=0, atol=1e-10)
+    sticks = result["mechanism/qd"][:, 0] == 0.0
+    assert 10 < sticks.sum() < 400
+    assert np.abs(result["mechanism/friction"][sticks, 0]).max() <= 3.0 + 1e-9
+
+
+def test_the_tracking_error_of_the_palletiser_decays_as_designed() -> None:
+    """Gains 225 and 30: e = -0.02 (1 + 15 t) exp(-15 t) for all four axes."""
+    result = ab.simulate("palletiser_cycle")
+    t = result.time[:, np.newaxis]
+    expected = -0.02 * (1 + 15 * t) * np.exp(-15 * t) * np.ones(4)
+    np.testing.assert_allclose(result["error/y"], expected, rtol=0, atol=2e-6)
