@@ -39,7 +39,6 @@ from armblocks.face.assembly import Assembly, assemble, coordinates
 from armblocks.face.forward_simulation import ArmMotionResult, TorqueLaw, simulate_arm
 from armblocks.face.ikine_branches import IkineBranches
 from armblocks.face.ikine_result import IkineResult
-from armblocks.face.notebook_views import robot_view
 from armblocks.face.parametric import ParametricArm
 from armblocks.robot import FrictionModel, Link, Robot
 from armblocks.robot.dh_table import kinematics_text
@@ -489,4 +488,6 @@ class Arm(metaclass=ArgumentErrors):
 
     def _repr_html_(self) -> str:
         """The notebook view: a picture of the arm with all joints at zero, and its table."""
+        from armblocks.face.notebook_views import robot_view
+
         return robot_view(self.robot)

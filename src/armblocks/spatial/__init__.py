@@ -1,29 +1,8 @@
 """Rotations and rigid transforms: the geometry that descriptions and algorithms share."""
 
-from armblocks.spatial.conversions import (
-    angvec2r,
-    delta2tr,
-    eul2r,
-    eul2tr,
-    q2r,
-    qinterp,
-    qmul,
-    r2q,
-    r2t,
-    rpy2r,
-    rpy2tr,
-    rt2tr,
-    skew,
-    tr2adjoint,
-    tr2angvec,
-    tr2delta,
-    tr2eul,
-    tr2rpy,
-    trexp,
-    trinterp,
-    trlog,
-    vex,
-)
+from typing import TYPE_CHECKING
+
+from armblocks.lazy_exports import lazy_exports
 from armblocks.spatial.rotation import (
     IDENTITY3,
     Matrix3,
@@ -38,6 +17,60 @@ from armblocks.spatial.rotation import (
     vector3,
 )
 from armblocks.spatial.transform import Transform, transl, trotx, troty, trotz
+
+if TYPE_CHECKING:
+    from armblocks.spatial.conversions import (
+        angvec2r,
+        delta2tr,
+        eul2r,
+        eul2tr,
+        q2r,
+        qinterp,
+        qmul,
+        r2q,
+        r2t,
+        rpy2r,
+        rpy2tr,
+        rt2tr,
+        skew,
+        tr2adjoint,
+        tr2angvec,
+        tr2delta,
+        tr2eul,
+        tr2rpy,
+        trexp,
+        trinterp,
+        trlog,
+        vex,
+    )
+else:
+    __getattr__ = lazy_exports(
+        __name__,
+        {
+            "angvec2r": "armblocks.spatial.conversions",
+            "delta2tr": "armblocks.spatial.conversions",
+            "eul2r": "armblocks.spatial.conversions",
+            "eul2tr": "armblocks.spatial.conversions",
+            "q2r": "armblocks.spatial.conversions",
+            "qinterp": "armblocks.spatial.conversions",
+            "qmul": "armblocks.spatial.conversions",
+            "r2q": "armblocks.spatial.conversions",
+            "r2t": "armblocks.spatial.conversions",
+            "rpy2r": "armblocks.spatial.conversions",
+            "rpy2tr": "armblocks.spatial.conversions",
+            "rt2tr": "armblocks.spatial.conversions",
+            "skew": "armblocks.spatial.conversions",
+            "tr2adjoint": "armblocks.spatial.conversions",
+            "tr2angvec": "armblocks.spatial.conversions",
+            "tr2delta": "armblocks.spatial.conversions",
+            "tr2eul": "armblocks.spatial.conversions",
+            "tr2rpy": "armblocks.spatial.conversions",
+            "trexp": "armblocks.spatial.conversions",
+            "trinterp": "armblocks.spatial.conversions",
+            "trlog": "armblocks.spatial.conversions",
+            "vex": "armblocks.spatial.conversions",
+        },
+    )
 
 __all__ = [
     "IDENTITY3",
