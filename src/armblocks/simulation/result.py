@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 from os import PathLike
-from typing import TYPE_CHECKING, final
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, Protocol, final
 
 from armblocks.errors import counted
 from armblocks.simulation.export import save, to_dataframe
@@ -12,6 +14,14 @@ from armblocks.simulation.run_data import RunData
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+class SignalFigure(Protocol):
+    """A figure of signals, which notebooks show."""
+
+    def save(self, path: str | PathLike[str], *, theme: Literal["light", "dark"] | None = None) -> Path:
+        """Write a ``.svg``, ``.png`` or ``.pdf`` file atomically; returns the path."""
+        ...
 
 
 @final
@@ -41,6 +51,25 @@ class SimulationResult(RunData):
         Raises ``UnknownNameError`` for another suffix and ``FormatError`` if the file cannot be written.
         """
         save(self, path, jumps=jumps)
+
+    def plot(
+        self,
+        *names: str,
+        save: str | PathLike[str] | None = None,
+        theme: Literal["light", "dark"] | None = None,
+    ) -> SignalFigure:
+        """Draw signals over time, one panel each: ``result.plot("arm/q", "rne/tau", save="run.svg")``.
+
+        Without names, the first 12 signals. A notebook shows the figure at the end of a cell. ``save``: also
+        write a ``.svg``, ``.png`` or ``.pdf`` file. Angles are in degrees. Raises UnknownNameError for a
+        signal or a suffix that does not exist.
+        """
+        # The figures belong to a layer above this one.
+        figures: Any = importlib.import_module("armblocks.report.signal_figure")
+        figure: SignalFigure = figures.signal_figure(self, names, theme)
+        if save is not None:
+            figure.save(save, theme=theme)
+        return figure
 
     def __repr__(self) -> str:
         report = self.run
