@@ -60,7 +60,9 @@ def _sha256(data: bytes) -> bytes:
 def compiler_fingerprint() -> str:
     """A digest of the source files that determine the machine code."""
     package = Path(__file__).parent.parent
-    return _fingerprint(*(package / name for name in ("compiler", "routines", "integration")))
+    return _fingerprint(
+        *(package / name for name in ("compiler", "routines", "integration", "inverse_kinematics"))
+    )
 
 
 @cache

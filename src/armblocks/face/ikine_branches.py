@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.argument_errors import ArgumentErrors
+from armblocks.compiler import Kernel
 from armblocks.compiler.arguments import check_threads
 from armblocks.errors import InputError
 from armblocks.face.ikine_coordinates import dependent_excess
@@ -116,47 +117,59 @@ class ClosedForm:
     """
 
     robot: Robot
-    kernel: Callable[..., tuple[Array, Array, Array]]
+    kernel: Kernel
     chain: Chain
     solver: Solver
-    limits: Array
+    limits: tuple[Array, Array]
+    where: str
     iterate: Callable[[Array, Array | None], IkineResult]
 
     @classmethod
     def of(
         cls,
         robot: Robot,
-        kernel: Callable[..., tuple[Array, Array, Array]],
+        kernel: Kernel,
         iterate: Callable[[Array, Array | None], IkineResult],
     ) -> ClosedForm:
         """The solution with the kernel of ``trace_branches``. Raises RobotError for other arms."""
         from armblocks.dynamics.closed_form.trace import closed_solver
 
         chain, solver = closed_solver(robot)
-        return cls(robot=robot, kernel=kernel, chain=chain, solver=solver, limits=robot.qlim, iterate=iterate)
+        low, high = robot.qlim.T
+        return cls(
+            robot=robot,
+            kernel=kernel,
+            chain=chain,
+            solver=solver,
+            limits=(low - SLACK, high + SLACK),
+            where=f"ikine_all of robot '{robot.name}'",
+            iterate=iterate,
+        )
 
     def branches(self, T: Target, limits: object, tolerance: float, threads: int) -> IkineBranches:
         """The branches of an arm, see :meth:`armblocks.Arm.ikine_all`."""
-        robot, where = self.robot, f"ikine_all of robot '{self.robot.name}'"
+        robot, where = self.robot, self.where
         targets, batch = checked_poses(T, where)
-        q, errors, measures = self.kernel(targets, threads=check_threads(where, threads))
+        q, errors, measures = self.kernel.entry(targets, threads=check_threads(where, threads))
         has_pose = (errors[..., 0] <= tolerance) & (errors[..., 1] <= tolerance)
+        singular = measures < SINGULAR
         # Where a choice has infinitely many solutions, the one that was taken may not reach the position.
-        rest = np.flatnonzero(~has_pose.any(axis=1) & (measures < SINGULAR).any(axis=(1, 2)))
-        if rest.size:
+        rest = np.flatnonzero(~has_pose.any(axis=1))
+        if rest.size and (rest := rest[singular[rest].any(axis=(1, 2))]).size:
             found = self.iterate(targets[rest], None)
             q[rest, 0], has_pose[rest, 0] = found.q, found.success
             errors[rest, 0, 0], errors[rest, 0, 1] = found.position_error, found.rotation_error
         self._correct(targets, q, errors, has_pose)
-        inside = has_pose.copy()
-        for k, (low, high) in enumerate(self.limits):
-            inside &= (q[..., k] >= low - SLACK) & (q[..., k] <= high + SLACK)
+        low, high = self.limits
+        inside: NDArray[np.bool_] = has_pose.copy()
+        for k, (lowest, highest) in enumerate(zip(low, high)):
+            inside &= (q[..., k] >= lowest) & (q[..., k] <= highest)
         if robot.couplings:
             excess = dependent_excess(robot, q.reshape(-1, robot.nq))
             inside &= (excess <= 0.0).all(axis=-1).reshape(inside.shape)
         exists = inside if limits else has_pose
         q[~exists] = errors[~exists] = np.nan
-        arrays = (q, exists, has_pose & ~inside, errors[..., 0], errors[..., 1], measures < SINGULAR)
+        arrays = (q, exists, has_pose & ~inside, errors[..., 0], errors[..., 1], singular)
         values = arrays if batch else tuple(array[0] for array in arrays)
         return IkineBranches(
             q=values[0],

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.argument_errors import ArgumentErrors
+from armblocks.errors import ArgumentError
 
 Array = NDArray[np.float64]
 
@@ -64,11 +65,11 @@ class IkineResult(metaclass=ArgumentErrors):
         return partial(IkineResult, **self.__dict__), ()
 
     def __len__(self) -> int:
-        """The number of poses N. Raises TypeError for the result of one pose."""
+        """The number of poses N. Raises ArgumentError for the result of one pose."""
         return len(self._batch("len"))
 
     def __getitem__(self, index: int) -> IkineResult:
-        """The result of one pose of a batch. Raises TypeError for the result of one pose."""
+        """The result of one pose of a batch. Raises ArgumentError for the result of one pose."""
         self._batch("an index")
         values = {name: getattr(self, name)[index] for name in _BATCHED}
         for name, kind in (("success", bool), ("reason", str), ("iterations", int), ("restarts", int)):
@@ -76,9 +77,14 @@ class IkineResult(metaclass=ArgumentErrors):
         return IkineResult(**values, names=self.names)
 
     def explain(self) -> str:
-        """A sentence about the result of one pose. Raises TypeError for the result of a batch."""
+        """A sentence about the result of one pose. Raises ArgumentError for the result of a batch."""
         if not isinstance(self.reason, str):
-            raise TypeError("explain() is for the result of one pose. Fix: write result[k].explain().")
+            raise ArgumentError(
+                "explain() is for the result of one pose",
+                where="IkineResult",
+                allowed="a result without a leading axis",
+                fix="write result[k].explain()",
+            )
         error = f"{_length(float(self.position_error))}, {_angle(float(self.rotation_error))}"
         match self.reason:
             case "converged":
@@ -116,7 +122,12 @@ class IkineResult(metaclass=ArgumentErrors):
 
     def _batch(self, what: str) -> NDArray[np.str_]:
         if isinstance(self.reason, str):
-            raise TypeError(f"this is the result of one pose, without {what}. Fix: read its fields.")
+            raise ArgumentError(
+                f"this is the result of one pose, without {what}",
+                where="IkineResult",
+                allowed="the result of several poses",
+                fix="read its fields, such as result.q",
+            )
         return self.reason
 
 

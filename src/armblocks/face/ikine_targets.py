@@ -76,6 +76,8 @@ def checked_poses(T: Target, where: str) -> tuple[Array, bool]:
     Raises InputError for matrices that are not poses.
     """
     targets, batch = target_array(T, where)
+    if not batch and _is_exact(targets.tolist()):
+        return targets[np.newaxis], False
     targets = targets.reshape(-1, 4, 4)
     R = targets[:, :3, :3]
     x, y, z = (R[:, :, k].T for k in range(3))
@@ -92,6 +94,18 @@ def checked_poses(T: Target, where: str) -> tuple[Array, bool]:
         targets = targets.copy()
         targets[rounded, :3, :3] = U @ Vt
     return targets, batch
+
+
+def _is_exact(T: list[list[float]]) -> bool:
+    """Whether a matrix is a pose up to rounding, which for one matrix is faster without NumPy."""
+    (a, b, c, x), (d, e, f, y), (g, h, i, z), last = T
+    products = (
+        *(a * a + b * b + c * c - 1.0, d * d + e * e + f * f - 1.0, g * g + h * h + i * i - 1.0),
+        *(a * d + b * e + c * f, d * g + e * h + f * i, g * a + h * b + i * c),
+    )
+    volume = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    finite = (x + y + z) * 0.0 == 0.0
+    return max(map(abs, products)) <= ROUNDING and volume > 0.0 and finite and last == [0.0, 0.0, 0.0, 1.0]
 
 
 def _dot(a: Sequence[Array] | Array, b: Sequence[Array] | Array) -> Array:

@@ -19,6 +19,9 @@ from armblocks.routines.routine import Routine
 MIN_DAMPING = 1e-13
 """Damping of small errors, which keeps the pivots positive at singular configurations."""
 
+MAX_DAMPING = 0.3
+"""Damping of errors that are large compared with the arm. Translations without limits have such errors."""
+
 Matrix = Sequence[Sequence[Lanes]]
 """Rows of the Jacobian."""
 

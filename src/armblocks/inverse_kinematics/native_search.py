@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from armblocks.inverse_kinematics.damped_step import MIN_DAMPING, damped_step
+from armblocks.inverse_kinematics.damped_step import MAX_DAMPING, MIN_DAMPING, damped_step
 from armblocks.inverse_kinematics.layout import (
     ROWS,
     TARGET,
@@ -296,7 +296,8 @@ class _Search:
         stopped = self._states(
             cost, position, rotation, gradient < (self._setting(Setting.FLAT) * cost) * size
         )
-        damping = fma(self._setting(Setting.DAMPING), cost, MIN_DAMPING)
+        damping = self._setting(Setting.DAMPING) * cost
+        damping = select(damping > MAX_DAMPING, MAX_DAMPING, damping) + MIN_DAMPING
         damping = fma(self._setting(Setting.ROOT_DAMPING), square_root(cost), damping)
         dq = self._limited(damped_step(r, J, e, damping))
         for i in range(n):

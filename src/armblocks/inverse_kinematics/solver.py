@@ -32,8 +32,6 @@ MIN_TARGETS_PER_THREAD = 64
 MIN_SHARE = 16
 """Minimum number of targets of a share."""
 _NUMBERS, _COUNTS, _HAS_STARTS = int(Number.COUNT), int(Count.COUNT), int(Setting.HAS_STARTS)
-VERSION = "4"
-"""Changes with the code of the search, for the disk cache of machine code."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,7 +193,7 @@ class InverseKinematics:
     def _load(self, lanes: int) -> tuple[NativeCode, Callable[..., None], Callable[..., None]]:
         with self._lock:
             if lanes not in self._code:
-                key = (self.error.digest, self.integrate.digest, repr(self.sizes), str(lanes), VERSION)
+                key = (self.error.digest, self.integrate.digest, repr(self.sizes), str(lanes))
                 code = load_code(("inverse kinematics", *key), lambda: self._write(lanes))
                 pointers = [ctypes.c_void_p] * len(ARRAYS)
                 search = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3, *pointers)
