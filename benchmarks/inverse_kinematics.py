@@ -77,7 +77,8 @@ def peers(arm: ab.Arm, T: np.ndarray, names: tuple[str, ...]) -> dict:
 
 def iteration_rows() -> list[str]:
     rows = [
-        "| robot | solved | largest error | batch | one by one | ik_LM | its solved | its error | ratio |",
+        "| robot | solved | largest error | batch | one by one "
+        "| ik_LM | solved by ik_LM | error of ik_LM | ratio |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name in ROBOTS:
@@ -100,7 +101,7 @@ def iteration_rows() -> list[str]:
 
 
 def reason_rows() -> list[str]:
-    rows = ["| robot | poses out of reach, named so | time each |", "| --- | --- | --- |"]
+    rows = ["| robot | reported as out of reach | time each |", "| --- | --- | --- |"]
     for name in ROBOTS:
         arm = ab.load_robot(name)
         T = targets_of(arm, 1000)
@@ -116,7 +117,8 @@ def reason_rows() -> list[str]:
 
 def closed_rows() -> list[str]:
     rows = [
-        "| robot | branches | largest error | batch | one by one | EAIK | its batch | one by one | ratio |",
+        "| robot | branches | largest error | batch | one by one "
+        "| EAIK branches | EAIK batch | EAIK one by one | ratio |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name in CLOSED:

@@ -189,7 +189,7 @@ function runStarted(event: EventOf<'run_started'>): void {
   if (run?.run === event.run) {
     // Renames of blocks follow, as after the first time.
     const { channels, views, aliases, tunables } = event
-    runs.nameAgain(event)
+    runs.restoreSignalNames(event)
     useStudio.setState({ run: { ...run, channels, views, aliases, tunables } })
     return
   }

@@ -1,12 +1,12 @@
 /*
- * Keys that are pressed on the sheet while the result of an edit is awaited. They are kept and replayed when
- * the page shows the result, so that each key acts on the state that its user expects: a copy that was just
- * pasted, the new name of a block, the sheet inside a subsystem.
+ * Keys that are pressed on the sheet while the result of an edit is awaited. They are queued and replayed
+ * when the page shows the result. Each key then acts on the state that the user expects: a copy that was
+ * just pasted, the new name of a block, the sheet inside a subsystem.
  */
 
 /** Awaited operations. */
 let operations = 0
-/** Whether the server answers; without it, keys act at once and their edits are sent later. */
+/** Whether the server is connected; without it, keys act at once and their edits are sent later. */
 let connected = false
 let replaying = false
 const keys: KeyboardEvent[] = []

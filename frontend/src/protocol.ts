@@ -616,7 +616,9 @@ export interface AskOutline {
   document: string;
 }
 /**
- * Return the parameter sets of a model, and its values of their parameters and of those in ``also``.
+ * Return the parameter sets of a model.
+ *
+ * The reply also contains the values in the model of all parameters of the sets, and of those in ``also``.
  */
 export interface AskParameterSets {
   kind: "parameter_sets";

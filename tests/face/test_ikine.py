@@ -270,7 +270,7 @@ def test_wrong_options_are_refused(arguments: dict[str, object], message: str) -
 def test_names_of_frames_and_axes_are_checked() -> None:
     with pytest.raises(UnknownNameError, match="there is no frame named 'nose'"):
         arm_of("ur5").ikine(np.eye(4), frame="nose")
-    with pytest.raises(UnknownNameError, match="there is no axes of a mask named 'joint'"):
+    with pytest.raises(UnknownNameError, match="there is no choice of axes named 'joint'"):
         arm_of("ur5").ikine(np.eye(4), mask=[1] * 6, axes="joint")
 
 

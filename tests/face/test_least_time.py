@@ -47,7 +47,7 @@ def test_all_limits_hold_at_all_times_and_one_binds(name: str, blend: float | No
         [np.abs(tau) / limits["torque"], np.abs(qd) / limits["speed"], np.abs(qdd) / limits["acceleration"]]
     )
     assert ratios.max() <= 1.0 + 2e-3
-    # In each segment some limit is reached but for the change of a quantity within the segment.
+    # In each segment some limit is reached, up to the change of a quantity within the segment.
     of_segment = ratios.max(axis=1).reshape(5, -1).max(axis=0)
     assert np.quantile(of_segment, 0.03) > 0.97
     assert_allclose(path.q[[0, -1]], points[[0, -1]], atol=1e-12)
@@ -141,9 +141,7 @@ def test_speed_limits_alone_give_the_largest_speed_at_each_point() -> None:
 def test_motions_that_cannot_be_found_are_refused() -> None:
     arm = ab.load_robot("puma560")
     points = [[0, 0.2, 0, 0, 0, 0], [1, 0.4, 0, 0, 0, 0]]
-    with pytest.raises(
-        InputError, match=r"the path cannot be passed at 100 %.*joint 'link2' needs .* to hold"
-    ):
+    with pytest.raises(InputError, match=r"the path is infeasible at 100 %.*joint 'link2' needs .* to hold"):
         ab.least_time(arm, points, torque=20.0, speed=1.0)
     with pytest.raises(InputError, match="nothing limits the motion of the robot"):
         ab.least_time(one_joint(), [[0.0], [1.0]])

@@ -144,7 +144,7 @@ def test_units_of_headers_are_converted(tmp_path: Path) -> None:
     assert_allclose(path.t, [0.0, 1.0])
     assert_allclose(path.q[-1], [np.pi / 2, 0.5])
     (tmp_path / "units.csv").write_text("t,q1 [rev]\n0,0\n1,1\n")
-    with pytest.raises(InputError, match=r"a column has the unit 'rev'.*rates of rad, m, deg"):
+    with pytest.raises(InputError, match=r"a column has the unit 'rev'.*units of rad, m, deg"):
         ab.load_trajectory(tmp_path / "units.csv")
 
 

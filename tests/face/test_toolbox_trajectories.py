@@ -101,7 +101,7 @@ def test_lspb_has_the_three_phases_of_the_toolbox(t: Any, ratio: float | None) -
         expected = lspb_by_phases(q0[k], q1[k], times, mean[k] * (ratio or 1.5))
         assert_allclose(motion.q[:, k], expected[0], rtol=0, atol=1e-11)  # accelerations up to 2e4
         assert_allclose(motion.qd[:, k], expected[1], rtol=0, atol=1e-12)
-        # A sample may be at a jump but for rounding.
+        # A sample may be at a jump up to rounding.
         inside = np.abs(np.diff(expected[2], append=expected[2, -1])) == 0
         assert_allclose(motion.qdd[inside, k], expected[2][inside], rtol=1e-8, atol=1e-12)
     assert_array_equal(motion.q[:, 2], np.full(len(times), 0.4))
@@ -171,7 +171,7 @@ def test_jtraj_is_a_motion_at_any_time() -> None:
     ("call", "message"),
     [
         (lambda: ab.lspb(0, 1, 11, 0.05), "the speed 0.05 of joint 1 is too small.*0.1 to 0.2"),
-        (lambda: ab.lspb(0, 1, 11, 0.25), "the speed 0.25 of joint 1 is too big.*one to two times the mean"),
+        (lambda: ab.lspb(0, 1, 11, 0.25), "the speed 0.25 of joint 1 is too large.*one to two times"),
         (lambda: ab.lspb(0, 1, 11, -np.inf), "speed = .*a number above 0"),
         (lambda: ab.mtraj(lambda *_: 3, [0], [1], 5), "mtraj: the function returns int.*ab.lspb"),
         (lambda: ab.mstraj([[1.0]], None, None, [0.0], 0.1, 0.2), "qdmax and tsegment are both None"),

@@ -1,4 +1,4 @@
-"""Reports of trajectories: peaks, shares of limits, intervals of binding limits, the figure."""
+"""Reports of trajectories: peaks, utilisation of limits, intervals of binding limits, the figure."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ Signals = Mapping[str, np.ndarray]
 TOO_LARGE = 1e4
 """A diagram with larger signals counts as unstable, and is not compared."""
 SLOW_REFERENCE = 40.0
-"""A diagram whose run in the reference simulator takes longer is not judged, s of processor time."""
+"""Maximum processor time of a run in the reference simulator, s; slower diagrams are skipped."""
 
 
 class InconclusiveError(Exception):

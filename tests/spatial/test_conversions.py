@@ -193,7 +193,7 @@ def test_objects_of_spatialmath_are_accepted_and_returned(monkeypatch: pytest.Mo
         (lambda: spatial.tr2eul(np.eye(3), unit="grad"), "there is no unit of angles named 'grad'"),
         (lambda: spatial.rpy2r([0, 0]), r"the shape is \(2,\)"),
         (lambda: spatial.tr2rpy(np.eye(2)), r"the shape is \(2, 2\).*\(3, 3\) or \(4, 4\)"),
-        (lambda: spatial.tr2rpy(2 * np.eye(3)), "a matrix is no rotation: R'R differs"),
+        (lambda: spatial.tr2rpy(2 * np.eye(3)), "a matrix is not a rotation: R'R differs"),
         (lambda: spatial.tr2rpy(-np.eye(3)), "a determinant of 1"),
         (lambda: spatial.q2r([0, 0, 0, 0]), "a quaternion is 0 0 0 0"),
         (lambda: spatial.angvec2r(1.0, (0, 0, 0)), "the axis of a rotation is 0 0 0"),

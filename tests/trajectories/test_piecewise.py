@@ -108,7 +108,7 @@ def test_splines_equal_those_of_scipy() -> None:
 
 
 def least_duration(limits: list[float], distance: float, dt: float) -> float:
-    """The least time from rest to rest by a linear program on a grid: a lower bound but for the grid.
+    """The least time from rest to rest by a linear program on a grid: a lower bound up to the grid error.
 
     The highest limited derivative is constant in each step; the number of steps is found by bisection.
     """

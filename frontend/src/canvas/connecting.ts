@@ -4,7 +4,7 @@ import { freePort } from '../model/free_port'
 import { change, useStudio } from '../store'
 import { onEscape } from './pointer_drag'
 
-/** Ends the wait for Escape, which cancels the drag from a port. */
+/** Removes the listener for Escape, which cancels the drag from a port. */
 let escape = new AbortController()
 let cancelled = false
 

@@ -43,7 +43,7 @@ export function useSheetDrag(blocks: Record<string, SheetBlock>, notes: Record<s
   const [{ disconnected, insertable }, setEffect] = useState(NO_EFFECT)
   /** The effect of the drag, available before the next rendering. */
   const effect = useRef(NO_EFFECT)
-  /** Ends the wait for Escape, which cancels the drag. */
+  /** Removes the listener for Escape, which cancels the drag. */
   const escape = useRef(new AbortController())
   /** The wire into which a dragged block would be inserted. */
   const [targetWire, setTargetWire] = useState<string | null>(null)

@@ -51,7 +51,7 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
     <Modal
       opened
       onClose={onClose}
-      // A click beside the dialog, such as a missed one, does not discard typed values.
+      // An accidental click beside the dialog does not discard typed values.
       closeOnClickOutside={!changed.length}
       title={
         <Group gap="xs">
@@ -70,7 +70,7 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
         }}
         onKeyDown={(event) => {
           if (event.key !== 'Enter' || !(event.ctrlKey || event.metaKey) || event.shiftKey) return
-          // The key of the run: the typed values are part of the model that runs.
+          // Ctrl+Enter runs the model with the typed values.
           event.preventDefault()
           event.stopPropagation()
           void apply().then((done) => done && startOrResume())
@@ -101,7 +101,7 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
   )
 }
 
-/** Give the focus back at the end to the element that has it now. */
+/** When the dialog closes, return the focus to the element that had it when the dialog opened. */
 function useReturnedFocus(): void {
   const [previousFocus] = useState(() => document.activeElement)
   useEffect(

@@ -33,7 +33,7 @@ interface ShowMessage {
   arm: { path: string; scene: RobotScene; rest: number[][][]; drawing: string } | null
   /** A slider for each coordinate of the arm; null for a recorded motion. */
   joints?: { sliders: SliderOfJoint[]; q: number[] } | null
-  /** Whether the motion begins to play. */
+  /** Whether the playback starts automatically. */
   play?: boolean
 }
 

@@ -12,9 +12,9 @@ export interface SliderOfJoint {
 interface Joints {
   q: number[]
   poses: number[][][]
-  /** The number of received poses; it changes with the picture. */
+  /** The number of received poses; views are drawn again when it changes. */
   count: number
-  /** Whether Python answers. */
+  /** Whether the Python program is connected. */
   live: boolean
 }
 

@@ -71,7 +71,7 @@ export function onRunStarted(event: EventOf<'run_started'>, displayed: boolean):
   if (stored) {
     // After a reconnection the server sends its run again from the beginning.
     stored.samples.truncate(0)
-    nameAgain(event)
+    restoreSignalNames(event)
     if (displayed) showSamples(stored.samples)
     update(event.run, () => ({ state: 'running', tunings: [] }))
     return
@@ -102,7 +102,7 @@ export function onRunStarted(event: EventOf<'run_started'>, displayed: boolean):
 }
 
 /** Give the signals of a run the names that they had at its start. */
-export function nameAgain({ run, channels, aliases, views }: EventOf<'run_started'>): void {
+export function restoreSignalNames({ run, channels, aliases, views }: EventOf<'run_started'>): void {
   const stored = useRuns.getState().runs.find(({ key }) => key === run)
   stored?.samples.name(channels, aliases)
   update(run, () => ({ views }))

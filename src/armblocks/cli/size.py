@@ -41,8 +41,8 @@ def size(
 ) -> None:
     """Compare candidate motors and gears with the loads of a trajectory.
 
-    Each joint lists its candidates: the limit with the least margin, and the used parts of the limits of
-    speed, peak torque and RMS torque.
+    The table has a row for each joint and candidate: the limit with the smallest margin, and the utilisation
+    of the limits of speed, peak torque and RMS torque.
 
     Exit code 0: each joint has a candidate that passes, 1: some joint has none, 2: invalid input.
     """

@@ -34,7 +34,7 @@ def inherited_names(diagram: Diagram, sheet: str = "") -> dict[PortRef, str]:
 
 
 class _NameSearch:
-    """Follows a signal against its direction to the nearest name."""
+    """Searches upstream for the nearest name of a signal."""
 
     def __init__(self, diagram: Diagram) -> None:
         self.levels: dict[str, Diagram] = {"": diagram}

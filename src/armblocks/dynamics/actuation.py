@@ -1,7 +1,7 @@
 """Inverse dynamics of robots with constraints: the torques of the joints that have a motor.
 
 The torques of a tree, ``tau_tree``, are shared between motors and constraints: ``tau_tree = tau + J' λ`` with
-``Z' tau = 0`` for the directions Z in which no motor turns: the joints without a motor. These equations
+``Z' tau = 0`` for the directions Z in which no motor moves: the joints without a motor. These equations
 determine the multipliers λ.
 Source: Featherstone, *Rigid Body Dynamics Algorithms*, 8.12 (inverse dynamics of closed loops); Nakamura and
 Ghodoussi, *Dynamics computation of closed-link robot mechanisms*, IEEE Trans. Robotics and Automation 1989.
@@ -100,7 +100,7 @@ def of_motors(trace: Callable[[Robot], TracedFunction]) -> TorqueTrace:
 
 
 def directions_without_motor(robot: Robot) -> Array:
-    """A basis Z (n, k) of the speeds at which no motor turns, for the motors of all joints of the tree.
+    """A basis Z (n, k) of the speeds at which no motor moves, for the motors of all joints of the tree.
 
     Motors of joints that couplings determine are included. The directions are single coordinates (a column
     has one entry 1) unless a motor is at a joint that depends on several coordinates without motors.

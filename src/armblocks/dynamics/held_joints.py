@@ -199,7 +199,7 @@ def locked_joints(
 ) -> JointModes:
     """The locked joints, and the sliding directions of the others.
 
-    ``driving`` is the torque (n,) at the joints without dry friction and rigid stops; ``start`` is the
+    ``driving`` is the torque (n,) at the joints without Coulomb friction and hard stops; ``start`` is the
     initial guess. A moving joint slides. Of the joints at rest, those beyond their friction limit are
     released, and those that would slide against their direction are locked; this is repeated as many times as
     there are joints. (The accelerations minimise 1/2 qdd' M qdd - qdd' (torque - bias) + sum of friction

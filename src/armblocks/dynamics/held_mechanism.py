@@ -189,8 +189,8 @@ def check_lockable(robot: Robot, lockable: Sequence[int], near: Array | None, wh
     names = ", ".join(f"'{robot.speeds[k].name}'" for k in lockable)
     dof = robot.nv - len(relations)
     raise RobotError(
-        f"dry friction or hard stops act at the joints {names}, which are not independent: the mechanism has "
-        f"{counted(dof, 'degree', 'degrees')} of freedom",
+        f"Coulomb friction or hard stops act at the joints {names}, which are not independent: the mechanism "
+        f"has {counted(dof, 'degree', 'degrees')} of freedom",
         where=where,
         allowed="joints that determine the others, at most as many as degrees of freedom, so that the forces "
         "at rest are unique",

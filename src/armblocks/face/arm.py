@@ -176,7 +176,7 @@ class Arm(metaclass=ArgumentErrors):
 
     @cached_property
     def hessian0(self) -> FrameFunction:
-        """``hessian0(q)`` → H (n, 6, n): ``H[k]`` is the derivative of ``jacob0`` for a unit speed k."""
+        """``hessian0(q)`` → H (n, 6, n): derivatives ``H[k]`` of ``jacob0`` for unit speeds ``qd[k]``."""
         return self._code.framed("hessian0")
 
     def maniplty(self, q: ArrayLike, kind: str = "yoshikawa", axes: str = "all") -> Array:
@@ -264,20 +264,20 @@ class Arm(metaclass=ArgumentErrors):
         """Find coordinates q (nq,) with ``fkine(q) = T`` by iteration, for one pose or for N.
 
         ``T``: the pose of the tool in the world, m: a :class:`Transform`, (4, 4), (N, 4, 4), a list of
-        Transforms, or an SE3 of spatialmath. ``q0`` (nq,) or (N, nq): the first start; the solution has
-        the whole turns nearest to it. Without ``q0`` and after a failure, the search starts from ``restarts``
-        configurations of a random table, in the order of the distance of their poses from the target.
-        ``seed`` selects the table. Results are the same for a pose alone and in any batch.
+        Transforms, or an SE3 of spatialmath. ``q0`` (nq,) or (N, nq): the first start; of angles that differ
+        by whole turns, the solution has those nearest to it. Without ``q0`` and after a failure, the search
+        starts from ``restarts`` configurations of a random table, in the order of the distance of their poses
+        from the target. ``seed`` selects the table. Results are the same for a pose alone and in any batch.
 
         ``mask``: six numbers; 0 for a direction in which the pose may differ: x, y, z, then rotations about
-        x, y, z, in the ``axes`` of the ``"tool"`` at the target, or of the ``"world"``. An arm with fewer
-        than six joints and without a mask reaches only poses that it can reach exactly; the result of other
-        poses is the nearest one. ``limits``: whether solutions satisfy the limits of the joints. ``frame``:
-        as for ``fkine``. ``tolerance``: the largest error of a solution in m and in rad.
+        x, y, z, in the ``axes`` of the ``"tool"`` at the target, or of the ``"world"``. Without a mask, an
+        arm with fewer than six joints has solutions only for poses whose six components it reaches; for other
+        poses the result is the nearest pose. ``limits``: whether solutions satisfy the limits of the joints.
+        ``frame``: as for ``fkine``. ``tolerance``: the largest error of a solution in m and in rad.
 
-        The result says why there is no solution: :class:`IkineResult`. Method: damped least squares, with
-        joints held at their limits (Chan and Lawrence 1988; Sugihara, IEEE T-RO 27, 2011). Raises InputError
-        for targets that are not poses, RobotError for robots with closed loops.
+        The result has the reason if there is no solution: :class:`IkineResult`. Method: damped least squares,
+        with joints held at their limits (Chan and Lawrence 1988; Sugihara, IEEE T-RO 27, 2011). Raises
+        InputError for targets that are not poses, RobotError for robots with closed loops.
         """
         return self._inverse.call(mask, limits, frame, axes, tolerance, restarts, seed)(T, q0, threads)
 
@@ -457,7 +457,7 @@ class Arm(metaclass=ArgumentErrors):
         return arm_views.animate(self, q, dt, save=save, block=block, **appearance, **film)
 
     def teach(self, q: ArrayLike | None = None, *, block: bool = False) -> Any:
-        """Move the joints by sliders, from ``q`` (nq,) on: :meth:`plot` without a motion.
+        """Show the arm at ``q`` (nq,) with a slider for each joint, as :meth:`plot` without a motion.
 
         ``view = arm.teach()``; ``view.q`` are the present coordinates, which can also be set. Robots with
         closed loops stay closed. ``arm.teach(block=True).q`` waits until the page is closed.

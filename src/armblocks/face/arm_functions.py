@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 class ConfigurationFunction(Protocol):
-    """``f(q)``: ``q`` (nq,) or (N, nq); one result, or N of them stacked. ``out`` receives the result."""
+    """``f(q)``: ``q`` (nq,) or (N, nq); one or N results. ``out`` receives the result."""
 
     def __call__(self, q: ArrayLike, *, out: Array | None = None, threads: int = 1) -> Array: ...
 

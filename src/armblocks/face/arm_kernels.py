@@ -33,7 +33,7 @@ _OPTIONS = ("wrench", "payload", "out", "threads")
 class ArmKernels:
     """The kernels of a robot, compiled at first use; ``near``: as for :class:`armblocks.Arm`.
 
-    ``maker``: how pickled functions make their arm again.
+    ``maker``: the function and arguments by which pickled functions create their arm.
     """
 
     def __init__(

@@ -20,7 +20,7 @@ ROWS = {"all": slice(0, 6), "trans": slice(0, 3), "rot": slice(3, 6)}
 """Rows of the Jacobian by the name of the axes: linear, angular, or both."""
 KINDS = ("yoshikawa", "asada", "condition", "smallest")
 RANK = 1e-12
-"""Singular values below this part of the largest one are zero."""
+"""Singular values below this fraction of the largest one are zero."""
 
 
 class _Function(Protocol):
@@ -32,7 +32,8 @@ class Ellipsoid(metaclass=ArgumentErrors):
     """Ellipsoids of velocities or forces: ``radii`` (m,), descending, and unit ``directions`` (m, m).
 
     ``directions[:, k]`` is the direction of ``radii[k]``, in world axes. For N configurations the arrays have
-    N in front. A radius is infinite where an arm carries any force without torques.
+    a leading axis of N. A radius of forces is infinite in directions in which the arm balances any force
+    without torques.
     """
 
     radii: Array

@@ -118,5 +118,5 @@ def checked_options(
 def check_axes(axes: object, where: str) -> str:
     """The axes of a mask. Raises UnknownNameError."""
     if axes not in MASK_AXES:
-        raise UnknownNameError("axes of a mask", str(axes), MASK_AXES, where=where)
+        raise UnknownNameError("choice of axes", str(axes), MASK_AXES, where=where)
     return str(axes)

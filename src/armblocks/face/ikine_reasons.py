@@ -152,7 +152,7 @@ class Reasons:
         return np.maximum(np.maximum(self.prepared.lowest - q, q - self.prepared.highest), 0.0)
 
     def _find_nearest(self) -> None:
-        """Find the nearest poses of the remaining targets, and say why they are the nearest ones."""
+        """Find the nearest poses of the remaining targets, and the reasons why these are not solutions."""
         for damping in CURVATURES:
             # Those beyond limits have a reason, but their nearest pose within the limits is needed too.
             rows = np.flatnonzero(~self.success) if damping == CURVATURES[0] else self._open()

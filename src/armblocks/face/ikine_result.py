@@ -30,12 +30,12 @@ class IkineResult(metaclass=ArgumentErrors):
     ``success``: whether ``q`` is a solution, within the tolerance and the limits. ``reason``:
 
     - ``"converged"``: ``q`` is a solution;
-    - ``"limits"``: there are solutions only beyond the limits of joints; ``excess`` (nq,) rad or m says by
-      how much one of them exceeds the limits of each coordinate;
+    - ``"limits"``: there are solutions only beyond the limits of joints; ``excess`` (nq,) rad or m: by
+    how much one of them exceeds the limits of each coordinate;
     - ``"out of reach"``: no configuration has this pose; ``position_error`` and ``rotation_error`` are those
       of the nearest pose, and ``lost_direction`` is the direction from there to the target;
     - ``"singular"``: ``q`` is near a solution, where the arm cannot move along ``lost_direction``;
-    - ``"steps"``: the search did not come to an end within its steps.
+    - ``"steps"``: the maximum number of iterations was reached.
 
     ``position_error`` m and ``rotation_error`` rad of ``q``, without the components that a mask leaves out;
     ``iterations``: evaluations of the kinematics; ``restarts``: starts after the first one.

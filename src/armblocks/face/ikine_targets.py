@@ -113,7 +113,7 @@ def _dot(a: Sequence[Array] | Array, b: Sequence[Array] | Array) -> Array:
 
 
 def raise_invalid_target(T: Array, index: int | None, where: str) -> None:
-    """Raise an InputError that says why the matrix ``T`` (4, 4) is not a pose."""
+    """Raise an InputError with the reason why the matrix ``T`` (4, 4) is not a pose."""
     name = "the target" if index is None else f"target {index}"
     allowed, fix = "a homogeneous matrix [R p; 0 0 0 1]", "give the pose of a frame in the world"
     if not np.isfinite(T).all():

@@ -28,9 +28,10 @@ _ROUNDING = 1e-12
 """Torques that are smaller, relative to their terms, are rounding errors."""
 _QUARTERS = np.array([0.25, 0.75])
 _SMALL, _ACCEPTED = 8e-4, 2e-2
-"""Excess over a limit between grid points, relative to it: without correction, and without an error."""
+"""Excess over a limit between grid points, relative to the limit: from the first, the limits are corrected;
+from the second, an error is raised."""
 _ROUNDS, _CORRECTION = 8, 1.3
-"""Number of corrections of the limits, and their part of the excess."""
+"""Maximum number of corrections of the limits, and the fraction of the excess that each one corrects."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,20 +58,20 @@ def least_time(
     """The fastest motion of ``arm`` from rest to rest along the path through ``points`` (K, n).
 
     The path is the cubic spline through the points; with ``blend``, straight lines in joint space with
-    parabolas at the inner points, which replace this part (0 to 0.5) of the shorter adjacent line. ``speed``,
-    ``acceleration``, ``torque``: greatest magnitudes, numbers or (n,), in rad or m, s, N m or N. By default
-    speeds and torques have the limits of the robot, and accelerations have none. ``payload``: a
+    parabolas at the inner points. A parabola replaces this fraction (0 to 0.5) of the shorter adjacent line.
+    ``speed``, ``acceleration``, ``torque``: greatest magnitudes, numbers or (n,), in rad or m, s, N m or N.
+    By default speeds and torques have the limits of the robot, and accelerations have none. ``payload``: a
     :class:`Payload`, or a mass (kg) at the tool. ``grid``: least number of segments of the path; ``dt``: time
     between samples, s.
 
     Torques are those of ``arm.rne``: rigid bodies, payload, rotor inertia, gravity, viscous and Coulomb
     friction of the motion. Source: Pham and Pham, A new approach to time-optimal path parameterization based
     on reachability analysis, IEEE Trans. Robotics 2018; viscous friction and the limits between grid points
-    are added by iteration. The acceleration jumps at each segment of the grid. Of separate speed intervals at
-    a point, which strong viscous friction can cause, only the slowest one is used.
+    are added by iteration. The acceleration jumps at each segment of the grid. Strong
+    viscous friction can cause separate intervals of feasible speeds; only the slowest interval is used.
 
-    Raises InputError where a point of the path cannot be passed, with the joint whose torque does not
-    suffice, and for paths without a limit; RobotError for robots with ball joints or closed loops. Warns of
+    Raises InputError for a path that is infeasible, with the joint whose torque is too small, and for paths
+    without a limit; RobotError for robots with ball joints or closed loops. Warns of
     positions outside the limits of the joints, which a spline may pass between the points.
     """
     where = "least_time"
@@ -203,7 +204,7 @@ def path_through(points: Array, limits: MotionLimits, blend: float | None) -> Pi
         raise InputError(
             f"blend = {blend!r}",
             where="least_time",
-            allowed="a number above 0 and up to 0.5: the part of a line that a blend replaces",
+            allowed="a number above 0 and up to 0.5: the fraction of a line that a blend replaces",
             fix="leave out blend for a path through the points",
         )
     return blended_path(points, scale, blend)
@@ -302,7 +303,7 @@ def _torque_terms(arm: Arm, points: _GridPoints, payload: Payload | float | None
     d = once - gravity - coulomb - b
     d[np.abs(d) <= _ROUNDING * (np.abs(once) + np.abs(gravity))] = 0.0
     a, b, c, d = (points.at(values) for values in (a - gravity, b, gravity + coulomb, d))
-    # A joint that turns at a grid point has the direction of the segment.
+    # A joint that reverses at a grid point has the direction of the segment.
     still = np.abs(points.at(first)) <= 1e-12 * np.abs(first).max()
     if still.any():
         middle = first[points.index[1]]
@@ -312,7 +313,7 @@ def _torque_terms(arm: Arm, points: _GridPoints, payload: Payload | float | None
 
 
 def _coulomb(arm: Arm, qd: Array) -> Array:
-    """The part of the friction that depends on the signs of the speeds; the other part is linear in them."""
+    """The Coulomb friction, without the viscous friction, which is linear in the speeds."""
     once, twice = np.split(arm.friction(np.concatenate([qd, 2.0 * qd])), 2)
     return 2.0 * once - twice
 
@@ -346,7 +347,7 @@ def _raise_impassable(
     s: Array,
     index: int,
 ) -> None:
-    """Raise InputError for a grid point that admits no speed, with the torques that hold the arm there."""
+    """Raise InputError for an infeasible grid point, with the torques that hold the arm there."""
     q = path.at(s[index]).q
     zero = np.zeros_like(q)
     holding = _torque(arm, q, zero, zero, payload)
@@ -356,7 +357,7 @@ def _raise_impassable(
     name = arm.robot.joint_names[k] if len(arm.robot.joint_names) == arm.n else f"joint {k + 1}"
     share = (s[index] - s[0]) / (s[-1] - s[0])
     raise InputError(
-        f"the path cannot be passed at {100 * share:.0f} % of its length: there joint '{name}' needs "
+        f"the path is infeasible at {100 * share:.0f} % of its length: there joint '{name}' needs "
         f"{abs(holding[k]):.4g} to hold the arm and {friction[k]:.4g} against friction",
         where="least_time",
         allowed=f"torques (N m, N) up to {limits.torque[k]:.4g}",

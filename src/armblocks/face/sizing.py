@@ -47,7 +47,7 @@ _TEXT_COLUMNS = (
 class SizingReport(metaclass=ArgumentErrors):
     """The loads of all candidate drives of an arm over a cycle. ``print`` shows the comparison as a table.
 
-    ``loads``: joint after joint, each with its candidates.
+    ``loads``: in the order of the joints, and of the candidates of each joint.
     """
 
     name: str
@@ -69,7 +69,7 @@ class SizingReport(metaclass=ArgumentErrors):
         return found
 
     def table(self) -> list[dict[str, float | str]]:
-        """One row for each joint and drive; parts of limits in %, NaN for limits that are not given."""
+        """One row for each joint and drive; utilisation of limits in %, NaN for limits that are not given."""
         return [_row(load) for load in self.loads]
 
     def csv(self) -> str:
@@ -134,11 +134,12 @@ def size_drives(
 ) -> SizingReport:
     """Compare candidate motors and gears for a cycle: the trajectory and a ``pause`` (s) at its end.
 
-    The torque of a motor is that of the rigid bodies with the ``payload`` (a :class:`Payload`, or kg at the
-    tool) and gravity, through the efficiency of the gear, and the inertia and friction of the drive itself.
+    The torque of a motor is the torque of gravity and of the rigid bodies with the ``payload`` (a
+    :class:`Payload`, or kg at the tool), converted by the ratio and efficiency of the gear, plus the torques
+    of inertia and friction of the drive itself.
     The motors of the robot's file are replaced by the candidates. In the pause the motor holds the arm, or
-    its brake does (``brakes_in_pause``) and the torque is 0. The brake must hold the largest weight of all
-    positions of the motion.
+    its brake does (``brakes_in_pause``) and the torque is 0. The brake must hold the largest gravity
+    torque of the motion.
 
     Raises InputError without a drive for some joint or for an unknown joint of a drive; RobotError for robots
     with closed loops, ball joints, or motors at joints that depend on others.
@@ -321,6 +322,6 @@ def _page(report: SizingReport, figures: dict[str, Picture]) -> str:
         f'<style>{page_css()}</style></head><body><header class="top"><h1>{title}</h1>'
         f'<p class="lead">{escape(report.heading)}</p></header><main><section><h2>Suggested drives</h2>'
         f"<ul>{chosen}</ul></section><section><h2>All candidates</h2>"
-        f"{html_table('Used parts of the limits; a drive fails above 100 %', heads, rows)}</section>"
+        f"{html_table('Utilisation of the limits; a drive fails above 100 %', heads, rows)}</section>"
         f'<section><h2>Torque over speed</h2><div class="pair">{drawn}</div></section></main></body></html>\n'
     )

@@ -68,8 +68,8 @@ def tpoly(
 
     It differs from :func:`jtraj` in the meaning of a number of samples N: the times are 0, 1 … N - 1, and
     rates are per sample, in releases 9 and 10 and in roboticstoolbox-python (``quintic``). ``t`` (N,): times
-    in s from 0. ``qd0``, ``qdf`` (n,): speeds at the ends, zero by default. The toolbox has one joint, here
-    ``q0`` and ``qf`` are numbers or (n,).
+    in s from 0. ``qd0``, ``qdf`` (n,): speeds at the ends, zero by default. The toolbox supports one joint;
+    here ``q0`` and ``qf`` are numbers or (n,).
     """
     start, goal = ends_of(q0, qf, "tpoly")
     times = sample_times(t, "tpoly", step=1.0)
@@ -84,7 +84,7 @@ def lspb(q0: ArrayLike, qf: ArrayLike, t: ArrayLike | int, speed: ArrayLike | No
     or (n,), between one and two times the mean speed; its sign is ignored, as in release 10 (release 9.4
     compares it with the sign). By default it is 1.5 times the mean speed, which gives three equal parts. All
     joints end at the same time. At a time at which the acceleration jumps, the table has the value before the
-    jump, as in the toolbox. Raises InputError for a speed that is too small or too big.
+    jump, as in the toolbox. Raises InputError for a speed that is too small or too large.
     """
     start, goal = ends_of(q0, qf, "lspb")
     times = sample_times(t, "lspb", step=1.0)
@@ -159,8 +159,8 @@ def mstraj(
     The motion passes near the inner points and ends at the last one. As in releases 9 and 10, the durations
     of blends and, for given ``qdmax``, of segments are rounded up to multiples of ``dt``, a segment takes at
     least two blends, and its speed is the distance between the points divided by its duration. The table also
-    has the start, which the toolbox leaves out. A duration that is a multiple of ``dt`` but for rounding is
-    not lengthened.
+    has the start, which the toolbox leaves out. A duration that is a multiple of ``dt``
+    up to rounding is not lengthened.
     """
     via = via_points("points", points, "mstraj", least=1 if q0 is not None else 2)
     start, via = (via[0], via[1:]) if q0 is None else (joint_vector("q0", q0, "mstraj"), via)

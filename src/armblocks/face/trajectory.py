@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _JUMP = 1e-9
-"""Rates that differ by less, relative to the greatest one, are continuous between two pieces."""
+"""Derivatives that differ by less, relative to the largest one, are continuous between two pieces."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class JointTrajectory(metaclass=ArgumentErrors):
-    """Samples of a joint motion: ``t`` (N,) s, ``q`` (N, n) rad or m, ``qd`` and ``qdd`` (N, n) its rates.
+    """Samples of a joint motion: ``t`` (N,) s, ``q`` (N, n) rad or m, derivatives ``qd`` and ``qdd`` (N, n).
 
     ``trajectory(t)`` is the motion at any time. Without a ``curve`` from a function such as ``jtraj``, it is
     between two samples the quintic that has their positions, speeds and accelerations.
@@ -115,9 +115,9 @@ class JointTrajectory(metaclass=ArgumentErrors):
     def rows(self) -> Array:
         """The motion as a table (M, 1 + 3 n) of t, q, qd, qdd, from which quintics reproduce it.
 
-        The rows are the ends of its polynomials; two rows with one time are a jump of a rate. This is the
-        parameter of the block :class:`~armblocks.blocks.Trajectory`. It is exact for all trajectories up to
-        the fifth degree.
+        The rows are the ends of its polynomials; two rows with one time are a jump of a derivative. This is
+        the parameter of the block :class:`~armblocks.blocks.Trajectory`. It is exact for all trajectories up
+        to the fifth degree.
         """
         starts, ends = self._curve.pieces()
         times = self._curve.times

@@ -73,7 +73,7 @@ def _factor(unit: str, where: str) -> float:
         raise InputError(
             f"a column has the unit '{unit}'",
             where=where,
-            allowed=f"rates of {', '.join(name for name in _UNITS if name)} per s, or no unit for rad or m",
+            allowed=f"units of {', '.join(name for name in _UNITS if name)}, per s for speeds, or no unit",
             fix="convert the column, or correct its header",
         )
     return _UNITS[position]

@@ -1,4 +1,4 @@
-"""The report of a trajectory: cycle time, peaks against limits, and which limit binds when."""
+"""The report of a trajectory: cycle time, peaks against limits, and the binding limit at each time."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from armblocks.report.charts.time_chart import Panel, Trace, time_chart
 Array = NDArray[np.float64]
 
 BINDING = 0.95
-"""Part of a limit from which on it counts as binding."""
+"""Fraction of a limit from which it counts as binding."""
 _SHORT = 0.01
-"""Part of the cycle time below which intervals are left out."""
+"""Fraction of the cycle time below which intervals are left out."""
 _SAMPLES = 1000
 _MAX_TEXT_INTERVALS = 12
 _QUANTITIES = ("speed", "acceleration", "torque")
@@ -104,7 +104,7 @@ class TrajectoryReport(metaclass=ArgumentErrors):
 
     @property
     def binding(self) -> tuple[BindingInterval, ...]:
-        """The times in which a limit binds: the quantity nearest to its limit, from 95 % of the limit on.
+        """The times in which a limit binds: the quantity nearest to its limit, from 95 % of the limit.
 
         Interruptions and intervals of less than 1 % of the cycle time are left out.
         """
@@ -131,7 +131,7 @@ class TrajectoryReport(metaclass=ArgumentErrors):
         return tuple(shown)
 
     def table(self) -> list[dict[str, float | str]]:
-        """One row for each joint: peaks in rad or m, s, N m or N, and their parts of the limits in %."""
+        """One row for each joint: peaks in rad or m, s, N m or N, and in % of the limits."""
         peaks = {"speed": self.qd, "acceleration": self.qdd, "torque": self.tau}
         shares = 100.0 * self.ratios.max(axis=0)
         rows: list[dict[str, float | str]] = []
@@ -210,7 +210,7 @@ def trajectory_report(
     torque: ArrayLike | None = None,
     payload: Payload | float | None = None,
 ) -> TrajectoryReport:
-    """The report of a trajectory of ``arm``: cycle time, peaks against limits, and which limit binds when.
+    """The report of a trajectory of ``arm``: cycle time, peaks and limits, the binding limit at each time.
 
     The limits are those of :func:`~armblocks.least_time`; torques are those of ``arm.rne`` with the
     ``payload``. Raises InputError for a trajectory with another number of joints.

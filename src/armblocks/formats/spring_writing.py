@@ -40,5 +40,5 @@ def line_springs(robot: Robot) -> list[LineSpring]:
 def warn_of_springs(robot: Robot, names: list[str], format: str) -> None:
     """Warn of springs that the file does not contain."""
     if names:
-        what = f"springs that are not part of the {format} file, so that its dynamics are others: "
+        what = f"springs that are not part of the {format} file, so that its dynamics differ: "
         warn_of_loss(f"robot '{robot.name}'", what + ", ".join(f"'{name}'" for name in names))

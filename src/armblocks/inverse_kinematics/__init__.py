@@ -1,1 +1,1 @@
-"""Iterative inverse kinematics of any traced pose error, as native code over batches. It knows no robot."""
+"""Iterative inverse kinematics of any traced pose error, independent of robots: native code over batches."""

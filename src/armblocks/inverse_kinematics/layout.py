@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 TARGET = 16
-"""Numbers of a target: a homogeneous matrix, row by row."""
+"""Number of doubles of a target: a homogeneous matrix in row-major order."""
 ROWS = 6
 """Rows of the error: three of the position, three of the rotation."""
 POSE = 12
-"""Numbers of a pose in the table of starts: the first three rows of the matrix."""
+"""Number of doubles of a pose in the table of starts: the first three rows of the matrix."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,7 +28,7 @@ class SearchSizes:
 
 
 class Setting(IntEnum):
-    """Places of the settings, which are doubles."""
+    """Indices of the settings, which are doubles."""
 
     POSITION_TOLERANCE = 0
     """Square of the largest position error of a solution, m²."""
@@ -72,7 +72,7 @@ class Limit(IntEnum):
 
 
 class Number(IntEnum):
-    """Places of the results that are doubles."""
+    """Indices of the results that are doubles."""
 
     POSITION_ERROR = 0
     ROTATION_ERROR = 1
@@ -82,7 +82,7 @@ class Number(IntEnum):
 
 
 class Count(IntEnum):
-    """Places of the results that are integers."""
+    """Indices of the results that are integers."""
 
     STATUS = 0
     STEPS = 1

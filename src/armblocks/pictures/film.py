@@ -1,7 +1,7 @@
 """Films: frames of equal size, encoded as GIF (by Pillow) or as MP4 (by ffmpeg).
 
-A film is written frame by frame to a temporary file, which is renamed when the film is complete. The memory
-is that of a few frames. After an error or Ctrl-C, an existing file of that name is unchanged.
+A film is written frame by frame to a temporary file, which is renamed when the film is complete. Only a few
+frames are in memory. After an error or Ctrl-C, an existing file of that name is unchanged.
 """
 
 from __future__ import annotations
@@ -136,7 +136,7 @@ def _mp4(file: GrowingFile, first: Pixels, rate: float) -> Generator[None, Pixel
         codec="libx264",
         macro_block_size=2,
         ffmpeg_log_level="error",
-        # The index is at the begin of the file, so that browsers can play it while it is loaded.
+        # The index is at the beginning of the file, so that browsers can play it while it is loaded.
         output_params=["-crf", "18", "-preset", "medium", "-movflags", "+faststart", "-f", "mp4"],
     )
     try:

@@ -4,9 +4,9 @@ With the path ``q(s)``, its speed ``y = ds/dt``, ``x = y^2`` and ``u = d²s/dt²
 torque or an acceleration) is ``a u + b x + d y + c``. In a segment of the grid ``u`` is constant, so ``u =
 (x1 - x0) / (2 h)``. Each limit holds at both ends of each segment, with the values of this segment.
 
-``d y`` is viscous friction. It is linear in the speed and not in ``x``; it is replaced by its tangent at the
-speed of the previous solution, and the solutions are repeated until they do not change: Newton's iteration.
-Where this tangent admits no motion, the iteration continues at half the speed.
+``d y`` is viscous friction. It is linear in the speed and not in ``x``. Newton's iteration replaces it by its
+tangent at the speed of the previous solution until the solution does not change.
+Where no motion is feasible with this tangent, the iteration continues at half the speed.
 
 In the middle of a segment the quantities may exceed their limits by terms of second order in h. The limits of
 such a segment are reduced by the excess, and the solution is repeated. All iterations are native code.
@@ -61,7 +61,7 @@ class Limits:
 
 @dataclass(frozen=True, kw_only=True)
 class Solution:
-    """Squared path speeds (N + 1,), or the index of a grid point that the path cannot pass.
+    """Squared path speeds (N + 1,), or the index of an infeasible grid point.
 
     ``excess``: the greatest excess in the middle of a segment, relative to the limits.
     """
@@ -240,7 +240,7 @@ def _solve(
 ) -> Integer:
     """Fill ``x`` and ``result``: greatest excess, number of iterations, two numbers of working memory.
 
-    Returns -1, or the index of an impassable point.
+    Returns -1, or the index of an infeasible point.
     """  # fmt: skip
     fill, reduce = r.program.define(_fill_lines), r.program.define(_reduce_limits)
     back, forth = r.program.define(backward), r.program.define(forward)

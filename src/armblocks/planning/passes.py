@@ -48,7 +48,7 @@ class Rows(NamedTuple):
 
 
 class Profile(NamedTuple):
-    """Squared path speeds (N + 1,) at the grid points, or ``failed``: a grid point that admits no speed."""
+    """Squared path speeds (N + 1,) at the grid points, or ``failed``: an infeasible grid point."""
 
     x: Array
     failed: int | None

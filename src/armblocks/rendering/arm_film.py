@@ -180,8 +180,8 @@ def spread(count: int, most: int) -> NDArray[np.intp]:
 def resampled(robot: Robot, time: _Array, q: _Array, times: _Array) -> _Array:
     """Coordinates (K, nq) at other times (K,) s, linear between the rows of ``q`` (N, nq) at ``time`` (N,).
 
-    The quaternions of a ball joint change their sign between two rows where this is nearer. Their lengths are
-    not 1.
+    The quaternions of a ball joint change their sign between two rows if this reduces their distance. The
+    interpolated quaternions are not normalised.
     """
     rows = q.copy()
     first = 0

@@ -135,7 +135,7 @@ class LimitCheck:
 
     @property
     def margin(self) -> float:
-        """1 - value / limit: the part of the limit that is left, negative beyond it."""
+        """1 - value / limit: the remaining fraction of the limit, negative beyond it."""
         return 1.0 - self.used
 
 
@@ -145,7 +145,7 @@ class DriveLoad(metaclass=ArgumentErrors):
 
     ``time`` (N,) s, ``speed`` (N,) rad/s and ``torque`` (N,) N m of the motor; ``output_torque`` (N,) N m or
     N at the output of the gear. ``pause`` s, with the torque ``pause_torque`` N m. ``holding_torque``: the
-    largest torque of weight, at the motor. ``load_inertia``: the largest inertia at the joint without the
+    largest gravity torque, at the motor. ``load_inertia``: the largest inertia at the joint without the
     drive, divided by the square of the gear ratio, kg m².
     """
 
@@ -306,7 +306,7 @@ class DriveLoad(metaclass=ArgumentErrors):
         return min(self.checks, key=lambda check: check.margin)
 
     def used(self, name: str) -> float:
-        """The used part of a limit by its name, 1 at the limit; NaN for a limit that is not given."""
+        """The utilisation of a limit by its name, 1 at the limit; NaN for a limit that is not given."""
         return next((check.used for check in self.checks if check.name == name), math.nan)
 
     @cached_property
@@ -321,8 +321,8 @@ def motor_torque(
 ) -> Array:
     """Torque of the motor (N,), N m, for a torque at the output of the gear.
 
-    ``speed`` (rad/s) and ``acceleration`` (rad/s²) of the motor; ``direction``: the sign of the speed, also
-    of the motion that begins or ends where the speed is 0. The gear loses power in both directions: the
+    ``speed`` (rad/s) and ``acceleration`` (rad/s²) of the motor; ``direction``: the sign of the speed, where
+    the speed is 0 that of the motion before or after. The gear loses power in both directions: the
     output torque is divided by the efficiency if the motor drives, and multiplied by it if the load drives.
     """
     loss = np.where(output_torque * direction > 0.0, 1.0 / drive.efficiency, drive.efficiency)

@@ -84,11 +84,12 @@ def coordinate_map(links: Sequence[Link], couplings: Sequence[Coupling], where: 
 def remaining_coupling(
     links: Sequence[Link], couplings: Sequence[Coupling], added: Coupling
 ) -> Coupling | float | None:
-    """What a coupling adds to ``couplings``, which do not contradict each other, for the moving ``links``.
+    """The coupling that has to be added to consistent ``couplings`` of ``links`` so that ``added`` holds.
 
-    It is the coupling itself, perhaps with another joint first, or an equal one of independent coordinates if
-    all its joints depend on others. None: it follows from the others. A number: it contradicts the others,
-    which give the sum of its terms another constant, larger by this number.
+    This is ``added`` itself, perhaps with another joint first. If all its joints depend on others, it is an
+    equivalent coupling of independent coordinates. None: ``added`` follows from ``couplings``. A number:
+    ``added`` contradicts ``couplings``; the number is the value of its terms by ``couplings`` minus its
+    constant.
     """
     terms = added.terms
     for k in range(len(terms)):

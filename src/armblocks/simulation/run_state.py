@@ -1,10 +1,10 @@
 """The state of a run, from which another run continues, in memory or as a file.
 
-A run that ends at a given time shortens its last step; a longer run would not. Besides the values at the end,
-a state therefore contains the arrays of the native loop before the last step. A run that continues with the
-same solver, settings and parameters repeats the step with its natural length, and its
-samples are identical to those of the uninterrupted run. With other settings or parameters, or changed values,
-a run restarts from the values at ``time``.
+A run shortens its last step to end at its stop time. A longer run would take the full step. Besides the
+values at the end, a state therefore contains the arrays of the native loop before the last step. A run that
+continues with the same solver, settings and parameters repeats the step with its full length, and its samples
+are identical to those of the uninterrupted run. With other settings or parameters, or changed values, a run
+restarts from the values at ``time``.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _PARTS = ("states", "discrete", "algebraic")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RunState:
-    """State of a run of system ``name`` at ``time`` (s), after the ticks and events of that instant.
+    """State of a run of system ``name`` at ``time`` (s), after the ticks and events at that time.
 
     ``states (nx,)``, ``discrete (nz,)`` and ``algebraic (nw,)`` are flat; ``names`` has the slot names of
     each. ``settings`` are the method and the numbers with which a run can continue from ``checkpoint``. Both

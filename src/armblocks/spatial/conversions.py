@@ -285,7 +285,7 @@ def pose_array(T: PoseLike, where: str) -> Array:
     wrong = (error > ORTHONORMALITY) | ((np.cross(R[..., 0], R[..., 1]) * R[..., 2]).sum(axis=-1) < 0)
     if wrong.any():
         raise InputError(
-            f"a matrix is no rotation: R'R differs from the identity by {np.max(error):.3g}",
+            f"a matrix is not a rotation: R'R differs from the identity by {np.max(error):.3g}",
             where=where,
             allowed=f"at most {ORTHONORMALITY:g}, and a determinant of 1",
             fix="give the matrix with more digits",
@@ -337,7 +337,7 @@ def _quaternions(value: PoseLike, where: str) -> Array:
     quaternion = _vectors(value, 4, where)
     if (np.linalg.norm(quaternion, axis=-1) == 0.0).any():
         raise InputError(
-            "a quaternion is 0 0 0 0, which is no rotation",
+            "a quaternion is 0 0 0 0, which is not a rotation",
             where=where,
             allowed="quaternions w x y z other than zero",
             fix="1 0 0 0 is the quaternion without rotation",

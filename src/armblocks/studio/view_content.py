@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 PATH = "arm"
 """The block path under which the front end finds the poses of a motion."""
 MAX_VIEW_ROWS = 5000
-"""Maximum number of poses of a motion in a view; of more, every k-th is shown."""
+"""Maximum number of poses of a motion in a view; of longer motions, every k-th pose is shown."""
 DRAWING_SIZE = (480, 360)
 """Width and height of the static drawing for browsers without WebGL, px."""
 LENGTH_RANGE = 1.0
@@ -53,7 +53,7 @@ def arm_content(robot: Robot, q: Array) -> ViewContent:
 
 
 def motion_content(robot: Robot, q: Array, time: Array, poses: Array) -> ViewContent:
-    """The content of a view of a motion, which begins to play."""
+    """The content of a view of a motion; the playback starts automatically."""
     step = -(-len(time) // MAX_VIEW_ROWS)
     time, poses = time[::step], poses[::step]
     columns = np.ascontiguousarray(poses.reshape(len(time), -1).T)

@@ -1,8 +1,7 @@
 """A small server on this machine for the pages of ``Arm.plot``, ``Arm.animate`` and ``Arm.teach``.
 
-There is one server for a process, in threads that end with it. A page has all its data once it is loaded, so
-that it stays useful after the program has ended. It keeps one stream of events open, by which the server
-knows that it exists.
+There is one server for a process, in threads that end with it. A loaded page has all its data, so that it can
+be used after the program has ended. It keeps one event stream open, by which the server detects open pages.
 
 Only this machine can connect. All paths begin with a secret of the server, which other programs and web
 sites do not know; requests with another ``Host`` (DNS rebinding) or ``Origin`` are rejected.
@@ -42,9 +41,9 @@ MAX_PAGES = 32
 LOADING_TIME = 10.0
 """Time for which a program that ends waits for its last pages to load, s."""
 BEAT = 1.0
-"""Interval between signs of life in the stream of events, s."""
+"""Heartbeat interval of the event stream, s."""
 ABSENCE = 2.5
-"""Time without a stream after which a page is closed, s; a reload takes less."""
+"""Time without an event stream after which a page is closed, s; a reload takes less."""
 
 FOLDER = Path(__file__).parent
 CONTENT_POLICY = (
@@ -115,7 +114,7 @@ class ArmPage:
                 self._changed.wait(0.2)  # short, so that Ctrl-C is noticed on Windows
 
     def close(self) -> None:
-        """Tell the page that it is closed: its sliders stop, :meth:`wait` returns."""
+        """Close the view: the sliders of the page are disabled, and :meth:`wait` returns."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
@@ -131,7 +130,7 @@ class ArmPage:
             return {"q": self._q.tolist(), "poses": self._poses}
 
     def next_event(self, version: int) -> tuple[int, dict[str, Any] | None]:
-        """Wait for a change after ``version``, at most a beat; the number and data of the change."""
+        """Wait for a change after ``version``, at most one heartbeat interval; its number and data."""
         with self._changed:
             if self._version == version and not self._closed:
                 self._changed.wait(BEAT)
@@ -142,14 +141,14 @@ class ArmPage:
             return self._version, {"q": self._q.tolist(), "poses": self._poses}
 
     def stream_opened(self) -> None:
-        """Note that a page has loaded and listens."""
+        """Record that a page has opened its event stream."""
         with self._changed:
             self._streams += 1
             self._last_stream = time.monotonic()
             self._changed.notify_all()
 
     def stream_closed(self) -> None:
-        """Note that a page does not listen any more."""
+        """Record that a page has closed its event stream."""
         with self._changed:
             self._streams -= 1
             self._last_stream = time.monotonic()
@@ -240,7 +239,7 @@ class _Handler(BaseHTTPRequestHandler):
         """Print nothing: the log would contain the secret."""
 
     def do_GET(self) -> None:
-        """Send a page, its content, or its stream of events."""
+        """Send a page, its content, or its event stream."""
         found = self._found()
         if found is None:
             return
@@ -316,7 +315,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
 
     def _stream(self, page: ArmPage) -> None:
-        """Send changes of the coordinates as events, and a sign of life each second."""
+        """Send changes of the coordinates as events, and a heartbeat each second."""
         self._begin("text/event-stream", {})
         page.stream_opened()
         version = 0

@@ -47,9 +47,9 @@ def spline_path(points: Array, scale: Array) -> PiecewisePolynomial:
 
 
 def blended_path(points: Array, scale: Array, blend: float) -> PiecewisePolynomial:
-    """Straight lines between the points with parabolas at the inner points, which are passed at a distance.
+    """Straight lines between the points with parabolas near the inner points, which the path does not pass.
 
-    ``blend``: the part of the shorter adjacent line that a parabola replaces, 0 to 0.5 (exclusive 0). The
+    ``blend``: the fraction of the shorter adjacent line that a parabola replaces, above 0, up to 0.5. The
     direction of the path is continuous, its curvature jumps.
     """
     s = chord_lengths(points, scale)

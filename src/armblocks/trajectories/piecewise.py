@@ -109,7 +109,7 @@ def hermite(
         powers = [q0, qd0, (3.0 * a - b) / h, (b - 2.0 * a) / (h * h)]
     else:
         qdd0, qdd1 = starts[2], ends[2]
-        # What is left for the powers 3 to 5: position, speed and acceleration, scaled to the length 1.
+        # Differences that determine the powers 3 to 5: position, speed, acceleration, scaled to the length 1.
         a = (q1 - q0) - h * (qd0 + h * qdd0 / 2.0)
         b = h * (qd1 - qd0 - h * qdd0)
         c = h * h * (qdd1 - qdd0)

@@ -95,7 +95,7 @@ def test_paths_follow_renames_forward_and_back() -> None:
     assert path_after("ab.gain", {"a": "x"}) == "ab.gain"
 
 
-def test_a_run_is_told_of_renames_and_is_tuned_by_the_new_names(tmp_path: Path) -> None:
+def test_a_run_is_notified_of_renames_and_is_tuned_by_the_new_names(tmp_path: Path) -> None:
     async def scenario(hub: Hub, ask: Callable[..., Awaitable[Any]], events: Events) -> None:
         async def event_of(kind: str, count: int = 1) -> dict[str, Any]:
             while len(found := [event for event in events if event["kind"] == kind]) < count:

@@ -69,7 +69,8 @@ class ArmPlant(Block):
     limit until a torque moves it away. Joints that rest at their stops before the impact stay there.
 
     The robot may have coupled joints and closed loops; the start must satisfy them (``arm.assemble``). In
-    a mechanism with loops, only joints that determine the others can have dry friction or hard stops.
+    a mechanism with loops, only joints that determine the others can have Coulomb friction or hard
+    stops.
 
     ``payload``: mass (kg), centre x y z (m) and inertia xx yy zz xy yz xz (kg m^2) about this centre, in the
     tool frame. If the payload jumps, the joint speeds do not change: a payload is picked up and released at
@@ -465,7 +466,7 @@ class ArmPlant(Block):
         return above - below
 
     def _driving_torque(self, x: Signals, u: Signals, p: Signals) -> SX:
-        """The joint torque without dry friction and rigid stops."""
+        """The joint torque without Coulomb friction and hard stops."""
         return u["tau"] - viscous_torque(self.robot, x["qd"]) + self._elastic_stops(x, p)
 
     def _near(self) -> NDArray[np.float64] | None:

@@ -32,7 +32,7 @@ from armblocks.equations import Shape
 class DcMotor(Block):
     """A DC motor: L i' = v - R i - k w, J w' = k i - b w - load, angle' = w.
 
-    The model has one shaft and no dry friction. All signals are on the motor side.
+    The model has one shaft and no Coulomb friction. All signals are on the motor side.
     """
 
     title: ClassVar[str] = "DC Motor"

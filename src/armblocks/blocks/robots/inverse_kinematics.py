@@ -105,10 +105,10 @@ class ResolvedRate(Block):
 
     Resolved-rate motion control (Whitney, 1969) with damped least squares: near a singular configuration,
     where the manipulability falls below ``region``, damping up to ``damping`` bounds the speeds and the tool
-    leaves the commanded velocity. The measures are those of the Jacobian whose rows of the position are
-    divided by the size of the arm. All speeds are reduced in proportion, so that none exceeds ``max_speed``.
-    ``avoidance`` moves joints towards the middle of their ranges as far as the tool does not move, which
-    needs more joints than the tool has degrees of freedom.
+    leaves the commanded velocity. The manipulability is that of the Jacobian whose linear rows are divided by
+    the size of the arm. All speeds are reduced in proportion, so that none exceeds ``max_speed``.
+    ``avoidance`` moves joints towards the middle of their ranges without moving the tool. This requires more
+    joints than degrees of freedom of the tool.
     """
 
     title: ClassVar[str] = "Resolved Rate"

@@ -28,7 +28,7 @@ from armblocks.errors import InputError, counted
 
 @dataclass(frozen=True, kw_only=True)
 class Trajectory(Block):
-    """A joint motion from a table: rows of t, q, qd, qdd, with the quintic of both rows between two rows.
+    """A joint motion from a table: rows of t, q, qd, qdd, interpolated by quintics.
 
     ``trajectory.block()`` gives this block for any joint trajectory, and ``trajectory.save(path)`` writes its
     table. All trajectories of armblocks up to the fifth degree are reproduced exactly: jtraj, lspb, mstraj,
@@ -93,7 +93,7 @@ class Trajectory(Block):
         begin = table.entry(row, 0)
         h = if_else(between, table.entry(next_row, 0) - begin, 1.0)
         s = if_else(between, (t - begin) / h, 0.0)
-        # What is left for the powers 3 to 5 of s after the motion with constant acceleration qdd0.
+        # The difference to the motion with constant acceleration qdd0 determines the powers 3 to 5 of s.
         a = (q1 - q0) - h * (qd0 + h * qdd0 / 2.0)
         b, c = h * (qd1 - qd0 - h * qdd0), h * h * (qdd1 - qdd0)
         cubic, fourth, fifth = (

@@ -26,7 +26,7 @@ class Solver(NamedTuple):
 
     ``geometry``: its name. ``branch_count``: the number of branches. ``choices``: the names of the choices
     between two solutions; a configuration where both coincide is singular. ``branches(T)``: all branches for
-    the pose ``T`` (4, 4), in an order of which the last choice changes fastest.
+    the pose ``T`` (4, 4); in their order the last choice changes fastest.
     """
 
     geometry: str

@@ -1,4 +1,4 @@
-"""Arms with three parallel axes: six joints as of Universal Robots, SCARA and planar arms, palletisers."""
+"""Arms with three parallel axes: Universal Robots (six joints), SCARA and planar arms, palletisers."""
 
 from __future__ import annotations
 

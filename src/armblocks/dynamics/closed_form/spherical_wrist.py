@@ -1,4 +1,4 @@
-"""Six joints of which the last three axes intersect: position first, then orientation.
+"""Six joints whose last three axes intersect: position and orientation are solved one after the other.
 
 The centre of the wrist does not depend on the last three joints, so the first three follow from its position
 (Pieper, 1968). They are: two parallel axes after the first one, or two intersecting axes and a third joint
@@ -18,7 +18,7 @@ from armblocks.dynamics.closed_form.subproblems import angle_between, distance, 
 
 
 def spherical_wrist(chain: Chain) -> Solver | None:
-    """The solver of the chain; None if its geometry is another one."""
+    """The solver of the chain; None for other geometries."""
     if len(chain.axes) != 6 or any(axis.prismatic for axis in (*chain.axes[:2], *chain.axes[3:])):
         return None
     first, second, third, *wrist = chain.axes
@@ -73,7 +73,7 @@ def _parallel_arm(chain: Chain, centre: Array, y: SX) -> Iterator[tuple[list[SX]
     """The angles of three joints that take the point ``centre`` to ``y``; axes 2 and 3 are parallel.
 
     Joints 2 and 3 do not change the component along their axes, which gives the first angle. The distance of
-    the point from axis 2 then gives the third one.
+    the point from axis 2 gives the third angle.
     """
     first, second, third = chain.axes[:3]
     h, p1, p2, p3 = second.direction, first.point, second.point, third.point

@@ -40,7 +40,7 @@ GEOMETRIES = (
 def closed_solver(robot: Robot, frame: str | None = None) -> tuple[Chain, Solver]:
     """The chain of an arm and its solver.
 
-    Raises RobotError that says why the arm has none.
+    Raises RobotError with the reason if the arm has none.
     """
     check_open_chain(robot)
     chain = chain_of(robot, frame)
@@ -123,7 +123,7 @@ def _reversed(chain: Chain, solver: Solver) -> Solver:
         for branch in solver.branches(SX(chain.tool @ inverse)):
             yield Branch(branch.angles[::-1], branch.measures)
 
-    return solver._replace(geometry=f"{solver.geometry}, seen from the tool", branches=branches)
+    return solver._replace(geometry=f"{solver.geometry}, from the tool to the base", branches=branches)
 
 
 def _coordinates(robot: Robot, chain: Chain, inverse: Array, branch: Branch) -> SX:

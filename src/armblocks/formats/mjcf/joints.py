@@ -37,7 +37,7 @@ class PlacedJoint(NamedTuple):
 
 
 class Actuation(NamedTuple):
-    """What actuators give a joint, at the joint: the largest torque, rotor inertia and damping (SI units).
+    """Contributions of actuators to a joint, at the joint: largest torque, rotor inertia, damping (SI units).
 
     ``torque``: N m or N, None if unknown.
     """
@@ -143,7 +143,7 @@ def actuated_joints(root: Element, defaults: Defaults) -> set[str]:
 
 
 def actuation_of(root: Element, defaults: Defaults, context: FileContext) -> dict[str, Actuation]:
-    """What the actuators of each joint give it, by the joint's name.
+    """The contributions of the actuators to each joint, by the joint's name.
 
     The largest torque is the force range of an actuator, or the control range of a motor, times the magnitude
     of the gear. Armature and damping are at the actuator: at the joint they are larger by the squared gear.

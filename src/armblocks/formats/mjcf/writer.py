@@ -69,8 +69,9 @@ def write_mjcf(robot: Robot) -> bytes:
     that exceed the maximum depth of XML files. A revolute closure becomes two coincident pairs of points.
     Warns of data that MJCF does not have: line springs with a constant force, gear ratios (rotor inertia and
     friction are written at the joint), speed limits, the tip and the order of the coordinates of some trees,
-    Coulomb friction that depends on the direction, friction that accelerates, housings. MuJoCo does not
-    accept moving bodies without mass or with physically impossible inertias; they are written as they are.
+    Coulomb friction that depends on the direction, friction that accelerates a joint, housings. MuJoCo does
+    not accept moving bodies without mass or with physically impossible inertias; they are written as they
+    are.
     """
     mimics = mimics_of(robot, "MJCF", CLOSURES)
     for link in robot.links:

@@ -146,7 +146,7 @@ def motor_of(joint: Frame, axis: Element | None, context: FileContext) -> Motor 
     """The motor that gives a joint the friction of ``<dynamics>``: ``tau = damping qd + friction sign(qd)``.
 
     Rotor and gear are those of Drake's elements ``drake:rotor_inertia`` and ``drake:gear_ratio``. Findings
-    name friction that accelerates.
+    name friction that accelerates the joint.
     """
     if axis is None:
         return None

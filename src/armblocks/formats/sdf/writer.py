@@ -83,8 +83,8 @@ def write_sdf(robot: Robot) -> bytes:
 
     Raises ``FormatError`` for constraints and joint types that SDF does not have, and for loops that are not
     closed with all joints at zero. Warns of data that SDF does not have: the tip and the order of the
-    coordinates of some trees, Coulomb friction that depends on the direction, friction that accelerates,
-    meshes and housings, names that SDF reserves.
+    coordinates of some trees, Coulomb friction that depends on the direction, friction that accelerates
+    a joint, meshes and housings, names that SDF reserves.
     """
     mimics = mimics_of(robot, "SDF", tuple(_CLOSURES))
     warn_of_shapes(robot, (Box, Cylinder, Sphere), "SDF")
@@ -194,8 +194,8 @@ def _joint_lines(
         lines += [f"      {line}" for line in (_limit(link), _dynamics(robot, link)) if line]
         if mimic is not None:
             leader = quoted(joints[mimic.leader], robot)
-            numbers_of = f"<multiplier>{mimic.multiplier!r}</multiplier><offset>{mimic.offset!r}</offset>"
-            lines.append(f"      <mimic joint={leader}>{numbers_of}<reference>0</reference></mimic>")
+            coefficients = f"<multiplier>{mimic.multiplier!r}</multiplier><offset>{mimic.offset!r}</offset>"
+            lines.append(f"      <mimic joint={leader}>{coefficients}<reference>0</reference></mimic>")
         lines.append("    </axis>")
         motor = link.motor
         if motor is not None and (motor.gear_ratio, motor.inertia) != (1.0, 0.0):
@@ -244,8 +244,8 @@ def check_closed(robot: Robot, closure: Closure, a: NDArray[np.float64], b: NDAr
             raise FormatError(
                 f"constraint '{closure.name}' is not satisfied with all joints at zero",
                 where=f"robot '{robot.name}'",
-                allowed="loops that are closed there: SDF defines the frames of joints by this configuration",
-                fix="add the coordinates of arm.assemble() to the offsets of the joints, or save it as .json",
+                allowed="closures that are satisfied at zero, where SDF defines the frames of joints",
+                fix="add the coordinates of arm.assemble() to the joint offsets, or save a .json file",
             )
 
 

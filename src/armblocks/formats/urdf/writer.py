@@ -50,8 +50,8 @@ def write_urdf(robot: Robot) -> bytes:
 
     Raises ``FormatError`` for joint types and constraints that URDF does not have. Warns of data that URDF
     does not have: link frames that are not at the joint, another gravity, springs, the tip and the order of
-    the coordinates of some trees, Coulomb friction that depends on the direction, friction that accelerates,
-    meshes and housings.
+    the coordinates of some trees, Coulomb friction that depends on the direction, friction that accelerates a
+    joint, meshes and housings.
     """
     if not np.allclose(robot.gravity, STANDARD_GRAVITY, rtol=1e-15, atol=0.0):
         what = f"gravity {robot.gravity} is not part of a URDF file, which is read with -9.81 along z"

@@ -27,7 +27,7 @@ _Array = NDArray[np.float64]
 
 _PANEL_HEIGHT = 230.0
 _DECIBEL_RANGE = 140.0
-"""Displayed range below the highest line, dB. Lower values are rounding errors."""
+"""Displayed range below the largest value of all spectra, dB. Lower values are rounding errors."""
 
 
 def spectrum_chart(
@@ -56,7 +56,7 @@ def spectrum_chart(
         width=width,
         height=TOP + _PANEL_HEIGHT + BOTTOM,
         title=title,
-        description=f"{quantity} over the frequency of {', '.join(names)}.",
+        description=f"{quantity} of {', '.join(names)} over frequency.",
     )
     x = (low, high)
     area = log_area(x, span, box, degrees=False) if logarithmic else linear_area(x, span, box)
@@ -67,8 +67,8 @@ def spectrum_chart(
         positions = area.points(
             frequency[is_shown], np.where(np.isfinite(values[is_shown]), values[is_shown], span[0] - 1e3)
         )
-        x_scale, y_scale = thin_out(positions[:, 0], positions[:, 1], round(box[2] - box[0]))
-        points = clip_line(np.column_stack([x_scale, y_scale]), area.box)
+        x_px, y_px = thin_out(positions[:, 0], positions[:, 1], round(box[2] - box[0]))
+        points = clip_line(np.column_stack([x_px, y_px]), area.box)
         picture.add(Polyline(points, trace_tone(index), 1.6, trace_dash(index)))
     return with_legend(picture, names)
 

@@ -92,9 +92,9 @@ class BallMotion:
         length = hypot(*q)
         if length == 0.0:
             raise InputError(
-                "the quaternion of a joint is 0 0 0 0, which is no rotation",
+                "the quaternion of a joint is 0 0 0 0, which is not a rotation",
                 where="ball joint",
-                allowed="a quaternion w x y z other than zero; 1 0 0 0 is no rotation",
+                allowed="a quaternion w x y z other than zero; 1 0 0 0 is the identity",
                 fix="start from arm.neutral(), not from zeros",
             )
         w, x, y, z = (value / length for value in q)

@@ -56,7 +56,7 @@ class DiagramRuns:
         self.workers.prepare(after=FIRST_WORKER_DELAY_SECONDS)
 
     async def rename(self, document: str, renamed: Mapping[str, str]) -> None:
-        """Tell the clients that show the run of a diagram which blocks were renamed: old path to new path."""
+        """Notify the clients of a diagram's run about renamed blocks: old path to new path."""
         if (run := self.run_key(document)) is None:
             return
         self._names[run].rename(renamed)

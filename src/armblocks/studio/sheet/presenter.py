@@ -131,7 +131,7 @@ class DiagramPresenter(Presenter[OpenDocument]):
         self.on_changed(open_file)
 
     async def on_edited(self, open_file: OpenDocument, before: Diagram) -> None:
-        """Tell the run of the diagram which blocks were renamed, and start the background check."""
+        """Notify the run of the diagram about renamed blocks, and start the background check."""
         if renamed := renamed_paths(before, open_file.document.diagram):
             await self._runs.rename(open_file.key, renamed)
         self.on_changed(open_file)

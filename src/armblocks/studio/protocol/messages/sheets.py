@@ -307,7 +307,10 @@ class ParameterSetTable(Message):
 
 
 class AskParameterSets(Request[ParameterSetTable]):
-    """Return the parameter sets of a model, and its values of their parameters and of those in ``also``."""
+    """Return the parameter sets of a model.
+
+    The reply also contains the values in the model of all parameters of the sets, and of those in ``also``.
+    """
 
     kind: Literal["parameter_sets"] = "parameter_sets"
     document: str

@@ -1,4 +1,4 @@
-"""Keys that follow each other faster than the studio answers, cancelled drags, and renames after a run."""
+"""Keys pressed before the result of the previous edit arrives, cancelled drags, renames after a run."""
 
 from __future__ import annotations
 
