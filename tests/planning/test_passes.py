@@ -76,7 +76,7 @@ def test_a_mass_on_a_line_accelerates_and_brakes() -> None:
     assert_allclose(slow.x, np.minimum(np.minimum(4.0 * s, 2.0 * (1.0 - s)), 0.5), atol=1e-12)
 
 
-def test_an_impassable_point_is_named() -> None:
+def test_an_infeasible_point_is_named() -> None:
     N = 10
     half = np.full((1, N), N / 2.0)
     low, high = np.full((1, N), -1.0), np.full((1, N), 1.0)

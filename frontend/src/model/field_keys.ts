@@ -6,7 +6,7 @@ const TEXT_KEYS = new Set(
   ).split(' '),
 )
 
-/** Whether a key is not for the field that has the focus but a command, such as Ctrl+S or Ctrl+Enter. */
+/** Whether a key is a command, such as Ctrl+S, and does not edit the field that has the focus. */
 export const isCommandKey = ({
   key,
   ctrlKey,

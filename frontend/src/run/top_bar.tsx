@@ -27,7 +27,7 @@ const SPEEDS = [
   ...['0.1', '0.25', '0.5', '1', '2', '5', '10'].map((value) => ({ value, label: `${value} × real time` })),
 ]
 
-/** Accept the text in the field that has the focus: a command such as the run acts on what is displayed. */
+/** Accept the text in the field that has the focus: a command such as a run uses the displayed values. */
 function acceptTypedText(): void {
   const { activeElement } = document
   const isField = activeElement instanceof HTMLInputElement || activeElement instanceof HTMLTextAreaElement

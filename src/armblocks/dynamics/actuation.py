@@ -2,9 +2,9 @@
 
 The torques of a tree, ``tau_tree``, are shared between motors and constraints: ``tau_tree = tau + J' λ`` with
 ``Z' tau = 0`` for the directions Z in which no motor moves: the joints without a motor. These equations
-determine the multipliers λ.
-Source: Featherstone, *Rigid Body Dynamics Algorithms*, 8.12 (inverse dynamics of closed loops); Nakamura and
-Ghodoussi, *Dynamics computation of closed-link robot mechanisms*, IEEE Trans. Robotics and Automation 1989.
+determine the multipliers λ. Source: Featherstone, *Rigid Body Dynamics Algorithms*, 8.12 (inverse dynamics of
+closed loops); Nakamura and Ghodoussi, *Dynamics computation of closed-link robot mechanisms*, IEEE Trans.
+Robotics and Automation 1989.
 """
 
 from __future__ import annotations

@@ -209,8 +209,8 @@ class Mechanism:
     def branches(self, q: Array) -> list[Array]:
         """The directions (n,), each of length 1, of the curves of assembled configurations through ``q``.
 
-        For a mechanism with one degree of freedom. With several directions, ``q`` is a
-        bifurcation, where branches of the motion cross. Without a direction, the mechanism cannot move.
+        For a mechanism with one degree of freedom. With several directions, ``q`` is a bifurcation, where
+        branches of the motion cross. Without a direction, the mechanism cannot move.
         """
         random, J = np.random.default_rng(3), self.jacobian(q)
         found: list[Array] = []

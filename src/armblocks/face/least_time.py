@@ -28,10 +28,10 @@ _ROUNDING = 1e-12
 """Torques that are smaller, relative to their terms, are rounding errors."""
 _QUARTERS = np.array([0.25, 0.75])
 _SMALL, _ACCEPTED = 8e-4, 2e-2
-"""Excess over a limit between grid points, relative to the limit: from the first, the limits are corrected;
-from the second, an error is raised."""
+"""Excess over a limit between grid points, relative to the limit: above the first number the limits are
+corrected, above the second one the motion is an error."""
 _ROUNDS, _CORRECTION = 8, 1.3
-"""Maximum number of corrections of the limits, and the fraction of the excess that each one corrects."""
+"""Maximum number of corrections, and the multiple of the excess by which each one reduces the limits."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,12 +67,12 @@ def least_time(
     Torques are those of ``arm.rne``: rigid bodies, payload, rotor inertia, gravity, viscous and Coulomb
     friction of the motion. Source: Pham and Pham, A new approach to time-optimal path parameterization based
     on reachability analysis, IEEE Trans. Robotics 2018; viscous friction and the limits between grid points
-    are added by iteration. The acceleration jumps at each segment of the grid. Strong
-    viscous friction can cause separate intervals of feasible speeds; only the slowest interval is used.
+    are added by iteration. The acceleration jumps at each segment of the grid. Strong viscous friction can
+    cause separate intervals of feasible speeds; only the slowest interval is used.
 
     Raises InputError for a path that is infeasible, with the joint whose torque is too small, and for paths
-    without a limit; RobotError for robots with ball joints or closed loops. Warns of
-    positions outside the limits of the joints, which a spline may pass between the points.
+    without a limit; RobotError for robots with ball joints or closed loops. Warns of positions outside the
+    limits of the joints, which a spline may pass between the points.
     """
     where = "least_time"
     robot = arm.robot
@@ -140,7 +140,7 @@ def fastest_motion(
     margin = np.zeros_like(problem.a[0])
     solution = solve(problem, margin)
     if solution.failed is not None:
-        _raise_impassable(arm, path, limits, payload, s, solution.failed)
+        _raise_infeasible(arm, path, limits, payload, s, solution.failed)
     for _ in range(_ROUNDS):
         beyond, factor = _between(arm, path, limits, payload, s, solution.x)
         excess = max(float((beyond / problem.bound).max(initial=0.0)), float(factor.max()) - 1.0)
@@ -213,10 +213,10 @@ def path_through(points: Array, limits: MotionLimits, blend: float | None) -> Pi
 def grid_of(arm: Arm, path: PiecewisePolynomial, count: int) -> Array:
     """At least ``count`` segments of the path, with points at its knots and where Coulomb friction jumps."""
     slow = np.full(arm.n, 1e-9)
-    dry = np.abs(arm.friction(slow)) + np.abs(arm.friction(-slow)) > 1e-6
+    has_coulomb = np.abs(arm.friction(slow)) + np.abs(arm.friction(-slow)) > 1e-6
     knots = path.times
-    if dry.any():
-        knots = np.unique(np.append(knots, turning_points(path, dry)))
+    if has_coulomb.any():
+        knots = np.unique(np.append(knots, turning_points(path, has_coulomb)))
     grid: list[Array] = [knots[:1]]
     for begin, end in pairwise(knots):
         parts = max(math.ceil(count * (end - begin) / (knots[-1] - knots[0])), 4)
@@ -304,11 +304,11 @@ def _torque_terms(arm: Arm, points: _GridPoints, payload: Payload | float | None
     d[np.abs(d) <= _ROUNDING * (np.abs(once) + np.abs(gravity))] = 0.0
     a, b, c, d = (points.at(values) for values in (a - gravity, b, gravity + coulomb, d))
     # A joint that reverses at a grid point has the direction of the segment.
-    still = np.abs(points.at(first)) <= 1e-12 * np.abs(first).max()
-    if still.any():
+    at_rest = np.abs(points.at(first)) <= 1e-12 * np.abs(first).max()
+    if at_rest.any():
         middle = first[points.index[1]]
         of_segment = _coulomb(arm, middle)
-        c += np.where(still, of_segment - points.at(coulomb), 0.0)
+        c += np.where(at_rest, of_segment - points.at(coulomb), 0.0)
     return a, b, c, d
 
 
@@ -323,7 +323,7 @@ def _torque(arm: Arm, q: Array, qd: Array, qdd: Array, payload: Payload | float 
 
 
 def _motion(points: _GridPoints, lengths: Array, x: Array) -> PiecewisePolynomial:
-    """The motion over time; each segment is the quintic with the exact rates at both of its ends."""
+    """The motion over time; each segment is the quintic with the exact derivatives at both of its ends."""
     times = np.append(0.0, np.cumsum(segment_times(x, lengths)))
     u = (np.diff(x) / (2.0 * lengths))[:, None]
     y = np.sqrt(x)
@@ -339,7 +339,7 @@ def _motion(points: _GridPoints, lengths: Array, x: Array) -> PiecewisePolynomia
     return hermite(times, start, end, end=last)
 
 
-def _raise_impassable(
+def _raise_infeasible(
     arm: Arm,
     path: PiecewisePolynomial,
     limits: MotionLimits,

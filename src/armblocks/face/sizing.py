@@ -136,10 +136,9 @@ def size_drives(
 
     The torque of a motor is the torque of gravity and of the rigid bodies with the ``payload`` (a
     :class:`Payload`, or kg at the tool), converted by the ratio and efficiency of the gear, plus the torques
-    of inertia and friction of the drive itself.
-    The motors of the robot's file are replaced by the candidates. In the pause the motor holds the arm, or
-    its brake does (``brakes_in_pause``) and the torque is 0. The brake must hold the largest gravity
-    torque of the motion.
+    of inertia and friction of the drive itself. The motors of the robot's file are replaced by the
+    candidates. In the pause the motor holds the arm, or its brake does (``brakes_in_pause``) and the torque
+    is 0. The brake must hold the largest gravity torque of the motion.
 
     Raises InputError without a drive for some joint or for an unknown joint of a drive; RobotError for robots
     with closed loops, ball joints, or motors at joints that depend on others.
@@ -164,7 +163,7 @@ def size_drives(
             fix="use a trajectory of more than one point",
         )
     zero = np.zeros_like(q)
-    weight = rigid.rne(q, zero, zero, payload=payload)
+    gravity = rigid.rne(q, zero, zero, payload=payload)
     inertia = _largest_inertia(rigid, q, payload)
     loads: list[DriveLoad] = []
     for j, joint in enumerate(joints):
@@ -174,7 +173,7 @@ def size_drives(
                 continue
             ratio = drive.gear_ratio
             speed, acceleration = ratio * qd[:, j], ratio * qdd[:, j]
-            held = float(weight[-1, j]) / ratio
+            holding = float(gravity[-1, j]) / ratio
             loads.append(
                 DriveLoad(
                     joint=joint,
@@ -184,8 +183,8 @@ def size_drives(
                     torque=motor_torque(drive, tau[:, j], speed, acceleration, direction),
                     output_torque=tau[:, j],
                     pause=float(pause),
-                    pause_torque=0.0 if brakes_in_pause else held,
-                    holding_torque=float(np.abs(weight[:, j]).max()) / ratio,
+                    pause_torque=0.0 if brakes_in_pause else holding,
+                    holding_torque=float(np.abs(gravity[:, j]).max()) / ratio,
                     load_inertia=float(inertia[j]) / ratio**2,
                 )
             )

@@ -80,8 +80,8 @@ def tpoly(
 def lspb(q0: ArrayLike, qf: ArrayLike, t: ArrayLike | int, speed: ArrayLike | None = None) -> JointTrajectory:
     """The toolbox's ``lspb``: constant acceleration, constant ``speed``, constant deceleration.
 
-    ``t`` (N,): times in s from 0, or a number of samples N for the times 0, 1 … N - 1. ``speed``: a number
-    or (n,), between one and two times the mean speed; its sign is ignored, as in release 10 (release 9.4
+    ``t`` (N,): times in s from 0, or a number of samples N for the times 0, 1 … N - 1. ``speed``: a number or
+    (n,), between one and two times the mean speed; its sign is ignored, as in release 10 (release 9.4
     compares it with the sign). By default it is 1.5 times the mean speed, which gives three equal parts. All
     joints end at the same time. At a time at which the acceleration jumps, the table has the value before the
     jump, as in the toolbox. Raises InputError for a speed that is too small or too large.
@@ -98,7 +98,7 @@ def lspb(q0: ArrayLike, qf: ArrayLike, t: ArrayLike | int, speed: ArrayLike | No
     outside = np.flatnonzero((mean != 0.0) & ((np.abs(speeds) < low) | (np.abs(speeds) > high)))
     if outside.size:
         k = int(outside[0])
-        size = "small" if abs(speeds[k]) < low[k] else "big"
+        size = "small" if abs(speeds[k]) < low[k] else "large"
         raise InputError(
             f"the speed {abs(speeds[k]):g} of joint {k + 1} is too {size}",
             where="lspb",
@@ -159,8 +159,8 @@ def mstraj(
     The motion passes near the inner points and ends at the last one. As in releases 9 and 10, the durations
     of blends and, for given ``qdmax``, of segments are rounded up to multiples of ``dt``, a segment takes at
     least two blends, and its speed is the distance between the points divided by its duration. The table also
-    has the start, which the toolbox leaves out. A duration that is a multiple of ``dt``
-    up to rounding is not lengthened.
+    has the start, which the toolbox leaves out. A duration that is a multiple of ``dt`` up to rounding is not
+    lengthened.
     """
     via = via_points("points", points, "mstraj", least=1 if q0 is not None else 2)
     start, via = (via[0], via[1:]) if q0 is None else (joint_vector("q0", q0, "mstraj"), via)

@@ -3,8 +3,8 @@
 The damping is proportional to the squared error, ``l = k E`` (Chan and Lawrence, *General inverse kinematics
 with the error damped pseudoinverse*, ICRA 1988; Sugihara, *Solvability-unconcerned inverse kinematics by the
 Levenberg-Marquardt method*, IEEE Trans. Robotics 27, 2011). Steps are bounded at singular configurations, and
-near a regular solution the convergence is quadratic. A joint at a limit that the step would
-exceed is excluded from the step (active set).
+near a regular solution the convergence is quadratic. A joint at a limit that the step would exceed is
+excluded from the step (active set).
 """
 
 from __future__ import annotations

@@ -5,8 +5,8 @@ torque or an acceleration) is ``a u + b x + d y + c``. In a segment of the grid 
 (x1 - x0) / (2 h)``. Each limit holds at both ends of each segment, with the values of this segment.
 
 ``d y`` is viscous friction. It is linear in the speed and not in ``x``. Newton's iteration replaces it by its
-tangent at the speed of the previous solution until the solution does not change.
-Where no motion is feasible with this tangent, the iteration continues at half the speed.
+tangent at the speed of the previous solution until the solution does not change. Where no motion is feasible
+with this tangent, the iteration continues at half the speed.
 
 In the middle of a segment the quantities may exceed their limits by terms of second order in h. The limits of
 such a segment are reduced by the excess, and the solution is repeated. All iterations are native code.

@@ -4,8 +4,8 @@ All values are at the shaft of the motor, unless stated otherwise. Signals are i
 their samples; the integrals of torques squared and of powers are exact for this interpolation.
 
 Source: the selection procedure of drive manufacturers (effective torque at mean speed, peak torque and speed
-against the curves of the motor); Slocum and others; for strain wave gears the average output torque is the
-cubic mean of the torque, weighted by speed.
+against the curves of the motor). For strain wave gears the average output torque is the cubic mean of the
+torque, weighted by speed.
 """
 
 from __future__ import annotations
@@ -322,8 +322,8 @@ def motor_torque(
     """Torque of the motor (N,), N m, for a torque at the output of the gear.
 
     ``speed`` (rad/s) and ``acceleration`` (rad/s²) of the motor; ``direction``: the sign of the speed, where
-    the speed is 0 that of the motion before or after. The gear loses power in both directions: the
-    output torque is divided by the efficiency if the motor drives, and multiplied by it if the load drives.
+    the speed is 0 that of the motion before or after. The gear loses power in both directions: the output
+    torque is divided by the efficiency if the motor drives, and multiplied by it if the load drives.
     """
     loss = np.where(output_torque * direction > 0.0, 1.0 / drive.efficiency, drive.efficiency)
     loss = np.where(direction == 0.0, 1.0, loss)

@@ -34,8 +34,8 @@ class SignalFigure:
     def save(self, path: str | PathLike[str], *, theme: Theme | None = None) -> Path:
         """Write a ``.svg``, ``.png`` or ``.pdf`` file atomically; returns the path.
 
-        ``theme``: by default that of the viewer for SVG, light for the others. Raises UnknownNameError for
-        another suffix, MissingLibraryError without the extra ``figures``.
+        ``theme``: by default the theme of the viewer for SVG, light for the other formats. Raises
+        UnknownNameError for another suffix, MissingLibraryError without the extra ``figures``.
         """
         target = Path(path)
         match target.suffix.lower():

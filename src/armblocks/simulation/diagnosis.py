@@ -208,8 +208,8 @@ def _minimum_step(system: CompiledSystem, run: Integration) -> SimulationError:
         f"{left:.0e} further steps, mainly because of state '{name}'",
         where=system.name,
         allowed="equations that jump at events only",
-        fix=f"check the input of '{name}' for a jump that depends on the state, such as dry friction or a "
-        f"sign in a formula: use a block with a rest state (ArmPlant, StickSlipFriction){stiff}",
+        fix=f"check the input of '{name}' for a jump that depends on the state, such as Coulomb friction or "
+        f"a sign in a formula: use a block with a rest state (ArmPlant, StickSlipFriction){stiff}",
     )
 
 

@@ -68,9 +68,8 @@ class ArmPlant(Block):
     stops at once in a plastic impact, whose impulse also acts on the other joints. It stays exactly at the
     limit until a torque moves it away. Joints that rest at their stops before the impact stay there.
 
-    The robot may have coupled joints and closed loops; the start must satisfy them (``arm.assemble``). In
-    a mechanism with loops, only joints that determine the others can have Coulomb friction or hard
-    stops.
+    The robot may have coupled joints and closed loops; the start must satisfy them (``arm.assemble``). In a
+    mechanism with loops, only joints that determine the others can have Coulomb friction or hard stops.
 
     ``payload``: mass (kg), centre x y z (m) and inertia xx yy zz xy yz xz (kg m^2) about this centre, in the
     tool frame. If the payload jumps, the joint speeds do not change: a payload is picked up and released at

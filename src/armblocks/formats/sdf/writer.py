@@ -83,8 +83,8 @@ def write_sdf(robot: Robot) -> bytes:
 
     Raises ``FormatError`` for constraints and joint types that SDF does not have, and for loops that are not
     closed with all joints at zero. Warns of data that SDF does not have: the tip and the order of the
-    coordinates of some trees, Coulomb friction that depends on the direction, friction that accelerates
-    a joint, meshes and housings, names that SDF reserves.
+    coordinates of some trees, Coulomb friction that depends on the direction, friction that accelerates a
+    joint, meshes and housings, names that SDF reserves.
     """
     mimics = mimics_of(robot, "SDF", tuple(_CLOSURES))
     warn_of_shapes(robot, (Box, Cylinder, Sphere), "SDF")
