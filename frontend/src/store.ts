@@ -241,7 +241,8 @@ export async function showBlock(inside: string[], name: string): Promise<void> {
 /** Select the result of an edit, unless the user has selected something else since the edit was sent. */
 export function selectIfUnchanged(before: ReadonlySet<string>, names: Iterable<string>): void {
   const { selection, select } = useStudio.getState()
-  if (selection === before) select(names)
+  // A block that gets the focus back after a dialog is selected again: the same names in a new set.
+  if (selection.size === before.size && [...selection].every((name) => before.has(name))) select(names)
 }
 
 /** The names of the blocks and signals of the visible sheet, which a new block cannot have. */
