@@ -17,7 +17,7 @@ export async function holdKeys<T>(operation: Promise<T>): Promise<T> {
   try {
     return await operation
   } finally {
-    // The caller continues in a microtask, for example it selects the new blocks.
+    // The caller continues in a microtask, in which it can select the new blocks.
     setTimeout(() => {
       operations--
       replay()
@@ -48,7 +48,7 @@ const isUndoOrRedo = ({ key, ctrlKey, metaKey, altKey }: KeyboardEvent): boolean
 
 function onKeyDown(event: KeyboardEvent): void {
   if (replaying || isModifier(event)) return
-  // After a held key, all keys are held: their order counts, also in a field that a held key opens.
+  // After a held key, all keys are held to preserve their order, also in a field that a held key opens.
   if (!keys.length && (!areHeld() || !isForSheet(event) || isUndoOrRedo(event))) return
   event.preventDefault()
   event.stopImmediatePropagation()

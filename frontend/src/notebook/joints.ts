@@ -50,7 +50,7 @@ function sendLatest(): void {
   send(useJoints.getState().q)
 }
 
-/** Show poses from Python. Its coordinates are shown unless a slider has moved meanwhile. */
+/** Show poses and coordinates from Python. Coordinates are ignored if a slider has moved meanwhile. */
 export function receivePoses(q: number[], poses: number[][][]): void {
   awaitedSince = -Infinity
   useJoints.setState(({ count, q: shown }) => ({ q: unsent ? shown : q, poses, count: count + 1 }))

@@ -9,8 +9,8 @@ import { usePinnedParameters } from './pinned_parameters'
 
 /*
  * Views of runs identify blocks, signals and parameters by their paths. When a block is renamed, also by
- * undo, they follow: scopes keep their curves, displays and wires their values, and tried values their
- * parameters.
+ * undo, these paths are updated. Scopes keep their curves, displays and wires keep their values, and tried
+ * values remain with their parameters.
  */
 
 const viewsAfter = (views: SinkView[], renamed: Renamed): SinkView[] =>

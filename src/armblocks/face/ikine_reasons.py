@@ -29,7 +29,7 @@ NEAR = 1e-6
 SINGULAR = 1e-3
 """Ratio of the smallest to the largest singular value of the weighted Jacobian where it is singular."""
 DEPENDENT_RETRIES = 40
-"""Starts that are tried to bring joints that couplings determine into their limits."""
+"""Number of starts from which solutions within the limits of dependent joints are searched."""
 
 
 class Reasons:

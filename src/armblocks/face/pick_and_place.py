@@ -86,9 +86,10 @@ def pick_and_place(
 
     ``pick``, ``place``: poses of the tool in the world, (4, 4) or :class:`Transform`. The tool goes down and
     up vertically over the height ``lift`` (m) at both poses, and rests ``grip_time`` (s) there. Between the
-    vertical lines the joints move on straight lines; corners are rounded by ``blend`` as in
-    :func:`~armblocks.least_time`, whose limits these are. Each of the three motions takes the least time,
-    the second one with the ``payload``. ``mask``: as for ``arm.ikine``. ``dt``: time between samples, s.
+    vertical lines the joints move on straight lines in joint space. ``blend`` rounds the corners, and
+    ``speed``, ``acceleration`` and ``torque`` are limits, as for :func:`~armblocks.least_time`. Each of the
+    three motions takes the least time, the second one with the ``payload``. ``mask``: as for ``arm.ikine``.
+    ``dt``: time between samples, s.
 
     Raises InputError for a pose that the arm does not reach, with the reason, and for a vertical line on
     which the configuration of the arm changes. Warns of positions outside the limits of the joints.

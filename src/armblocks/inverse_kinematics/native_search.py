@@ -193,11 +193,11 @@ class _Search:
         counts[Count.STEPS] = 0
         counts[Count.ATTEMPTS] = 0
         target = self.arrays["targets"].after(sample * TARGET)
-        sound = is_pose(r, target) != 0.0
+        is_valid = is_pose(r, target) != 0.0
         counts[Count.STATUS] = select(
-            sound, r.constant_integer(Status.NOT_FOUND), r.constant_integer(Status.INVALID_TARGET)
+            is_valid, r.constant_integer(Status.NOT_FOUND), r.constant_integer(Status.INVALID_TARGET)
         )
-        with r.when(sound):
+        with r.when(is_valid):
             self.samples[lane] = sample
             self.attempts[lane] = 0
             self.previous[lane * 2] = -1.0
@@ -334,16 +334,16 @@ class _Search:
         held: list[Mask] = []
         total = Lanes.constant(self.r, 0.0)
         for i, place in enumerate(self.sizes.position_of_speed):
-            slope = J[0][i] * e[0]
+            gradient = J[0][i] * e[0]
             for k in range(1, ROWS):
-                slope = fma(J[k][i], e[k], slope)
+                gradient = fma(J[k][i], e[k], gradient)
             if place is None:
-                held.append(slope != slope)
+                held.append(gradient != gradient)
             else:
                 q = self.rows["q"][place]
-                below = (q <= self._limit(Limit.LOWEST, place)) & (slope < 0.0)
-                held.append(below | ((q >= self._limit(Limit.HIGHEST, place)) & (slope > 0.0)))
-            free = select(held[-1], 0.0, slope)
+                below = (q <= self._limit(Limit.LOWEST, place)) & (gradient < 0.0)
+                held.append(below | ((q >= self._limit(Limit.HIGHEST, place)) & (gradient > 0.0)))
+            free = select(held[-1], 0.0, gradient)
             total = fma(free, free, total)
         return held, total
 

@@ -59,19 +59,19 @@ def is_pose(r: Routine, target: Reals) -> Real:
 
     The rotation may deviate from an orthonormal matrix as much as that of a ``Transform``.
     """
-    sound = target[0].finite
+    is_valid = target[0].finite
     for k in range(1, POSE):
-        sound = sound & target[k].finite
+        is_valid = is_valid & target[k].finite
     for k, value in enumerate((0.0, 0.0, 0.0, 1.0)):
-        sound = sound & (target[POSE + k] == value)
+        is_valid = is_valid & (target[POSE + k] == value)
     rotation = [[target[4 * i + j] for j in range(3)] for i in range(3)]
     for i in range(3):
         for j in range(i, 3):
             product = sum((rotation[k][i] * rotation[k][j] for k in range(3)), start=r.constant(0.0))
-            sound = sound & (abs(product - float(i == j)) <= ORTHONORMALITY)
+            is_valid = is_valid & (abs(product - float(i == j)) <= ORTHONORMALITY)
     (a, b, c), (d, e, f), (g, h, i_) = rotation
     determinant = a * (e * i_ - f * h) - b * (d * i_ - f * g) + c * (d * h - e * g)
-    return select(sound & (determinant > 0.0), 1.0, 0.0)
+    return select(is_valid & (determinant > 0.0), 1.0, 0.0)
 
 
 ORTHONORMALITY = 1e-8

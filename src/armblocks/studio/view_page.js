@@ -44,7 +44,7 @@ const el = document.getElementById('view')
 widget.render({ model, el })
 const frame = el.querySelector('iframe')
 frame.style.height = '100vh'
-// The stream begins when everything is loaded: the program may end then.
+// The event stream is opened after the page has loaded all data, because the program may then end.
 frame.addEventListener('load', () => {
   const events = new EventSource('events')
   events.onopen = () => change('_live', true)

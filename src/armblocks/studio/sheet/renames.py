@@ -75,7 +75,7 @@ class PathNames:
         """Whether clients know the paths at the start of the run."""
 
     def rename(self, renamed: Mapping[str, str]) -> None:
-        """Follow the next renames: old path to new path."""
+        """Add the next renames: old path to new path."""
         self.renames.append(dict(renamed))
 
     def present(self, path: str) -> str:
