@@ -315,7 +315,7 @@ def test_a_robot_that_differs_from_its_file_is_written_completely(tmp_path: Path
 def test_an_error_in_a_robot_file_names_both_files(tmp_path: Path) -> None:
     (tmp_path / "arm.m").write_text("x = 1;\nfor i = 1:3\n")
     data = write(arms(load_robot("kr180"))).replace(b'"kr180"', b'"arm.m"')
-    with pytest.raises(FormatError, match=r"model\.json:5, blocks\.fkine0.*arm\.m:2: 'for' is not supported"):
+    with pytest.raises(FormatError, match=r"model\.json:6, blocks\.fkine0.*arm\.m:2: 'for' is not supported"):
         read(data, tmp_path)
 
 
