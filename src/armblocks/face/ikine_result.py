@@ -31,7 +31,7 @@ class IkineResult(metaclass=ArgumentErrors):
 
     - ``"converged"``: ``q`` is a solution;
     - ``"limits"``: there are solutions only beyond the limits of joints; ``excess`` (nq,) rad or m: by
-    how much one of them exceeds the limits of each coordinate;
+      how much one of them exceeds the limits of each coordinate;
     - ``"out of reach"``: no configuration has this pose; ``position_error`` and ``rotation_error`` are those
       of the nearest pose, and ``lost_direction`` is the direction from there to the target;
     - ``"singular"``: ``q`` is near a solution, where the arm cannot move along ``lost_direction``;
