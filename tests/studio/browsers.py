@@ -70,7 +70,7 @@ Object.defineProperty(window, '__pw_bidiInsertText', {
 })
 """
 """Replaces Playwright's insertion of text by that of Firefox: React overlooks the change of Playwright's."""
-LOST_CONNECTION = re.compile("ERR_CONNECTION_|(connection to|server at) ws://")
+LOST_CONNECTION = re.compile("ERR_CONNECTION_|ERR_CONTENT_LENGTH_MISMATCH|(connection to|server at) ws://")
 """Messages of Chromium and Firefox about a studio that has ended."""
 SCRIPTS = (INSERT_TEXT,) if IN_FIREFOX else ()
 """Scripts that pages need at their start."""

@@ -18,6 +18,7 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armblocks.argument_errors import with_argument_errors
 from armblocks.errors import InputError, UnknownNameError
 from armblocks.spatial.rotation import RPY_CONVENTIONS, SINGULAR
 from armblocks.spatial.transform import ORTHONORMALITY, Transform
@@ -32,6 +33,7 @@ UNITS = ("rad", "deg")
 
 
 # ---- angles ----------------------------------------------------------------------------------------------
+@with_argument_errors
 def rpy2r(rpy: ArrayLike, order: str = "zyx", *, unit: str = "rad") -> Array:
     """The rotation (3, 3) of roll, pitch, yaw (3,).
 
@@ -44,11 +46,13 @@ def rpy2r(rpy: ArrayLike, order: str = "zyx", *, unit: str = "rad") -> Array:
     return _about_three(axes, angles[..., ::-1] if roll_last else angles)
 
 
+@with_argument_errors
 def rpy2tr(rpy: ArrayLike, order: str = "zyx", *, unit: str = "rad") -> Array:
     """The pose (4, 4) without displacement of roll, pitch, yaw (3,); ``order`` as for :func:`rpy2r`."""
     return r2t(rpy2r(rpy, order, unit=unit))
 
 
+@with_argument_errors
 def tr2rpy(T: PoseLike, order: str = "zyx", *, unit: str = "rad") -> Array:
     """Roll, pitch, yaw (3,) of a pose or rotation, ``abs(pitch) <= pi/2``; ``order`` as for :func:`rpy2r`.
 
@@ -62,16 +66,19 @@ def tr2rpy(T: PoseLike, order: str = "zyx", *, unit: str = "rad") -> Array:
     return _in_unit(-_three_angles(np.swapaxes(R, -1, -2), axes[::-1])[..., ::-1], unit, "tr2rpy")
 
 
+@with_argument_errors
 def eul2r(angles: ArrayLike, *, unit: str = "rad") -> Array:
     """The rotation (3, 3) of Euler angles phi, theta, psi (3,): R = Rz(phi) Ry(theta) Rz(psi)."""
     return _about_three("zyz", _angles(angles, unit, "eul2r"))
 
 
+@with_argument_errors
 def eul2tr(angles: ArrayLike, *, unit: str = "rad") -> Array:
     """The pose (4, 4) without displacement of Euler angles ZYZ (3,)."""
     return r2t(eul2r(angles, unit=unit))
 
 
+@with_argument_errors
 def tr2eul(T: PoseLike, *, unit: str = "rad") -> Array:
     """Euler angles ZYZ phi, theta, psi (3,) with 0 <= theta <= pi; phi is 0 if theta is 0 or pi."""
     R = rotations(T, "tr2eul")
@@ -83,6 +90,7 @@ def tr2eul(T: PoseLike, *, unit: str = "rad") -> Array:
     return _in_unit(np.stack([phi, theta, psi], axis=-1), unit, "tr2eul")
 
 
+@with_argument_errors
 def angvec2r(angle: ArrayLike, axis: ArrayLike, *, unit: str = "rad") -> Array:
     """The rotation (3, 3) by an angle about an axis (3,) of any length. Raises InputError for an axis 0."""
     vector = _vectors(axis, 3, "angvec2r")
@@ -100,6 +108,7 @@ def angvec2r(angle: ArrayLike, axis: ArrayLike, *, unit: str = "rad") -> Array:
     return q2r(np.concatenate([scalar, vector], axis=-1))
 
 
+@with_argument_errors
 def tr2angvec(T: PoseLike, *, unit: str = "rad") -> tuple[Array, Array]:
     """The angle, 0 to pi, and the unit axis (3,) of a rotation; the axis of the identity is (0, 0, 0)."""
     vector = _logarithm(rotations(T, "tr2angvec"))
@@ -109,6 +118,7 @@ def tr2angvec(T: PoseLike, *, unit: str = "rad") -> tuple[Array, Array]:
 
 
 # ---- quaternions -----------------------------------------------------------------------------------------
+@with_argument_errors
 def r2q(T: PoseLike) -> Array:
     """The unit quaternion (4,) w x y z with w >= 0 of a pose or rotation, by Shepperd's method."""
     R = rotations(T, "r2q")
@@ -126,6 +136,7 @@ def r2q(T: PoseLike) -> Array:
     return np.where(unit[..., :1] < 0.0, -unit, unit)
 
 
+@with_argument_errors
 def q2r(q: PoseLike) -> Array:
     """The rotation (3, 3) of a quaternion (4,) w x y z of any length. Raises InputError for zero."""
     quaternion = _quaternions(q, "q2r")
@@ -138,6 +149,7 @@ def q2r(q: PoseLike) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
+@with_argument_errors
 def qmul(left: PoseLike, right: PoseLike) -> Array:
     """Hamilton's product (4,) of quaternions: R(left right) = R(left) R(right)."""
     a, b = _quaternions(left, "qmul"), _quaternions(right, "qmul")
@@ -146,6 +158,7 @@ def qmul(left: PoseLike, right: PoseLike) -> Array:
     return np.concatenate([scalar, vector], axis=-1)
 
 
+@with_argument_errors
 def qinterp(q0: PoseLike, q1: PoseLike, s: ArrayLike) -> Array:
     """The unit quaternions from ``q0`` (s = 0) to ``q1`` (s = 1) on the shorter great circle (slerp).
 
@@ -155,6 +168,7 @@ def qinterp(q0: PoseLike, q1: PoseLike, s: ArrayLike) -> Array:
 
 
 # ---- exponential and logarithm ---------------------------------------------------------------------------
+@with_argument_errors
 def skew(w: ArrayLike) -> Array:
     """The skew-symmetric matrix (3, 3) of a vector (3,): ``skew(a) b = a × b``."""
     vector = _vectors(w, 3, "skew")
@@ -164,6 +178,7 @@ def skew(w: ArrayLike) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
+@with_argument_errors
 def vex(S: ArrayLike) -> Array:
     """The vector (3,) of the skew-symmetric part of a matrix (3, 3)."""
     matrix = np.asarray(S, dtype=np.float64)
@@ -173,6 +188,7 @@ def vex(S: ArrayLike) -> Array:
     return np.stack([odd[..., 2, 1], odd[..., 0, 2], odd[..., 1, 0]], axis=-1)
 
 
+@with_argument_errors
 def trexp(S: PoseLike, theta: ArrayLike = 1.0) -> PoseLike:
     """The rotation of a rotation vector (3,), or the pose of a twist (6,) ``v, w``, times ``theta``.
 
@@ -192,6 +208,7 @@ def trexp(S: PoseLike, theta: ArrayLike = 1.0) -> PoseLike:
     return _like(rt2tr(_exponential(w), (V @ v[..., None])[..., 0]), "SE3" if kind else "")
 
 
+@with_argument_errors
 def trlog(T: PoseLike) -> Array:
     """The rotation vector (3,) of a rotation (3, 3), or the twist (6,) ``v, w`` of a pose (4, 4).
 
@@ -207,6 +224,7 @@ def trlog(T: PoseLike) -> Array:
     return np.concatenate([(inverse @ array[..., :3, 3:])[..., 0], w], axis=-1)
 
 
+@with_argument_errors
 def trinterp(T0: PoseLike, T1: PoseLike, s: ArrayLike) -> PoseLike:
     """Poses or rotations from ``T0`` (s = 0) to ``T1`` (s = 1): linear position, shortest rotation.
 
@@ -224,6 +242,7 @@ def trinterp(T0: PoseLike, T1: PoseLike, s: ArrayLike) -> PoseLike:
     return _like(rt2tr(R, p), kind)
 
 
+@with_argument_errors
 def tr2delta(T0: PoseLike, T1: PoseLike) -> Array:
     """The small motion (6,) from ``T0`` to ``T1`` in frame T0: displacement, then ``vex(R0' R1 - I)``.
 
@@ -237,12 +256,14 @@ def tr2delta(T0: PoseLike, T1: PoseLike) -> Array:
     return np.concatenate([p, vex(back @ last[..., :3, :3] - np.eye(3))], axis=-1)
 
 
+@with_argument_errors
 def delta2tr(d: ArrayLike) -> Array:
     """The matrix (4, 4) ``I + [skew(w) v; 0 0]`` of a small motion (6,) ``v, w``; not exactly a pose."""
     vector = _vectors(d, 6, "delta2tr")
     return rt2tr(np.eye(3) + skew(vector[..., 3:]), vector[..., :3])
 
 
+@with_argument_errors
 def tr2adjoint(T: PoseLike) -> Array:
     """The adjoint (6, 6) of a pose: it maps a twist ``v, w`` in frame b to frame a of T_ab."""
     array = pose_array(T, "tr2adjoint")
@@ -256,6 +277,7 @@ def tr2adjoint(T: PoseLike) -> Array:
 
 
 # ---- parts of poses --------------------------------------------------------------------------------------
+@with_argument_errors
 def rt2tr(R: ArrayLike, p: ArrayLike) -> Array:
     """The pose (4, 4) of a rotation (3, 3) and a position (3,), m."""
     rotation, position = np.asarray(R, dtype=np.float64), np.asarray(p, dtype=np.float64)
@@ -265,6 +287,7 @@ def rt2tr(R: ArrayLike, p: ArrayLike) -> Array:
     return T
 
 
+@with_argument_errors
 def r2t(R: ArrayLike) -> Array:
     """The pose (4, 4) without displacement of a rotation (3, 3)."""
     return rt2tr(R, np.zeros(3))
