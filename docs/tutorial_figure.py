@@ -25,7 +25,9 @@ RUNS = {
 
 def controller_figure() -> str:
     """HTML of the chart. Executes the programs of the tutorial up to the section on margins."""
-    page = TUTORIAL.read_text(encoding="utf-8").partition("## The margins")[0]
+    page, heading, _ = TUTORIAL.read_text(encoding="utf-8").partition("## Stability margins")
+    if not heading:
+        raise ValueError(f"{TUTORIAL.name} has no section on margins")
     variables: dict[str, Any] = {}
     with contextlib.redirect_stdout(io.StringIO()):
         for code in re.findall(r"```python\n(.*?)```", page, re.DOTALL):
