@@ -46,10 +46,13 @@ const isModifier = ({ key }: KeyboardEvent): boolean =>
 const isUndoOrRedo = ({ key, ctrlKey, metaKey, altKey }: KeyboardEvent): boolean =>
   (ctrlKey || metaKey) && !altKey && ['z', 'y'].includes(key.toLowerCase())
 
+/** Whether a key acts at once: Esc closes and cancels what is displayed now. */
+const actsAtOnce = (event: KeyboardEvent): boolean => event.key === 'Escape' || isUndoOrRedo(event)
+
 function onKeyDown(event: KeyboardEvent): void {
   if (replaying || isModifier(event)) return
   // After a held key, all keys are held to preserve their order, also in a field that a held key opens.
-  if (!keys.length && (!areHeld() || !isForSheet(event) || isUndoOrRedo(event))) return
+  if (!keys.length && (!areHeld() || !isForSheet(event) || actsAtOnce(event))) return
   event.preventDefault()
   event.stopImmediatePropagation()
   keys.push(event)
@@ -95,6 +98,12 @@ function press({ key, code, ctrlKey, metaKey, altKey, shiftKey, repeat }: Keyboa
   else if (deletion) document.execCommand(deletion)
 }
 
+/** Discard held Esc keys: they would close the menu or dialog that the pointer opens now. */
+function onPointerDown(): void {
+  keys.splice(0, keys.length, ...keys.filter(({ key }) => key !== 'Escape'))
+}
+
 addEventListener('keydown', onKeyDown, true)
+addEventListener('pointerdown', onPointerDown, true)
 // Edits of held keys are stored with the other pending edits.
 addEventListener('pagehide', () => setConnected(false))

@@ -91,7 +91,7 @@ class RunProcess:
             while True:
                 message = pipe.recv_bytes()
                 self._loop.call_soon_threadsafe(self._queue.put_nowait, message)
-        except (EOFError, OSError):
+        except (EOFError, OSError, TypeError):  # TypeError: another thread closes the pipe during the call
             pass
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._queue.put_nowait, None)
