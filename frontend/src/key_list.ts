@@ -10,7 +10,7 @@ interface KeyGroup {
 export const KEYS: KeyGroup[] = [
   {
     title: 'On the sheet',
-    sources: ['canvas/sheet_keys.ts'],
+    sources: ['canvas/sheet_keys.ts', 'held_keys.ts'],
     keys: [
       ['letters', 'Add a block: type its name'],
       ['Tab', 'Select the next block'],
