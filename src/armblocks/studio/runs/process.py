@@ -61,8 +61,10 @@ class RunProcess:
         """Send the worker its job, see :func:`armblocks.studio.runs.worker.work`."""
         self.job = {**job, "run": self.key, "document": self.document}
         self._commands.put(json.dumps(self.job).encode())
-        for transfer in (self._read, self._write):
-            Thread(target=transfer, args=(self._worker.pipe,), daemon=True).start()
+        pipe = self._worker.pipe
+        writer = Thread(target=self._write, args=(pipe,), daemon=True)
+        writer.start()
+        Thread(target=self._read, args=(pipe, writer), daemon=True).start()
         self._forward_task = self._loop.create_task(self._forward_messages())
 
     def send_command(self, request: run_messages.RunCommand) -> None:
@@ -85,16 +87,22 @@ class RunProcess:
             self._killed = True
             self._worker.process.kill()
 
-    def _read(self, pipe: Connection) -> None:
-        """Receive all messages of the worker, in a separate thread; ``None`` marks the end of the process."""
+    def _read(self, pipe: Connection, writer: Thread) -> None:
+        """Receive all messages of the worker, in a separate thread; ``None`` marks the end of the process.
+
+        Then the pipe is closed. Before that its number may not be free for another file.
+        """
         try:
             while True:
                 message = pipe.recv_bytes()
                 self._loop.call_soon_threadsafe(self._queue.put_nowait, message)
-        except (EOFError, OSError, TypeError):  # TypeError: another thread closes the pipe during the call
+        except (EOFError, OSError):
             pass
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._queue.put_nowait, None)
+        self._commands.put(None)
+        writer.join()
+        pipe.close()
 
     def _write(self, pipe: Connection) -> None:
         """Send commands to the worker in a separate thread; a hung worker does not block the server."""

@@ -77,9 +77,8 @@ class Worker:
         sender.close()
 
     def end(self) -> None:
-        """Kill the process."""
+        """Kill the process. Its end of the pipe is closed, which a thread that reads the pipe notices."""
         self.process.kill()
-        self.pipe.close()
 
 
 NEXT_WORKER_DELAY_SECONDS = 0.5
