@@ -52,11 +52,12 @@ def test_the_python_code_of_a_shipped_example_gives_the_same_diagram(name: str) 
     assert f"stop_time={ab.load_diagram(name).settings.stop_time}" in run
 
 
-def test_a_robot_without_name_or_file_cannot_be_written_as_python() -> None:
+@pytest.mark.parametrize("name", WITH_OWN_ROBOT)
+def test_a_robot_without_name_or_file_cannot_be_written_as_python(name: str) -> None:
     with pytest.raises(
         FormatError, match=r"neither shipped nor loaded from a file.*write the diagram as JSON"
     ):
-        diagram_to_python(ab.load_diagram("falling_pendulum"))
+        diagram_to_python(ab.load_diagram(name))
 
 
 def test_an_unknown_block_has_no_example() -> None:

@@ -205,7 +205,7 @@ def _minimum_step(system: CompiledSystem, run: Integration) -> SimulationError:
     stiff = "" if needs_jacobian else f"; if it is stiff, solver='{STIFF.name}'"
     return SimulationError(
         f"the run takes extremely short steps at {run.time:.6g} s: {run.last_step:.2g} s. It would need "
-        f"{left:.0e} further steps, mainly because of state '{name}'",
+        f"{left:.0e} more steps, mainly because of state '{name}'",
         where=system.name,
         allowed="equations that jump at events only",
         fix=f"check the input of '{name}' for a jump that depends on the state, such as Coulomb friction or "
