@@ -7,11 +7,13 @@ does not depend on the length of the table.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
 from casadi import SX, fmax, fmin, if_else, logic_and, logic_or
 
 from armblocks.blocks.switching import edge_count, since
-from armblocks.diagram import Guard, State
+from armblocks.diagram import Block, Guard, Shapes, Signals, State
 from armblocks.equations import last_at_or_below, read_entry
 
 ROW_MODES = (State("row", (), "index of the last row at or before t, from 0; -1 before the first row"),)
@@ -58,3 +60,39 @@ class TableRows:
     def _is_before(self, t: SX, row: SX) -> SX:
         """Whether t is before row 0, while the first row is held."""
         return logic_and(row == 0.0, since(t, self.entry(SX(0.0), 0)) < 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BlockWithRows(Block):
+    """A block that plays back the table of its parameter ``data``: rows of a time (s) and values."""
+
+    following_modes: ClassVar[bool] = True
+
+    if TYPE_CHECKING:
+        data: Any  # a parameter of the subclass
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return ROW_MODES
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        return ROW_GUARDS
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"next": self._rows(p).guard(t, x["row"])}
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"row": self._rows(p).consistent(t, x["row"])}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"row": self._rows(p).contradicts(t, x["row"])}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        return {"row": x["row"] + (e["next"] > 0.0)}
+
+    @property
+    def _size(self) -> tuple[int, int]:
+        rows, width = np.shape(self.data)
+        return rows, width
+
+    def _rows(self, p: Signals) -> TableRows:
+        return TableRows(*self._size, p["data"])

@@ -6,18 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
 from casadi import SX, if_else, vertcat
 
-from armblocks.blocks.table_rows import ROW_GUARDS, ROW_MODES, TableRows
+from armblocks.blocks.table_rows import BlockWithRows, TableRows
 from armblocks.diagram import (
-    Block,
-    Guard,
     ParameterKind,
     Port,
-    Shapes,
     Signals,
-    State,
     TimeTable,
     WorkedExample,
     parameter,
@@ -27,7 +22,7 @@ from armblocks.errors import InputError, counted
 
 
 @dataclass(frozen=True, kw_only=True)
-class Trajectory(Block):
+class Trajectory(BlockWithRows):
     """A joint motion from a table: rows of t, q, qd, qdd, interpolated by quintics.
 
     ``trajectory.block()`` gives this block for any joint trajectory, and ``trajectory.save(path)`` writes its
@@ -37,7 +32,6 @@ class Trajectory(Block):
     rest.
     """
 
-    following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "trajectory"
     sign: ClassVar[FaceSign] = graph((0, 0), (0.3, 0.05), (0.5, 0.6), (0.7, 0.5), (0.85, 1), (1, 1))
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -78,12 +72,6 @@ class Trajectory(Block):
             Port("qdd", "joint accelerations", "rad/s2", shape),
         )
 
-    def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return ROW_MODES
-
-    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return ROW_GUARDS
-
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         table, n = self._rows(p), (self._size[1] - 1) // 3
         row, between = table.present(x["row"]), table.is_between(x["row"])
@@ -105,26 +93,6 @@ class Trajectory(Block):
         qd = qd0 + s * h * qdd0 + s * s * (3.0 * cubic + s * (4.0 * fourth + 5.0 * s * fifth)) / h
         qdd = qdd0 + s * (6.0 * cubic + s * (12.0 * fourth + 20.0 * s * fifth)) / (h * h)
         return {"q": q, "qd": if_else(between, qd, 0.0), "qdd": if_else(between, qdd, 0.0)}
-
-    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"next": self._rows(p).guard(t, x["row"])}
-
-    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"row": self._rows(p).consistent(t, x["row"])}
-
-    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"row": self._rows(p).contradicts(t, x["row"])}
-
-    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        return {"row": x["row"] + (e["next"] > 0.0)}
-
-    @property
-    def _size(self) -> tuple[int, int]:
-        rows, width = np.shape(self.data)
-        return rows, width
-
-    def _rows(self, p: Signals) -> TableRows:
-        return TableRows(*self._size, p["data"])
 
 
 def _motion(table: TableRows, row: SX, n: int) -> list[SX]:

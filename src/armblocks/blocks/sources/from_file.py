@@ -5,18 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
 from casadi import SX, if_else, vertcat
 
-from armblocks.blocks.table_rows import ROW_GUARDS, ROW_MODES, TableRows
+from armblocks.blocks.table_rows import BlockWithRows
 from armblocks.diagram import (
-    Block,
-    Guard,
     ParameterKind,
     Port,
-    Shapes,
     Signals,
-    State,
     TimeTable,
     WorkedExample,
     parameter,
@@ -25,7 +20,7 @@ from armblocks.diagram.signs import FaceSign, graph
 
 
 @dataclass(frozen=True, kw_only=True)
-class FromFile(Block):
+class FromFile(BlockWithRows):
     """A signal from a table: y = values of the rows around t, interpolated linearly or held.
 
     In the file of a diagram, ``data`` names a CSV, NPZ, MAT or Parquet file, relative to the diagram's file,
@@ -37,7 +32,6 @@ class FromFile(Block):
     converted: the unit in a header such as ``q1 [deg]`` is that of the signal.
     """
 
-    following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "From File"
     sign: ClassVar[FaceSign] = graph((0, 0.2), (0.3, 0.9), (0.6, 0.4), (1, 0.7))
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -69,12 +63,6 @@ class FromFile(Block):
             ),
         )
 
-    def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return ROW_MODES
-
-    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return ROW_GUARDS
-
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         table, width = self._rows(p), self._size[1]
         row, between = table.present(x["row"]), table.is_between(x["row"])
@@ -88,23 +76,3 @@ class FromFile(Block):
         if self.outside == "zero":
             values = if_else(between, values, 0.0)
         return {"y": values}
-
-    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"next": self._rows(p).guard(t, x["row"])}
-
-    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"row": self._rows(p).consistent(t, x["row"])}
-
-    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"row": self._rows(p).contradicts(t, x["row"])}
-
-    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        return {"row": x["row"] + (e["next"] > 0.0)}
-
-    @property
-    def _size(self) -> tuple[int, int]:
-        rows, width = np.shape(self.data)
-        return rows, width
-
-    def _rows(self, p: Signals) -> TableRows:
-        return TableRows(*self._size, p["data"])
