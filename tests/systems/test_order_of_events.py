@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from small_subsystems import counter, scaled
 
 import armblocks as ab
 from armblocks.blocks import (
@@ -35,29 +36,12 @@ from armblocks.blocks import (
     Step,
     Sum,
     TriggeredSubsystem,
-    UnitDelay,
     ZeroOrderHold,
 )
 from armblocks.diagram import Diagram
 
 STOP = 2.0
 JUMPS = (0.3, 0.5, 0.8, 1.1, 1.6)
-
-
-def scaled(gain: float) -> Diagram:
-    """A subsystem: its input times ``gain``."""
-    inner = ab.DiagramBuilder("scaled")
-    inner.add("out", Outport(), inner.add("gain", Gain(gain=gain), inner.add("in", Inport())))
-    return inner.build()
-
-
-def counter() -> Diagram:
-    """A subsystem that adds its input to its output at each execution."""
-    inner = ab.DiagramBuilder("counter")
-    total = inner.add("total", Sum(signs="++"), inner.add("in", Inport()))
-    inner.connect(inner.add("delay", UnitDelay(), total), total["u2"])
-    inner.add("out", Outport(), total)
-    return inner.build()
 
 
 def resting() -> Diagram:

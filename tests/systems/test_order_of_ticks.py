@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from small_subsystems import counter, scaled
 
 import armblocks as ab
 from armblocks.blocks import (
@@ -20,8 +21,6 @@ from armblocks.blocks import (
     EnabledSubsystem,
     Gain,
     If,
-    Inport,
-    Outport,
     Relay,
     ResettableIntegrator,
     SineWave,
@@ -30,7 +29,6 @@ from armblocks.blocks import (
     UnitDelay,
     ZeroOrderHold,
 )
-from armblocks.diagram import Diagram
 
 PERIOD, TICKS = 0.1, 40
 BETWEEN_TICKS = slice(1, 2 * TICKS, 2)
@@ -38,22 +36,6 @@ BETWEEN_TICKS = slice(1, 2 * TICKS, 2)
 Values = dict[str, float]
 Rule = Callable[[Values, Values], float]
 """The output of a block at a tick, from the signals at this tick and at the tick before."""
-
-
-def scaled(gain: float) -> Diagram:
-    """A subsystem: its input times ``gain``."""
-    inner = ab.DiagramBuilder("scaled")
-    inner.add("out", Outport(), inner.add("gain", Gain(gain=gain), inner.add("in", Inport())))
-    return inner.build()
-
-
-def counter() -> Diagram:
-    """A subsystem that adds its input to its output at each execution."""
-    inner = ab.DiagramBuilder("counter")
-    total = inner.add("total", Sum(signs="++"), inner.add("in", Inport()))
-    inner.connect(inner.add("delay", UnitDelay(), total), total["u2"])
-    inner.add("out", Outport(), total)
-    return inner.build()
 
 
 class SampledNetwork:

@@ -102,17 +102,17 @@ class HybridSystem:
     tick. If ticks have several levels, a clock with ``m[k] = 2 + j`` ticks for the outputs and discrete
     states of level ``j`` only. If ``captures`` is true, it is also evaluated without a ticking clock just
     before every instant, at a time one unit in the last place earlier: z then stores left limits. ``reset``:
-    the additional input ``e (ng,)``, +1 or -1 where a guard fired upwards or downwards, else 0; outputs
-    ``x (nx,)`` and ``z (nz,)``.
-    With all ``e`` zero it gives the consistent modes (for example of a limiter that starts beyond its limit)
-    and the resulting states. A run makes this call at the start after the ticks, and whenever no guard fires
-    and a mode is inconsistent. At a breakpoint, as at a tick, the signs of guards before and after the
-    instant are compared. ``contradictions``: the inputs of ``guards``; output ``c (nm,)``, not 0 where the
-    mode ``z[modes[k]]`` is not consistent with the present values. ``initial_states``, ``initial_discrete``,
-    ``initial_algebraic``: input ``p``; output ``x0``, ``z0``, ``w0``. At the start all clocks without an
-    offset tick, before the first derivative. ``breakpoints``: input ``p``; output ``times (nb,)``: known
-    times at which signals jump (a step source). Signals are right-continuous: at a breakpoint, a tick or an
-    event they have their new values.
+    the additional input ``e (ng,)``, +1 or -1 where a guard fired upwards or downwards, else 0; outputs ``x
+    (nx,)`` and ``z (nz,)``. With all ``e`` zero it gives the consistent modes (for example of a limiter that
+    starts beyond its limit) and the resulting states. A run makes this call at the start, before each level
+    of ticks that follows events and after the ticks, and whenever no guard fires and a mode is inconsistent.
+    At a breakpoint, as at a tick, the signs of guards before and after the instant are compared.
+    ``contradictions``: the inputs of ``guards``; output ``c (nm,)``, not 0 where the mode ``z[modes[k]]`` is
+    not consistent with the present values. ``initial_states``, ``initial_discrete``, ``initial_algebraic``:
+    input ``p``; output ``x0``, ``z0``, ``w0``. At the start all clocks without an offset tick, before the
+    first derivative. ``breakpoints``: input ``p``; output ``times (nb,)``: known times at which signals jump
+    (a step source). Signals are right-continuous: at a breakpoint, a tick or an event they have their new
+    values.
     """
 
     name: str
