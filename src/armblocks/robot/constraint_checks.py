@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from armblocks.errors import RobotError, UnknownNameError
 from armblocks.robot.constraints import Constraint
-from armblocks.robot.fields import check_kind
+from armblocks.robot.fields import check_parts
 from armblocks.robot.link import Link
 
 MAX_CONSTRAINTS = 300
@@ -19,26 +19,10 @@ def check_constraints(robot: str, links: Sequence[Link], constraints: Sequence[C
     ``robot`` is the name of the robot.
     """
     where = f"robot '{robot}'"
-    if len(constraints) > MAX_CONSTRAINTS:
-        raise RobotError(
-            f"it has {len(constraints)} constraints",
-            where=where,
-            allowed=f"at most {MAX_CONSTRAINTS}",
-            fix="split the robot",
-        )
+    check_parts(constraints, Constraint, "constraint", MAX_CONSTRAINTS, where=where, fix="split the robot")
     joints = {link.name: link.joint for link in links}
-    names: set[str] = set()
     for constraint in constraints:
-        check_kind(constraint, Constraint, where=f"constraints of {where}")
         place = f"{where}, constraint '{constraint.name}'"
-        if constraint.name in names:
-            raise RobotError(
-                f"two constraints are named '{constraint.name}'",
-                where=where,
-                allowed="unique names",
-                fix="rename one of the constraints",
-            )
-        names.add(constraint.name)
         for name in (*constraint.links, *constraint.joints):
             if name is not None and name not in joints:
                 raise UnknownNameError("link", name, joints, where=place)

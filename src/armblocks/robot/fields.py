@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import cast
+from collections.abc import Sequence
+from typing import Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -52,3 +53,31 @@ def pose(value: object, *, where: str) -> Transform:
 def check_kind(value: object, kind: type, *, where: str) -> None:
     """Raise ``RobotError`` unless a value is of a class of the description."""
     check_type(value, kind, f"a {kind.__name__}", where=where, error=RobotError)
+
+
+class Named(Protocol):
+    """A part of a description with a name."""
+
+    @property
+    def name(self) -> str: ...
+
+
+def check_parts(parts: Sequence[Named], kind: type, noun: str, most: int, *, where: str, fix: str) -> None:
+    """Raise ``RobotError`` unless these are at most ``most`` parts of this class with different names.
+
+    ``noun``: the word for one part in messages. ``fix``: what to do if there are too many.
+    """
+    if len(parts) > most:
+        what = f"it has {len(parts)} {noun}s"
+        raise RobotError(what, where=where, allowed=f"at most {most}", fix=fix)
+    names: set[str] = set()
+    for part in parts:
+        check_kind(part, kind, where=f"{noun}s of {where}")
+        if part.name in names:
+            raise RobotError(
+                f"two {noun}s are named '{part.name}'",
+                where=where,
+                allowed="unique names",
+                fix=f"rename one of the {noun}s",
+            )
+        names.add(part.name)

@@ -14,7 +14,7 @@ from typing import ClassVar, Self
 from armblocks.argument_errors import ArgumentErrors
 from armblocks.errors import RobotError, UnknownNameError
 from armblocks.robot.constraints import Attachment
-from armblocks.robot.fields import check_kind, number
+from armblocks.robot.fields import check_kind, check_parts, number
 from armblocks.robot.link import Link
 
 MAX_SPRINGS = 300
@@ -127,26 +127,11 @@ SPRING_TYPES: tuple[type[Spring], ...] = (JointSpring, LineSpring)
 def check_springs(robot: str, links: Sequence[Link], springs: Sequence[Spring]) -> None:
     """Raise RobotError or UnknownNameError for the first inconsistency. ``robot`` is the robot's name."""
     where = f"robot '{robot}'"
-    if len(springs) > MAX_SPRINGS:
-        raise RobotError(
-            f"it has {len(springs)} springs",
-            where=where,
-            allowed=f"at most {MAX_SPRINGS}",
-            fix="leave out springs that are not used",
-        )
+    fix = "leave out springs that are not used"
+    check_parts(springs, Spring, "spring", MAX_SPRINGS, where=where, fix=fix)
     joints = {link.name: link.joint for link in links}
-    names: set[str] = set()
     for spring in springs:
-        check_kind(spring, Spring, where=f"springs of {where}")
         place = f"{where}, spring '{spring.name}'"
-        if spring.name in names:
-            raise RobotError(
-                f"two springs are named '{spring.name}'",
-                where=where,
-                allowed="unique names",
-                fix="rename one of the springs",
-            )
-        names.add(spring.name)
         if isinstance(spring, JointSpring):
             if spring.joint not in joints:
                 raise UnknownNameError("joint", spring.joint, joints, where=place)
