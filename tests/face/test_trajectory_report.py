@@ -35,6 +35,20 @@ def test_a_trapezoidal_motion_binds_acceleration_speed_acceleration() -> None:
     assert "acceleration of x" in str(report)
 
 
+def test_the_share_of_a_limit_that_does_not_exist_is_unknown() -> None:
+    path = ab.point_to_point(-0.3, 0.6, speed=1.0, acceleration=2.0)
+    (row,) = ab.trajectory_report(slider(), path, speed=1.0).table()
+    assert row["speed %"] == pytest.approx(100.0)
+    assert np.isnan([row["acceleration %"], row["torque %"]]).all()
+
+
+def test_rounding_errors_of_a_position_of_0_are_not_shown() -> None:
+    path = ab.spline_trajectory([[0.0], [0.2], [0.0]], [0.0, 1.0, 2.0])
+    q = path.q - 5e-17
+    report = ab.trajectory_report(slider(), ab.JointTrajectory(t=path.t, q=q, qd=path.qd, qdd=path.qdd))
+    assert report.table()[0]["lowest"] == 0.0 and "e−17" not in str(report)
+
+
 def test_exceeded_limits_are_sentences() -> None:
     arm = ab.load_robot("puma560")
     path = ab.jtraj(np.zeros(6), [6.0, 0, 0, 0, 0, 0], np.linspace(0, 1, 50))

@@ -29,6 +29,8 @@ BINDING = 0.95
 """Fraction of a limit from which it counts as binding."""
 _SHORT = 0.01
 """Fraction of the cycle time below which intervals are left out."""
+_ROUNDING = 1e-14
+"""Positions that are smaller, relative to the largest one of the joint, are rounding errors of 0."""
 _SAMPLES = 1000
 _MAX_TEXT_INTERVALS = 12
 _QUANTITIES = ("speed", "acceleration", "torque")
@@ -131,13 +133,17 @@ class TrajectoryReport(metaclass=ArgumentErrors):
         return tuple(shown)
 
     def table(self) -> list[dict[str, float | str]]:
-        """One row for each joint: peaks in rad or m, s, N m or N, and in % of the limits."""
+        """One row for each joint: peaks in rad or m, s, N m or N, and in % of the limits; NaN without a
+        limit."""
         peaks = {"speed": self.qd, "acceleration": self.qdd, "torque": self.tau}
-        shares = 100.0 * self.ratios.max(axis=0)
+        limits = np.stack([self.speed_limits, self.acceleration_limits, self.torque_limits])
+        shares = np.where(np.isfinite(limits), 100.0 * self.ratios.max(axis=0), np.nan)
         rows: list[dict[str, float | str]] = []
         for j, joint in enumerate(self.joints):
             row: dict[str, float | str] = {"joint": joint, "unit": self.units[j]}
-            row |= {"lowest": float(self.q[:, j].min()), "highest": float(self.q[:, j].max())}
+            ends = {"lowest": float(self.q[:, j].min()), "highest": float(self.q[:, j].max())}
+            rounding = _ROUNDING * max(map(abs, ends.values()))
+            row |= {name: value if abs(value) > rounding else 0.0 for name, value in ends.items()}
             row["margin"] = float(self.position_margin[j])
             for k, (name, values) in enumerate(peaks.items()):
                 row[name] = float(np.abs(values[:, j]).max())
