@@ -14,7 +14,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
-from casadi import SX, Function, densify, jtimes, vertcat
+from casadi import SX, Function, densify, vertcat
 
 from armblocks.diagram.block import Block, Shapes, Signals
 from armblocks.diagram.conditional_equations import FIRE, conditional
@@ -27,7 +27,7 @@ from armblocks.diagram.generated_modes import (
 )
 from armblocks.diagram.parameter import shape_of
 from armblocks.diagram.port import DelayLine, Guard, State
-from armblocks.equations import Shape, Slot, call_with_constants, has_elementary
+from armblocks.equations import Shape, Slot, call_with_constants, directional_derivative, has_elementary
 from armblocks.errors import DiagramError
 
 
@@ -83,8 +83,7 @@ class Group:
     def rate(self, order: int) -> Function:
         """The ``order``-th time derivative as a function of ``t, p, z, z', …`` up to that order of z.
 
-        f' = df/dt + df/dz z' + df/dz' z'' + …: exact, by CasADi's forward differentiation. The
-        result is cached in the group.
+        f' = df/dt + df/dz z' + df/dz' z'' + …: exact. The result is cached in the group.
         """
         if not self._rates:
             self._rates.append((self.expression, (self.z,)))
@@ -93,7 +92,8 @@ class Group:
             next_order = SX.sym(f"z{len(orders)}", self.z.numel())
             variables = vertcat(self.t, *orders)
             seeds = vertcat(1.0, *orders[1:], next_order)
-            self._rates.append((densify(jtimes(expression, variables, seeds)), (*orders, next_order)))
+            rate = directional_derivative(expression, variables, seeds)
+            self._rates.append((densify(rate), (*orders, next_order)))
         if order not in self._functions:
             expression, orders = self._rates[order]
             self._functions[order] = Function("f", [self.t, self.p, *orders], [expression])

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     )
     from armblocks.equations.continuous import continuous_system
     from armblocks.equations.flow_jacobian import FlowJacobian, trace_flow_jacobian
+    from armblocks.equations.forward_differentiation import directional_derivative
     from armblocks.equations.hybrid_system import (
         Delays,
         EventRanks,
@@ -42,6 +43,7 @@ else:
             "TracedFunction": "armblocks.equations.traced_function",
             "call_with_constants": "armblocks.equations.constant_folding",
             "continuous_system": "armblocks.equations.continuous",
+            "directional_derivative": "armblocks.equations.forward_differentiation",
             "elementary": "armblocks.equations.constant_folding",
             "flatten": "armblocks.equations.symbols",
             "has_elementary": "armblocks.equations.constant_folding",
@@ -69,6 +71,7 @@ __all__ = [
     "TracedFunction",
     "call_with_constants",
     "continuous_system",
+    "directional_derivative",
     "elementary",
     "flatten",
     "has_elementary",

@@ -88,6 +88,16 @@ def call_with_constants(function: Function, arguments: Sequence[SX]) -> list[SX]
     """The result columns of an SX function for these arguments, some of which may be constants."""
     if not any(map(_has_constants, arguments)):
         return function.call(list(arguments), True, False)
+    return results_of_operations(function, arguments, operation_value)
+
+
+def results_of_operations(
+    function: Function, arguments: Sequence[SX], value_of: Callable[[int, Sequence[SX]], SX]
+) -> list[SX]:
+    """The result columns of an SX function, from the value of each operation.
+
+    ``value_of(number, operands)`` is the value of the operation with CasADi's number.
+    """
     whole = [densify(argument) for argument in arguments]
     results = [SX.zeros(function.numel_out(k)) for k in range(function.n_out())]
     rows = [function.sparsity_out(k).row() for k in range(function.n_out())]
@@ -107,7 +117,7 @@ def call_with_constants(function: Function, arguments: Sequence[SX]) -> list[SX]
                 if slot >= 0:
                     work[slot] = value
         else:
-            work[target[0]] = operation_value(number, [work[source] for source in sources])
+            work[target[0]] = value_of(number, [work[source] for source in sources])
     return results
 
 

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from casadi import SX, Function, densify, depends_on, jacobian, jtimes, vertcat
 
 from armblocks.equations.evaluation import refuse_called
+from armblocks.equations.forward_differentiation import directional_derivative
 from armblocks.equations.hybrid_system import HybridSystem, LinearLoops
 from armblocks.equations.located_jumps import with_located_jumps
 from armblocks.equations.sensitivity_delays import DelayedSensitivities
@@ -175,7 +176,7 @@ class _AugmentedSystem:
         (p,) = traced.arguments
         c = self.columns
         value = vertcat(*traced.results, SX(0, 1))
-        parts = [value, *(jtimes(value, p, seed) for seed in c.seeds)]
+        parts = [value, *(directional_derivative(value, p, seed) for seed in c.seeds)]
         if letter == "z0" and c.added:
             starts = Function("f", [c.p], [vertcat(*c.starts.values())])
             parts += starts.call([p], True, False)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from casadi import SX, Function, densify, jtimes, vertcat
+from casadi import SX, Function, densify, vertcat
 
+from armblocks.equations.forward_differentiation import directional_derivative
 from armblocks.equations.hybrid_system import HybridSystem
 from armblocks.equations.signatures import Signature, Slot
 from armblocks.equations.traced_function import TracedFunction
@@ -93,7 +94,7 @@ class Columns:
         if not expression.numel():
             return SX(0, 1)
         by = vertcat(self.t, self.x, self.z, self.w, self.p)
-        return densify(jtimes(expression, by, vertcat(t, x, z, w, p)))
+        return densify(directional_derivative(expression, by, vertcat(t, x, z, w, p)))
 
     def extended(self, layout: Signature, letter: str) -> Signature:
         """The slots of ``x``, ``z`` or ``w`` with those of their sensitivities."""

@@ -1,0 +1,103 @@
+"""Directional derivatives that are finite where the direction does not change a root, a power or an angle.
+
+The derivative of ``sqrt(u)`` is infinite at ``u = 0``. CasADi's forward differentiation multiplies it by the
+rate of u, so that a root that rests at 0 has the rate ``0 * inf = nan``. Here the rate of an operation whose
+operand does not change is 0, whatever its partial derivative is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi
+from casadi import SX, Function, densify, if_else, jtimes, logic_and, reshape, symvar, vec, vertcat
+
+from armblocks.equations.constant_folding import operation_value, results_of_operations, substituted
+
+_POWERS = (casadi.OP_POW, casadi.OP_CONSTPOW)
+_UNBOUNDED = frozenset(
+    (
+        *_POWERS,
+        casadi.OP_SQRT,
+        casadi.OP_ASIN,
+        casadi.OP_ACOS,
+        casadi.OP_ACOSH,
+        casadi.OP_ATAN2,
+        casadi.OP_HYPOT,
+    )
+)
+"""Operations with a finite value at a point where a partial derivative is infinite or does not exist."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Operation:
+    """One operation of :data:`_UNBOUNDED`, whose value is a symbol in the operations after it."""
+
+    number: int
+    operands: tuple[SX, ...]
+    symbol: SX
+
+    def rate(self, rates: Sequence[SX]) -> SX:
+        """The rate of the value, from the rates of the operands."""
+        total = SX(0.0)
+        for k, rate in enumerate(rates):
+            if not rate.is_zero():
+                total += if_else(rate == 0.0, 0.0, rate * self._partial(k))
+        return total
+
+    def _partial(self, index: int) -> SX:
+        """The partial derivative with respect to one operand."""
+        symbols = [SX.sym(f"a{k}") for k in range(len(self.operands))]
+        value = operation_value(self.number, symbols)
+        partial = jtimes(value, symbols[index], SX(1.0))
+        if self.number in _POWERS:
+            base, exponent = symbols
+            # 0 ** y is 0 for all y > 0, and x ** 0 is 1 for all x.
+            constant = (exponent == 0.0, logic_and(base == 0.0, exponent > 0.0))[index]
+            partial = if_else(constant, 0.0, partial)
+        return substituted(partial, vertcat(*symbols), vertcat(*self.operands))
+
+
+def directional_derivative(expression: SX, variables: SX, direction: SX) -> SX:
+    """The derivative of ``expression`` along ``direction``, in the shape of the expression.
+
+    ``variables`` is a column of symbols (n, 1), and ``direction`` (n, 1) their rates. An operation whose
+    operands have the rate 0 has the rate 0. A rate that is not finite remains: that of ``sqrt(u)`` where u
+    leaves 0 with a rate other than 0.
+    """
+    own = {variables[k].element_hash() for k in range(variables.numel())}
+    others = vertcat(*(symbol for symbol in symvar(expression) if symbol.element_hash() not in own), SX(0, 1))
+    function = Function("f", [variables, others], [vec(densify(expression))])
+    if not any(function.instruction_id(k) in _UNBOUNDED for k in range(function.n_instructions())):
+        return jtimes(expression, variables, direction)
+    operations, column = _cut(function, (variables, others))
+    symbols, values, rates = SX(0, 1), SX(0, 1), direction
+    for operation in operations:
+        operands = vertcat(*operation.operands)
+        of_operands = densify(jtimes(operands, vertcat(variables, symbols), rates))
+        rate = operation.rate([of_operands[k] for k in range(operands.numel())])
+        value = operation_value(operation.number, _entries(substituted(operands, symbols, values)))
+        symbols = vertcat(symbols, operation.symbol)
+        values = vertcat(values, value)
+        rates = vertcat(rates, rate)
+    derivative = densify(jtimes(column, vertcat(variables, symbols), rates))
+    return reshape(substituted(derivative, symbols, values), *expression.shape)
+
+
+def _entries(column: SX) -> list[SX]:
+    return [column[k] for k in range(column.numel())]
+
+
+def _cut(function: Function, arguments: Sequence[SX]) -> tuple[list[_Operation], SX]:
+    """The operations of :data:`_UNBOUNDED` in sequence, and the result as a function of their symbols."""
+    operations: list[_Operation] = []
+
+    def value(number: int, operands: Sequence[SX]) -> SX:
+        if number not in _UNBOUNDED or all(operand.is_constant() for operand in operands):
+            return operation_value(number, operands)
+        operations.append(_Operation(number, tuple(operands), SX.sym(f"s{len(operations)}")))
+        return operations[-1].symbol
+
+    (result,) = results_of_operations(function, arguments, value)
+    return operations, result
