@@ -2,9 +2,9 @@
 
     ARMBLOCKS_PEERS=peers/bin/python python benchmarks/inverse_kinematics.py
 
-The peers run in an environment of their own (see inverse_kinematics_peers.py), directly after the measurement
-of armblocks for the same robot, with the same axes, limits and targets. The targets are the poses of random
-coordinates within the limits. The output is the tables for RESULTS.md.
+The other programs run in a separate environment (see inverse_kinematics_peers.py), directly after the
+measurement of armblocks for the same robot, with the same axes, limits and targets. The targets are the poses
+of random coordinates within the limits. The output is the tables for RESULTS.md.
 """
 
 # pyright: basic

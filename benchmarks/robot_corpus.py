@@ -1,4 +1,4 @@
-"""How many robot files of published packages load, and how well they agree with Pinocchio and MuJoCo.
+"""Load the robot files of published packages, and compare the robots with Pinocchio and MuJoCo.
 
     python benchmarks/robot_corpus.py FOLDER [--download] [--packages A,B] [--seconds 280] [--max-joints 40]
 
@@ -87,7 +87,8 @@ REASONS = (
 
 @dataclass(kw_only=True)
 class Result:
-    """What came of one file; ``reason``: why it was refused; ``seconds`` of processor time of the load."""
+    """The result of one file; ``reason``: why the file was refused; ``seconds`` of processor time of the
+    load."""
 
     file: str
     package: str
@@ -186,7 +187,7 @@ def _compare(result: Result, robot: Robot, path: Path, max_joints: int) -> None:
 
 
 def run(folder: Path, packages: list[str], seconds: float, max_joints: int) -> None:
-    """Append the results of the files that have none yet, until the time is over."""
+    """Append the results of the files without a result, up to the time limit."""
     store = folder / "results.jsonl"
     known = {result.file: result.reason for result in stored(store)}
     end = time.monotonic() + seconds
@@ -203,7 +204,7 @@ def run(folder: Path, packages: list[str], seconds: float, max_joints: int) -> N
             if time.monotonic() > end:
                 print("stopped; run the command again to continue", file=sys.stderr)
                 return
-            # The line that a crash of the process leaves behind.
+            # An incomplete line of a process that crashed.
             started = Result(file=name, package=package, format=FORMATS[path.suffix.lower()], reason="crash")
             lines.write(json.dumps(asdict(started)) + "\n")
             lines.flush()

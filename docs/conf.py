@@ -6,7 +6,7 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
-# The worked example of each block runs once, so that optimisation is not worth its time.
+# The worked example of each block runs once, so optimised compilation would take longer than it saves.
 os.environ.setdefault("ARMBLOCKS_EFFORT", "little")
 
 from generated_pages import write_generated_pages  # noqa: E402

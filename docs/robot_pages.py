@@ -39,13 +39,14 @@ Lengths and ranges are facts from publications; each page names the sources and 
 are used, no text, drawing or program of the source was copied. Most arms were compared with a
 second source that shares no code with the first. The bodies are drawn from the kinematics and are not the
 shapes of the real arms. Masses, centres of mass and inertias are those of a publication or of the
-manufacturer, or computed from CAD models by the authors of a package. Where there are none, they are
-*estimated* from the drawn bodies (`scripts/estimated_masses.py`), those of palletising arms from payload and
-lengths (`scripts/palletisers.py`): suitable for trying an algorithm, not for sizing a drive.
+manufacturer, or computed from CAD models by the authors of a package. If no source states them, they are
+*estimated*: from the drawn bodies (`scripts/estimated_masses.py`), or for palletising arms from payload and
+lengths (`scripts/palletisers.py`). Estimates are suitable for tests of algorithms, but not for the sizing of
+drives.
 
 *Reach* is the greatest distance of the tool frame from axis 1, computed from the table and the ranges.
-Data sheets often state that of the wrist, which is smaller. Payloads are those of data sheets, or of the
-model's name.
+Data sheets often state the smaller reach of the wrist. Payloads are those of data sheets, or follow from the
+name of the model.
 """
 
 

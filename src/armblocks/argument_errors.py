@@ -2,7 +2,8 @@
 
 Python's TypeError for such a call does not list the valid names. Public classes have the metaclass
 :class:`ArgumentErrors`, which raises :class:`~armblocks.errors.ArgumentError` instead, also in their public
-methods; :func:`with_argument_errors` does the same for functions. An ``ArgumentError`` is a TypeError, too.
+methods. :func:`with_argument_errors` is the corresponding decorator of functions. An ``ArgumentError`` is a
+TypeError, too.
 """
 
 from __future__ import annotations
@@ -53,7 +54,9 @@ class ArgumentErrors(ABCMeta):
 
     @property
     def __signature__(cls) -> inspect.Signature:
-        """The signature of the constructor. By default ``inspect.signature`` returns that of ``__call__``."""
+        """The signature of the constructor. By default ``inspect.signature`` of a class with a metaclass
+        returns the signature of ``__call__``.
+        """
         return inspect.signature(types.MethodType(cls.__init__, cls))
 
 

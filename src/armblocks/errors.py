@@ -14,7 +14,7 @@
     ├── FormatError           a file that cannot be read or written (file:line)
     ├── MissingLibraryError   a library of an optional extra is not installed
     ├── CompileError          equations that the compiler cannot translate
-    └── SimulationError       a run that failed (it keeps the results up to that time)
+    └── SimulationError       a run that failed (with the results up to that time)
 
     ArmblocksWarning(UserWarning)
     ├── InertiaWarning        an inertia that no body can have
@@ -156,10 +156,10 @@ class RobotError(ArmblocksError):
 
 
 class AssemblyError(RobotError):
-    """No configuration near a guess satisfies the constraints of a robot, as far as the search found.
+    """The search found no configuration near a guess that satisfies the constraints of a robot.
 
-    ``q`` are the coordinates of the best configuration; ``gaps`` has the remaining gap of each constraint in
-    words.
+    ``q`` are the coordinates of the best configuration; ``gaps`` describes the remaining gap of each
+    constraint.
     """
 
     def __init__(

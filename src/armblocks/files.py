@@ -14,8 +14,8 @@ from armblocks.errors import FormatError
 def write_atomically(path: str | Path, data: bytes, *, mode: int = 0o666) -> os.stat_result:
     """Replace the file at ``path`` by ``data``, atomically: readers see the old file or the new one.
 
-    Returns the ``stat`` of the new file: another size, time or inode later means that another program has
-    written it. ``mode``: the permissions of a new file, less the user's umask.
+    Returns the ``stat`` of the new file: a later change of size, time or inode means that another program has
+    written the file. ``mode``: the permissions of a new file, less the user's umask.
 
     The bytes are written to a temporary file in the same folder and flushed (``fsync``). A rename then
     replaces the old file, and the folder entry is flushed too. A symbolic link stays a link: its target is

@@ -1,8 +1,8 @@
 """Interrupts (Ctrl-C) that libraries discard.
 
 CasADi looks for signals during its computations. The ``KeyboardInterrupt`` that Python raises there may be
-discarded, or another error may replace it. Within :func:`kept`, interrupts are noted as well: :func:`check`
-raises an interrupt that was discarded, and so does the end of the block.
+discarded, or another error may replace it. The context :func:`kept` records interrupts: :func:`check` and the
+end of the context raise an interrupt that was discarded.
 """
 
 from __future__ import annotations
@@ -14,14 +14,16 @@ from contextlib import contextmanager
 from types import FrameType
 
 _noted: list[int] = []
-"""The signals of interrupts that have not been answered."""
+"""The interrupts that have not been handled."""
 
 
 @contextmanager
 def kept() -> Generator[None]:
-    """A block that does not end without a ``KeyboardInterrupt`` if one was raised inside, and not answered.
+    """Context that raises ``KeyboardInterrupt`` at its end if an interrupt inside was discarded.
 
-    Only in the main thread, where Python raises interrupts, and only with Python's own handler of SIGINT.
+    The context has an
+    effect only in the main thread, where Python raises interrupts, and only with Python's own handler of
+    SIGINT.
     """
     in_main_thread = threading.current_thread() is threading.main_thread()
     if not in_main_thread or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -50,7 +52,7 @@ def check() -> None:
 
 
 def answered() -> None:
-    """The caller has caught an interrupt and acts on it."""
+    """Mark the recorded interrupt as handled by the caller."""
     _noted.clear()
 
 

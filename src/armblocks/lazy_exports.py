@@ -20,7 +20,7 @@ def lazy_exports(
 
     ``modules`` maps each name to the module that defines it. A name whose module is
     ``package.name`` is that module itself. After the first lookup a name is an ordinary attribute.
-    ``argument_errors``: exported functions answer wrong arguments as described in
+    ``argument_errors``: exported functions raise an error for wrong arguments as described in
     :mod:`armblocks.argument_errors`.
     """
 
@@ -39,7 +39,7 @@ def lazy_exports(
 
 
 def _exported_function(package: str, function: FunctionType) -> object:
-    """The function with the errors of wrong arguments; it pickles by its name in the package."""
+    """The function with an ``ArgumentError`` for wrong arguments. Pickling stores its name in the package."""
     explained = importlib.import_module("armblocks.argument_errors").with_argument_errors(function)
     explained.__module__ = package
     return explained
@@ -48,8 +48,8 @@ def _exported_function(package: str, function: FunctionType) -> object:
 def display_method(module: str, function: str) -> Callable[[Any], str]:
     """A notebook display method (``_repr_html_`` and the like) that calls ``function`` of ``module``.
 
-    Description classes belong to a layer below the drawing code and must not import it. They give the name of
-    the drawing function, which is imported at the first call.
+    Description classes belong to a layer below the drawing code and must not import it. They name the drawing
+    function, which is imported at the first call.
     """
 
     def show(self: object) -> str:

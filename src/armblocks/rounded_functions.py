@@ -5,7 +5,8 @@ poles of a filter) become constants of the code. The C library's functions, whic
 CasADi call, differ in the last place from one library or processor to the next. The functions of this module
 use integer arithmetic and give the same bits everywhere. A real number ``x`` is the integer
 ``round(x 2**bits)``, with 192 bits more than the magnitude of the argument needs. Results are therefore
-correctly rounded in practice. A call takes 10 to 200 microseconds.
+correctly rounded, except for arguments whose result is within about 2**-192 of the middle between two
+doubles. A call takes 10 to 200 microseconds.
 
 Signed zeros, infinities and NaN follow C99 (Annex F): an argument outside the domain gives NaN, a pole gives
 an infinity, and no function raises. The series are those of Abramowitz and Stegun, Handbook of Mathematical

@@ -17,7 +17,7 @@ from numpy.testing import assert_allclose
 import armblocks as ab
 from armblocks import formats
 from armblocks.dynamics import trace_constrained_motion, trace_joint_wrenches, trace_rne
-from armblocks.dynamics.held_joints import JointEquations
+from armblocks.dynamics.lockable_joints import JointEquations
 from armblocks.dynamics.mechanism import Mechanism
 from armblocks.errors import ArmblocksWarning, FormatError, RobotError, UnknownNameError
 from armblocks.formats.file_findings import FileContext

@@ -23,7 +23,7 @@ EPSILON = float(np.finfo(np.float64).eps)
 THRESHOLD = 10.0
 """An entry is zero if it is at most this many times its estimated error."""
 MAX_ELIMINATED = 8
-"""More states of one irreducible part than this are transformed by a reflection instead of eliminations."""
+"""An irreducible part with more states is transformed by a reflection instead of eliminations."""
 
 
 class SystemMatrix:

@@ -111,8 +111,8 @@ def dcgain(system: StateSpaceModel) -> Array:
 def _steady_state_gain(path: StateSpaceModel) -> float:
     """The steady-state gain of a system with one input and one output.
 
-    The path has an integrator if ``A`` (sampled: ``I - A``) is singular, which relative changes of its
-    entries by about the roundoff can make it. This decision does not depend on the units of the states.
+    The path has an integrator if relative changes of the entries of ``A`` (sampled: ``I - A``) by about the
+    roundoff can make this matrix singular. This decision does not depend on the units of the states.
     """
     matrix, condition = _steady_state_matrix(path)
     roundoff = 10.0 * float(np.finfo(np.float64).eps) * max(path.order, 1)

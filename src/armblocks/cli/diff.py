@@ -31,7 +31,7 @@ _MAX_TEXT_LENGTH = 160
 def diff(
     before: ModelName,
     after: Annotated[
-        str, typer.Argument(help="The diagram to compare it with.", autocompletion=complete_models)
+        str, typer.Argument(help="The second diagram of the comparison.", autocompletion=complete_models)
     ],
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of lines.")] = False,
     trust: Annotated[

@@ -2,7 +2,7 @@
 
 Exit codes: 0 done, 1 a defect of armblocks (with a traceback), 2 invalid input (a message, no traceback), 130
 interrupted with Ctrl-C. ``diff`` also exits with 1 if its diagrams differ, ``lint`` if it has findings, and
-``size`` if a joint has no drive that passes.
+``size`` if a joint has no candidate drive within all limits.
 """
 
 from __future__ import annotations

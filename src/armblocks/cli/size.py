@@ -44,7 +44,7 @@ def size(
     The table has a row for each joint and candidate: the limit with the smallest margin, and the utilisation
     of the limits of speed, peak torque and RMS torque.
 
-    Exit code 0: each joint has a candidate that passes, 1: some joint has none, 2: invalid input.
+    Exit code 0: each joint has a candidate within all limits, 1: a joint has none, 2: invalid input.
     """
     import armblocks as ab
 

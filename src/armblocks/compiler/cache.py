@@ -148,7 +148,7 @@ def _prune_occasionally(root: Path) -> None:
 def prune(root: Path, limit: int = _SIZE_LIMIT) -> None:
     """If the files exceed ``limit`` bytes, remove those used least recently until three quarters are left.
 
-    Remains of writers that were killed are removed after a day.
+    Temporary files of killed writers are removed after a day.
     """
     cached_files: list[tuple[float, int, str]] = []
     for subfolder in root.glob("??"):

@@ -1,4 +1,4 @@
-"""Bookmarks: named parts of a sheet to which the studio can return. They do not affect the model."""
+"""Bookmarks: named parts of a sheet that the studio can show again. They do not affect the model."""
 
 from __future__ import annotations
 

@@ -283,7 +283,7 @@ class DiagramBuilder(metaclass=ArgumentErrors):
         self._parameter_sets[name] = dict(values)
 
     def comment_out(self, block: BlockHandle | str) -> None:
-        """Comment a block out: it takes no part in the model, and its outputs are zeros of the same shapes.
+        """Comment a block out: it is excluded from the model, and its outputs are zeros of the same shapes.
 
         Raises ``UnknownNameError``, and ``DiagramError`` for In and Out blocks.
         """

@@ -1,4 +1,4 @@
-"""Commented blocks: a block that is commented out takes no part in the model, or passes its inputs on.
+"""Commented blocks: a commented block is excluded from the model, or replaced by connections.
 
 A block that is commented *out* has no states, events, views or logged signals. Its outputs are zeros, with
 the shapes that they have in the model without comments, and its inputs are unused. A block that is commented

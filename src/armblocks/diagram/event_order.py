@@ -1,10 +1,10 @@
 """The order of events and ticks at one instant: each block follows all blocks that it reads.
 
-Where an event changes a signal, another block may seem to have an event because the signal has not changed
-yet. An example is a trigger on the sum of a step and the output of a subsystem that the step enables. Events
-at one instant are therefore processed by *rank*. The rank of a block is the largest number of blocks with
-events on a path of direct feedthrough to it. Blocks with events that depend on each other in a loop have one
-rank; their events are processed together.
+An event changes a signal. Before the change, another block that reads the signal may detect a false event. An
+example is a trigger on the sum of a step and the output of a subsystem that the step enables. Events at one
+instant are therefore processed by *rank*. The rank of a block is the largest number of blocks with events on
+a path of direct feedthrough to it. Blocks with events that depend on each other in a loop have one rank;
+their events are processed together.
 
 Ticks have *levels*. The outputs of level 0 read events on which no sampled signal acts; these events come
 before the ticks. Then follow the events on which outputs of level 0 act, then the ticks of level 1, which

@@ -1,8 +1,9 @@
 """Flattening of diagrams with subsystems, tags and buses: blocks named by paths, direct connections only.
 
-Flattening changes no signal. A block ``pid`` inside the subsystem ``controller`` becomes the block
-``controller/pid``; each input is traced back through virtual blocks to the output of a real block. A diagram
-without virtual blocks is its own flat form. The steps are the passes of :mod:`armblocks.diagram.passes`.
+Flattening does not change the values of signals. A block ``pid`` inside the subsystem ``controller`` becomes
+the block ``controller/pid``; each input is traced back through virtual blocks to the output of a real block.
+A diagram without virtual blocks is its own flat form. The steps are the passes of
+:mod:`armblocks.diagram.passes`.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
-"""Names of signals behind blocks that only pass them on: From, In, and the outputs of subsystems.
+"""Propagated names of signals (Simulink: propagated signal labels).
 
-Simulink calls them propagated signal labels. Drawings show them as ``<name>``. They are computed for
-drawings only: results and legends find the names of signals by the outputs that compute them.
+A From block, an In block and an output of a subsystem pass on a signal; the name of the signal is propagated
+with it. Drawings show them as ``<name>``. They are computed for drawings only: results and legends find the
+names of signals by the outputs that compute them.
 """
 
 from __future__ import annotations

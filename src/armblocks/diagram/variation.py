@@ -40,7 +40,7 @@ def with_comments(diagram: Diagram, comments: Mapping[str, Comment | None]) -> D
 
     Example of ``comments``: ``{"filter": "through", "plant/drag": "out", "gain": None}``.
 
-    A block that is commented ``"out"`` takes no part in the model; its outputs are zeros of the same shapes.
+    A block that is commented ``"out"`` is excluded from the model; its outputs are zeros of the same shapes.
     A block that is commented ``"through"`` is replaced by connections from its inputs to its outputs.
     ``None`` removes a comment. Blocks inside subsystems are named by their paths. The copy is checked. Raises
     ``UnknownNameError`` for an unknown block, ``DiagramError`` for a block that cannot be commented, or is

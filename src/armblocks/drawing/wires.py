@@ -13,7 +13,7 @@ Area = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A block (px) and the rectangle of its name, which wires avoid if they can: x, y, width, height."""
+    """A block (px) and the rectangle of its name, which wires avoid if possible: x, y, width, height."""
 
     x: float
     y: float

@@ -1,10 +1,10 @@
 """Inverse dynamics of robots with constraints: the torques of the joints that have a motor.
 
-The torques of a tree, ``tau_tree``, are shared between motors and constraints: ``tau_tree = tau + J' λ`` with
-``Z' tau = 0`` for the directions Z in which no motor moves: the joints without a motor. These equations
-determine the multipliers λ. Source: Featherstone, *Rigid Body Dynamics Algorithms*, 8.12 (inverse dynamics of
-closed loops); Nakamura and Ghodoussi, *Dynamics computation of closed-link robot mechanisms*, IEEE Trans.
-Robotics and Automation 1989.
+Motors and constraints together exert the torques of the tree, ``tau_tree = tau + J' λ``. ``Z' tau = 0`` holds
+for the directions Z in which no motor moves: the joints without a motor. These equations determine the
+multipliers λ. Source: Featherstone, *Rigid Body Dynamics Algorithms*, 8.12 (inverse dynamics of closed
+loops); Nakamura and Ghodoussi, *Dynamics computation of closed-link robot mechanisms*, IEEE Trans. Robotics
+and Automation 1989.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from armblocks.robot.tree import KinematicTree
 class MotorForces(NamedTuple):
     """Torques (n, 1) of the motors, and the multipliers of all relations of the closures, N or N m.
 
-    The multipliers of relations that follow from others are 0: their forces are statically indeterminate.
+    The multipliers of redundant relations are 0: their forces are statically indeterminate.
     ``validity``: 0, or NaN if the motion violates the constraints.
     """
 
@@ -123,7 +123,7 @@ def directions_without_motor(robot: Robot) -> Array:
 def _check_actuation(
     robot: Robot, free_directions: Array, relations: Sequence[int], near: Array | None
 ) -> None:
-    """Raise RobotError unless the joints without a motor follow from those with a motor."""
+    """Raise RobotError unless the joints with a motor determine the joints without a motor."""
     functions = mechanism(robot)
     dof, motors = robot.nv - len(relations), robot.nv - free_directions.shape[1]
     where = f"robot '{robot.name}'"

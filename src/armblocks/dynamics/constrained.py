@@ -49,8 +49,9 @@ MAX_RESIDUAL = 1e-9
 MAX_INCONSISTENCY = 1e-6
 """Largest residual of a motion whose torques are computed: m, or cosine of an angle.
 
-The first time derivative may be larger by the sum of the absolute speeds, the second one by the sum of the
-absolute accelerations and the square of that of the speeds."""
+The tolerance of the first time derivative is multiplied by the sum of the absolute speeds. That of the second
+derivative is multiplied by the sum of the absolute accelerations plus the square of the sum of the absolute
+speeds."""
 
 Solve = Callable[[Sequence[Scalar]], list[SX]]
 """The solution of linear equations for one right-hand side."""
@@ -110,7 +111,7 @@ class ConstrainedEquations:
         return free + _combined(responses, multipliers, self.robot.nv), vertcat(*multipliers)
 
     def shortest_step(self) -> Callable[[Sequence[Scalar]], SX]:
-        """The function from residuals to the step of least norm that makes them zero to first order."""
+        """The function that maps residuals to the least-norm step that makes them zero to first order."""
         solve = symmetric_solver(mtimes(self.J, self.J.T))
         return lambda residuals: mtimes(self.J.T, -vertcat(*solve(residuals)))
 
@@ -205,7 +206,8 @@ def _total(values: SX) -> SX:
 def projected(robot: Robot, tree: KinematicTree, q: SX, relations: Sequence[int]) -> SX:
     """Coordinates (nq, 1) near ``q`` that satisfy the constraints, by Newton steps of least norm.
 
-    They are NaN if a residual larger than ``MAX_RESIDUAL`` remains, because ``q`` is too far from them.
+    The coordinates are NaN if a residual above ``MAX_RESIDUAL`` remains, because ``q`` is too far from the
+    constraints.
     """
     if not relations:
         return q
@@ -251,10 +253,10 @@ def constrained_motion(
 def restoring_rates(robot: Robot, q: SX, qd: SX, motion: ConstrainedMotion) -> tuple[SX, SX]:
     """Rates of the states ``q`` (nq, 1) and ``qd`` (n, 1) of an integration of ``motion``.
 
-    They are those of the motion and a decay of the distance from the consistent state with the time constant
-    ``RESTORING_TIME``. The outputs of a run are the consistent state, so this term keeps the integration
-    within the range of the projection and does not change the motion. Source: the method of Baumgarte 1972,
-    here without its influence on the results.
+    The rates are those of the motion, plus a term that reduces the distance from the consistent state with
+    the time constant ``RESTORING_TIME``. This term keeps the integrated states within the range of the
+    projection. It does not change the motion, because the outputs of a run are the consistent state. Source:
+    the method of Baumgarte 1972, here without its influence on the results.
     """
     to_consistent = vertcat(*difference(robot, entries(q), entries(motion.q)))
     speeds = motion.qd + to_consistent / RESTORING_TIME

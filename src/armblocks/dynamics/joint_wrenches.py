@@ -37,8 +37,9 @@ def reaction_wrenches(
 
     ``q`` (nq, 1), ``qd``, ``qdd``: of all joints of the tree. ``multipliers``: of all relations of the
     closures. ``loads``: the wrench of the tip on its surroundings in the frame of the last link, and the
-    inertia of the payload there. Each wrench is that of the parent on the link, about the origin and in the
-    axes of the distal frame of the joint; that of a closure is exerted on its second frame, in this frame.
+    inertia of the payload there. The parent exerts the wrench of a joint on the link, about the origin and in
+    the axes of the distal frame of the joint. The wrench of a closure acts on its second frame and is given
+    in this frame.
     """
     ground = constant_pose(Transform())
     bodies = body_poses(tree, [q[i] for i in range(q.numel())], ground)

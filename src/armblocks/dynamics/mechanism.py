@@ -1,7 +1,7 @@
 """Consistent configurations and degrees of freedom of robots with constraints, by numerical methods.
 
 ``assembled`` finds coordinates that satisfy the constraints, ``mobility`` finds the degrees of freedom and
-the relations that follow from others.
+the redundant relations.
 """
 
 from __future__ import annotations
@@ -231,7 +231,7 @@ class Mechanism:
         return found
 
     def gaps(self, q: Array) -> dict[str, str]:
-        """The violation of each closure at ``q`` in words, in mm and degrees."""
+        """The violation of each closure at ``q`` as text, in mm and degrees."""
         texts: dict[str, str] = {}
         for closure in self._closures:
             position, angle = self._gap(closure, q)
@@ -290,7 +290,8 @@ class Mechanism:
             largest = float(s.max(initial=0.0))
             if largest == 0.0:
                 break
-            # Directions whose singular values are rounding errors are left out: the last steps are undamped.
+            # Directions whose singular values are rounding errors are excluded, because the last steps are
+            # undamped.
             gains = np.where(
                 s > 1e-11 * largest, s / (s * s + damping * largest * largest * min(1.0, size)), 0.0
             )
@@ -368,7 +369,7 @@ def _independent_rows(jacobians: Sequence[Array], rank: int) -> list[int]:
     for _ in range(rank):
         lengths = np.min([np.linalg.norm(R, axis=1) / s for R, s in zip(remainders, scale)], axis=0)
         lengths[chosen] = -1.0
-        # Of nearly equal rows the first one is taken, so that rounding errors do not change the choice.
+        # The first of several nearly equal rows is chosen, so that rounding errors do not change the choice.
         best = int(np.argmax(lengths > 0.9 * lengths.max()))
         chosen.append(best)
         for remainder in remainders:

@@ -1,4 +1,4 @@
-"""Robot functions in independent coordinates, for robots whose couplings make joints depend on others.
+"""Robot functions in independent coordinates, for robots with coupled joints.
 
 With the constant matrix C of :class:`armblocks.robot.coordinate_map.CoordinateMap`, ``qd_tree = C qd``:
 ``tau = C' tau_tree``, ``J = J_tree C``, ``M = C' M_tree C``. The couplings hold exactly, without multipliers.
@@ -46,12 +46,12 @@ def tree_speeds(coordinates: CoordinateMap, qd: SX) -> SX:
 
 
 def generalised_forces(coordinates: CoordinateMap, tau: SX) -> SX:
-    """The forces of the independent coordinates that do the work of ``tau`` of all joints of the tree."""
+    """The generalised forces of the independent coordinates, with the power of ``tau`` of the tree."""
     return mtimes(_sparse(coordinates.speeds).T, tau)
 
 
 def reduced_columns(coordinates: CoordinateMap, J: SX) -> SX:
-    """A matrix that maps speeds of the tree, as a matrix that maps independent speeds."""
+    """The matrix for independent speeds, from a matrix for speeds of the tree."""
     return mtimes(J, _sparse(coordinates.speeds))
 
 

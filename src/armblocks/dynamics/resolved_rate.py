@@ -36,9 +36,9 @@ def bounded_speeds(
     Damped least squares with the rows of the position divided by the size of the arm: ``qd = J' (J J' + l²
     I)⁻¹ v``. The damping factor ``l`` grows from 0 to ``damping`` where the manipulability of this Jacobian
     falls from ``region`` to 0 (Nakamura and Hanafusa, *Inverse kinematic solutions with singularity
-    robustness*, J. Dyn. Sys. Meas. Control 108, 1986). ``posture_speeds (n,)`` are added as far as they do
-    not move the tool (Siciliano et al., *Robotics*, 2009, 3.5.1). Then all speeds are reduced in proportion,
-    so that none exceeds ``max_speed``.
+    robustness*, J. Dyn. Sys. Meas. Control 108, 1986). ``posture_speeds (n,)`` are projected onto the null
+    space of J and added (Siciliano et al., *Robotics*, 2009, 3.5.1). Then all speeds are reduced in
+    proportion, so that none exceeds ``max_speed``.
     """
     check_open_chain(robot)
     scale = diag(SX([1.0 / arm_size(robot)] * 3 + [1.0] * 3))
@@ -58,7 +58,7 @@ def bounded_speeds(
         gram = SX(mtimes(scaled.T, scaled) + square * SX.eye(n))
         return linear_solution(gram, SX(mtimes(scaled.T, right)))
 
-    # One solution for both terms: the posture's motion of the tool is subtracted from the velocity.
+    # One linear system for both terms: the tool velocity of the posture motion is subtracted from ``twist``.
     speeds = SX(solved(SX(v - mtimes(scaled, posture_speeds))) + posture_speeds)
     largest = SX(0.0)
     for speed in entries(speeds):
@@ -69,7 +69,7 @@ def bounded_speeds(
 def limit_avoidance(robot: Robot, q: SX, gain: SX) -> SX:
     """Speeds (n,) that move coordinates with limits towards the middle of their ranges.
 
-    ``gain`` (1/s) times the distance from the middle. Coordinates without limits stay.
+    ``gain`` (1/s) times the distance from the middle. Coordinates without limits have the speed 0.
     """
     speeds: list[SX] = []
     qlim = robot.qlim

@@ -20,8 +20,8 @@ from armblocks.spatial.vectors import Scalar, Vector, dot, scale, subtract
 def spring_torques(tree: KinematicTree, q: SX) -> list[Scalar]:
     """The torques that hold the springs (N m, N): the derivatives of their energy with respect to q.
 
-    They have the sign of gravity loads, to be added to ``tau``, in the order of qd. ``q`` (nq, 1): the
-    coordinates of all joints of the tree.
+    The torques have the sign of gravity loads and are added to ``tau``, in the order of qd. ``q`` (nq, 1):
+    the coordinates of all joints of the tree.
     """
     torques: list[Scalar] = [0.0] * tree.n
     for spring, extension, speed in _joint_springs(tree, q):
@@ -41,7 +41,7 @@ def spring_torques(tree: KinematicTree, q: SX) -> list[Scalar]:
 
 
 def spring_energy(tree: KinematicTree, q: SX) -> Scalar:
-    """The energy of the springs, J: that of a line spring is 0 at its ``length``."""
+    """The energy of the springs, J. The energy of a line spring is 0 at its ``length``."""
     energy: Scalar = 0.0
     for spring, extension, _ in _joint_springs(tree, q):
         energy = energy + 0.5 * spring.stiffness * (extension * extension)

@@ -71,8 +71,8 @@ class Arm(metaclass=ArgumentErrors):
     and differences of coordinates.
 
     ``near`` (nq,): coordinates of a robot with closed loops near which its constraints can be assembled.
-    There ``accel``, ``rne`` and ``gravload`` find which of the equations of the loops are independent. By
-    default they search near the neutral configuration, and then within the ranges of the joints.
+    At this configuration, ``accel``, ``rne`` and ``gravload`` determine the independent equations of the
+    loops. By default they search near the neutral configuration, then within the ranges of the joints.
 
     Units are SI: rad or m, N m or N. Frames: world, unless stated otherwise.
     """
@@ -138,8 +138,8 @@ class Arm(metaclass=ArgumentErrors):
     def fkine(self) -> FrameFunction:
         """``fkine(q)`` → T (4, 4): pose of the tool in the world, lengths in m.
 
-        ``frame=`` the name of another frame in the place of the tool: a named frame of the robot, or a link.
-        ``robot.frame_names`` lists them.
+        ``frame=``: the name of a frame instead of the tool: a named frame of the robot, or a link.
+        ``robot.frame_names`` lists the names.
         """
         return self._code.framed("fkine")
 
@@ -264,10 +264,11 @@ class Arm(metaclass=ArgumentErrors):
         """Find coordinates q (nq,) with ``fkine(q) = T`` by iteration, for one pose or for N.
 
         ``T``: the pose of the tool in the world, m: a :class:`Transform`, (4, 4), (N, 4, 4), a list of
-        Transforms, or an SE3 of spatialmath. ``q0`` (nq,) or (N, nq): the first start; of angles that differ
-        by whole turns, the solution has those nearest to it. Without ``q0`` and after a failure, the search
-        starts from ``restarts`` configurations of a random table, in the order of the distance of their poses
-        from the target. ``seed`` selects the table. Results are the same for a pose alone and in any batch.
+        Transforms, or an SE3 of spatialmath. ``q0`` (nq,) or (N, nq): the first start; angles of the solution
+        are shifted by full turns to the values nearest to ``q0``. Without ``q0`` and after a failure, the
+        search starts from ``restarts`` configurations of a random table, in the order of the distance of
+        their poses from the target. ``seed`` selects the table. The result of a pose is identical alone and
+        in any batch.
 
         ``mask``: six numbers; 0 for a direction in which the pose may differ: x, y, z, then rotations about
         x, y, z, in the ``axes`` of the ``"tool"`` at the target, or of the ``"world"``. Without a mask, an
@@ -275,8 +276,8 @@ class Arm(metaclass=ArgumentErrors):
         poses the result is the nearest pose. ``limits``: whether solutions satisfy the limits of the joints.
         ``frame``: as for ``fkine``. ``tolerance``: the largest error of a solution in m and in rad.
 
-        The result has the reason if there is no solution: :class:`IkineResult`. Method: damped least squares,
-        with joints held at their limits (Chan and Lawrence 1988; Sugihara, IEEE T-RO 27, 2011). Raises
+        The result has the reason if there is no solution: :class:`IkineResult`. Method: damped least squares
+        with an active set of joint limits (Chan and Lawrence 1988; Sugihara, IEEE T-RO 27, 2011). Raises
         InputError for targets that are not poses, RobotError for robots with closed loops.
         """
         return self._inverse.call(mask, limits, frame, axes, tolerance, restarts, seed)(T, q0, threads)
@@ -286,11 +287,11 @@ class Arm(metaclass=ArgumentErrors):
     ) -> IkineBranches:
         """Find all coordinates q (nq,) with ``fkine(q) = T`` in closed form, for one pose or for N.
 
-        For arms with six joints and a spherical wrist or three parallel axes, arms of parallel axes (SCARA,
-        planar), palletisers, and arms with three to five joints of these kinds. The geometry is detected.
-        Every branch is checked by forward kinematics to ``tolerance`` (m and rad). ``T`` and ``limits`` as
-        for :meth:`ikine`; of angles that differ by whole turns, the one within the limits is given, else
-        the one nearest to zero. Raises RobotError that names the reason for other arms.
+        It supports arms with six joints and a spherical wrist or three parallel axes, arms with only parallel
+        axes (SCARA, planar), palletisers, and arms with three to five joints of these types. The geometry is
+        detected. Every branch is checked by forward kinematics to ``tolerance`` (m and rad). ``T`` and
+        ``limits`` as for :meth:`ikine`; angles are shifted by full turns into the limits if possible, else to
+        the value nearest to zero. Raises RobotError that names the reason for other arms.
         """
         return self._inverse.closed_form.branches(T, limits, tolerance, threads)
 
@@ -311,7 +312,7 @@ class Arm(metaclass=ArgumentErrors):
     def rne(self) -> MotionFunction:
         """``rne(q, qd, qdd)`` → tau (n,) N m or N: joint torques of a motion, with motors and friction.
 
-        For a motion that violates the constraints of the robot they are NaN.
+        The torques of a motion that violates the constraints of the robot are NaN.
 
         ``wrench=`` [fx fy fz mx my mz] in the last link's frame, ``payload=`` a :class:`Payload` at the tool,
         or the mass (kg) of a point mass at the tool.
@@ -325,9 +326,9 @@ class Arm(metaclass=ArgumentErrors):
         Row k is the wrench that its parent exerts on link k, about the origin and in the axes of the distal
         frame of the joint (NOTATION.md). The component along the axis is the torque of the rigid bodies:
         ``rne`` without friction and rotor inertia. The last K rows are those of the closures of loops: the
-        wrench that the first link exerts on the second one, in the second frame. Where equations of closures
-        follow from others, their forces are statically indeterminate and are 0 here. ``wrench=`` and
-        ``payload=`` as for ``rne``.
+        wrench that the first link exerts on the second one, in the second frame. Forces of redundant closure
+        equations are statically indeterminate and are 0 in the result. ``wrench=`` and ``payload=`` as for
+        ``rne``.
         """
         return self._code.loaded("joint_wrenches")
 
@@ -349,9 +350,10 @@ class Arm(metaclass=ArgumentErrors):
     ) -> ArmMotionResult:
         """Simulate ``duration`` s from ``q0``, ``qd0`` under joint torques; ``t, q, qd = arm.fdyn(2.0)``.
 
-        ``torque``: none, (n,) constant, or a function with any of the arguments ``t, q, qd``. It is traced
-        and compiled (:class:`PythonFunction`), or with ``sample_time`` (s) called at each tick, and may then
-        branch. Coulomb friction sticks. ``dt``: interval of the samples. ``settings``: of ``ab.simulate``.
+        ``torque``: none, (n,) constant, or a function with any of the arguments ``t, q, qd``. The function is
+        traced and compiled (:class:`PythonFunction`). With ``sample_time`` (s) it is called at each tick
+        instead, and may then branch on values. Coulomb friction sticks. ``dt``: interval of the samples.
+        ``settings``: of ``ab.simulate``.
         """
         return simulate_arm(self.robot, duration, torque, q0, qd0, sample_time, dt, settings)
 
@@ -419,9 +421,9 @@ class Arm(metaclass=ArgumentErrors):
         In a notebook the result is a widget; elsewhere the 3-D page opens in the browser, and the call
         returns at once. ``block`` waits until the page is closed. The result has ``q``, the coordinates at
         the sliders. ``save``: write a file instead, ``.png``, ``.svg`` or ``.pdf``, and return its path; a
-        motion is drawn as its last pose, with the first one pale and the path of the tool. ``theme``: by
-        default that of the viewer. ``size``: width and height, px (files, widgets). ``view``: azimuth and
-        elevation of the camera of a file, degrees.
+        motion is drawn as its last pose, its first pose (pale) and the path of the tool. ``theme``:
+        ``"light"``, ``"dark"``, or by default the theme of the viewer. ``size``: width and height, px (files,
+        widgets). ``view``: azimuth and elevation of the camera of a file, degrees.
 
         Raises InputError for a wrong shape of ``q``, UnknownNameError for another suffix.
         """
@@ -445,10 +447,11 @@ class Arm(metaclass=ArgumentErrors):
     ) -> Any:
         """Play a motion: ``q`` (N, nq) with ``dt`` s between rows, or at times ``dt`` (N,), or a trajectory.
 
-        As :meth:`plot`, in a notebook or in the browser. The default of ``dt`` is 0.05 s. ``save``: write a
-        film instead, ``.mp4`` or ``.gif``, and return its path; ``.png`` and ``.svg`` show the path of the
-        tool. Films need the extra ``film``. ``rate``: frames per second. ``speed`` 2 plays twice as fast.
-        ``progress(done, all)`` is called after each frame. Ctrl-C leaves an old file unchanged.
+        The view is a widget in a notebook, else a browser page, as for :meth:`plot`. The default of ``dt`` is
+        0.05 s. ``save``: write a film instead, ``.mp4`` or ``.gif``, and return its path; ``.png`` and
+        ``.svg`` show the path of the tool. Films need the extra ``film``. ``rate``: frames per second.
+        ``speed`` 2 plays twice as fast. ``progress(done, all)`` is called after each frame. Ctrl-C leaves an
+        old file unchanged.
         """
         from armblocks.face import arm_views
 
@@ -459,8 +462,8 @@ class Arm(metaclass=ArgumentErrors):
     def teach(self, q: ArrayLike | None = None, *, block: bool = False) -> Any:
         """Show the arm at ``q`` (nq,) with a slider for each joint, as :meth:`plot` without a motion.
 
-        ``view = arm.teach()``; ``view.q`` are the present coordinates, which can also be set. Robots with
-        closed loops stay closed. ``arm.teach(block=True).q`` waits until the page is closed.
+        ``view = arm.teach()``; ``view.q`` are the present coordinates, which can also be set. Closed loops
+        stay closed. ``arm.teach(block=True).q`` waits until the page is closed.
         """
         from armblocks.face import arm_views
 

@@ -43,7 +43,7 @@ class ArmInverse:
         where = f"ikine of robot '{self._robot.name}'"
         options = checked_options(mask, limits, tolerance, restarts, seed, where)
         axes = check_axes(axes, where)
-        # Without a mask, all axes give the same solution, and those of the world are the simplest.
+        # Without a mask, the solution does not depend on the axes, and world axes need the fewest operations.
         made = IkineCall(self._kernels.search(frame, "world" if mask is None else axes), options)
         if mask is None:
             self._calls[key] = made
@@ -51,7 +51,7 @@ class ArmInverse:
 
     @cached_property
     def closed_form(self) -> ClosedForm:
-        """The closed solution. Raises RobotError for arms without one."""
+        """The closed-form solution. Raises RobotError for arms without a closed form."""
 
         def iterate(targets: Array, starts: Array | None) -> IkineResult:
             restarts = 100 if starts is None else 0

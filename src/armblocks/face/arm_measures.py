@@ -83,7 +83,7 @@ def _asada(J: Array, M: Array, rows: slice) -> Array:
 
 
 def operational_inertia(jacob0: _Function, inertia: _Function, q: ArrayLike) -> Array:
-    """``(J M⁻¹ J')⁻¹`` (6, 6); NaN where J has not the rank 6."""
+    """``(J M⁻¹ J')⁻¹`` (6, 6); NaN where the rank of J is below 6."""
     J, M = jacob0(q), inertia(q)
     mobility = J @ np.linalg.solve(M, np.swapaxes(J, -1, -2))
     values = np.linalg.eigvalsh(mobility)

@@ -41,7 +41,7 @@ PICTURE_SIZE = (640, 480)
 FILM_SIZE = (960, 720)
 """Default width and height, px."""
 MIN_SIDE, MAX_PICTURE_SIDE, MAX_FILM_SIDE = 64, 1600, 1920
-"""Limits of width and height, px. A picture has two pixels for each px, a film one."""
+"""Limits of width and height, px. A picture has two pixels for each px, a film one pixel."""
 MAX_PATH_POINTS = 2000
 """Maximum number of points of the tool's path in a picture."""
 MAX_ROWS = 200_000

@@ -138,7 +138,7 @@ class DiagramRun(metaclass=ArgumentErrors):
 
 
 def tuned_parameters(before: Diagram, after: Diagram) -> dict[str, Array] | None:
-    """The tunable parameters, ``block.parameter``, that differ; ``None`` if the equations differ too."""
+    """The tunable parameters, ``block.parameter``, that differ; ``None`` if the equations differ."""
     flat = flat_diagram(before)
     blocks, other_blocks = flat.blocks, flat_diagram(after).blocks
     if list(blocks) != list(other_blocks):

@@ -43,7 +43,7 @@ class IkineCall:
             array.flags.writeable = False
 
     def __call__(self, T: Target, q0: ArrayLike | None, threads: int) -> IkineResult:
-        """Search configurations for the targets, see :meth:`armblocks.Arm.ikine`."""
+        """Search for configurations at the targets, see :meth:`armblocks.Arm.ikine`."""
         if q0 is None and threads == 1 and is_plain(T) and T.shape == (4, 4) and not self._has_constraints:
             result = self._of_plain(T)
             if result is not None:

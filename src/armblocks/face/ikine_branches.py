@@ -39,9 +39,9 @@ LETTERS = "lr ud nf"
 class IkineBranches(metaclass=ArgumentErrors):
     """All configurations for one pose, or for N poses (then every array has a leading axis of N).
 
-    ``q`` (B, nq) rad or m: the branches; rows that do not exist, or are beyond limits that were requested,
-    are NaN. ``exists`` (B,): whether a branch is a solution. ``beyond_limits`` (B,): whether a branch has
-    the pose, but exceeds limits; with ``limits=True`` these are not solutions. ``position_error`` m and
+    ``q`` (B, nq) rad or m: the branches; rows of branches that do not exist, or that exceed requested limits,
+    are NaN. ``exists`` (B,): whether a branch is a solution. ``beyond_limits`` (B,): whether a branch has the
+    pose, but exceeds limits. With ``limits=True``, such branches are not solutions. ``position_error`` m and
     ``rotation_error`` rad (B,): of the pose at ``q``, computed by forward kinematics.
 
     ``geometry``: the property of the arm that the solution uses. ``choices``: the choices between two
@@ -110,9 +110,9 @@ class IkineBranches(metaclass=ArgumentErrors):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ClosedForm:
-    """The closed solution of an arm: its kernel, geometry, and the limits of the coordinates.
+    """The closed-form solution of an arm: its kernel, geometry, and the limits of the coordinates.
 
-    ``iterate``: inverse kinematics of targets by iteration without limits, from starts or from the table, for
+    ``iterate``: iterative inverse kinematics without limits, from starts or from the table. It is used at
     singular poses, and for arms whose axes are parallel or intersect only approximately.
     """
 
@@ -153,7 +153,7 @@ class ClosedForm:
         q, errors, measures = self.kernel.entry(targets, threads=check_threads(where, threads))
         has_pose = (errors[..., 0] <= tolerance) & (errors[..., 1] <= tolerance)
         singular = measures < SINGULAR
-        # Where a choice has infinitely many solutions, the one that was taken may not reach the position.
+        # At a pose where a choice has infinitely many solutions, the selected one may miss the position.
         rest = np.flatnonzero(~has_pose.any(axis=1))
         if rest.size and (rest := rest[singular[rest].any(axis=(1, 2))]).size:
             found = self.iterate(targets[rest], None)
@@ -183,7 +183,7 @@ class ClosedForm:
         )
 
     def _correct(self, targets: Array, q: Array, errors: Array, has_pose: NDArray[np.bool_]) -> None:
-        """Correct approximate branches by iteration; those that move to another solution are left out."""
+        """Correct approximate branches by iteration; discard branches that converge to another solution."""
         close = (errors[..., 0] <= CORRECTED * self.chain.size) & (errors[..., 1] <= CORRECTED)
         rows, columns = np.nonzero(close & ~has_pose)
         if rows.size:

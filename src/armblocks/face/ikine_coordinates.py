@@ -53,7 +53,7 @@ def periodic_coordinates(robot: Robot) -> NDArray[np.bool_]:
 
 
 def dependent_excess(robot: Robot, q: Array) -> Array:
-    """How far the joints that couplings determine exceed their limits at ``q`` (N, nq): (N, joints)."""
+    """The excess (N, joints) over the limits of joints that couplings determine, at ``q`` (N, nq)."""
     places = robot.position_of_speed
     columns: list[Array] = []
     for joint in robot.coupled_joints:

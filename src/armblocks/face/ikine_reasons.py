@@ -19,9 +19,10 @@ Array = NDArray[np.float64]
 POLISH_STEPS = 400
 """Maximum number of iterations to find the nearest pose of a target without a solution."""
 CURVATURES = (0.3, 1.0, 4.0)
-"""Dampings, relative to the weighted error, of the iteration to the nearest pose. The second derivatives of
-the pose, which the method neglects, are about 1 in units of the size of the arm; they matter where the error
-is large."""
+"""Dampings, relative to the weighted error, of the iteration to the nearest pose. The method neglects the
+second derivatives of the pose, which are about 1 in units of the size of the arm. Their effect is large where
+the error is large.
+"""
 FLAT = 1e-3
 """The nearest pose is found if the gradient, relative to error and Jacobian, is smaller than this."""
 NEAR = 1e-6
@@ -71,7 +72,7 @@ class Reasons:
         return np.flatnonzero(self.reason == "steps")
 
     def _move_dependent_joints(self) -> None:
-        """Search other solutions where a joint that couplings determine is beyond its limits."""
+        """Search for other solutions where a joint that couplings determine is beyond its limits."""
         robot = self.arm.robot
         wrong = self.success & (dependent_excess(robot, self.found.q) > 0.0).any(axis=1)
         rows = np.flatnonzero(wrong)
@@ -140,21 +141,22 @@ class Reasons:
         return self.arm.prepared(options)
 
     def _turns(self, q: Array) -> Array:
-        """Whole turns by which periodic coordinates are nearest to the middle of their limits."""
+        """The full turns that bring periodic coordinates nearest to the middle of their limits."""
         lowest, highest = self.prepared.lowest, self.prepared.highest
         bounded = np.isfinite(lowest) & np.isfinite(highest) & periodic_coordinates(self.arm.robot)
         middle = np.where(bounded, 0.5 * (np.where(bounded, lowest, 0) + np.where(bounded, highest, 0)), q)
         return np.round((q - middle) / (2.0 * math.pi))
 
     def _excess(self, q: Array) -> Array:
-        """How far coordinates exceed their limits, after the best number of whole turns."""
+        """The excess of coordinates over their limits, after the best shift by full turns."""
         q = q - 2.0 * math.pi * self._turns(q)
         return np.maximum(np.maximum(self.prepared.lowest - q, q - self.prepared.highest), 0.0)
 
     def _find_nearest(self) -> None:
         """Find the nearest poses of the remaining targets, and the reasons why these are not solutions."""
         for damping in CURVATURES:
-            # Those beyond limits have a reason, but their nearest pose within the limits is needed too.
+            # Targets beyond limits already have a reason, but the result also needs their nearest pose within
+            # the limits.
             rows = np.flatnonzero(~self.success) if damping == CURVATURES[0] else self._open()
             if not rows.size:
                 return

@@ -37,10 +37,10 @@ class IkineResult(metaclass=ArgumentErrors):
     - ``"singular"``: ``q`` is near a solution, where the arm cannot move along ``lost_direction``;
     - ``"steps"``: the maximum number of iterations was reached.
 
-    ``position_error`` m and ``rotation_error`` rad of ``q``, without the components that a mask leaves out;
+    ``position_error`` m and ``rotation_error`` rad of ``q``, without the components that a mask excludes;
     ``iterations``: evaluations of the kinematics; ``restarts``: starts after the first one.
-    ``lost_direction`` (6,): a direction in the world, or in the axes of the mask, first of translation (m),
-    then of rotation (rad); NaN for other reasons. ``names``: the names of the coordinates.
+    ``lost_direction`` (6,): a direction in the world, or in the axes of the mask, first translation (m), then
+    rotation (rad); NaN for the other reasons. ``names``: the names of the coordinates.
     """
 
     q: Array
@@ -56,7 +56,7 @@ class IkineResult(metaclass=ArgumentErrors):
 
     @classmethod
     def trusted(cls, **values: object) -> IkineResult:
-        """A result with all fields by name, without checks: the constructor takes as long as a search."""
+        """A result with all fields by name, without the constructor, which takes as long as a search."""
         result = object.__new__(cls)
         vars(result).update(values)
         return result
@@ -104,7 +104,7 @@ class IkineResult(metaclass=ArgumentErrors):
                 return f"no solution after {self.iterations} iterations; nearest pose: {error}"
 
     def __str__(self) -> str:
-        """The sentence of one pose; for a batch, the counts of reasons and the first failures."""
+        """The explanation of one pose; for a batch, the counts of reasons and the first failures."""
         if isinstance(self.reason, str):
             return self.explain()
         kinds, counts = np.unique(self.reason, return_counts=True)

@@ -31,7 +31,7 @@ LARGEST_STEP = 0.6
 
 
 class Options(NamedTuple):
-    """Everything but targets and starts on which a search depends."""
+    """The settings on which a search depends, besides targets and starts."""
 
     mask: tuple[float, ...]
     limits: bool
@@ -67,7 +67,7 @@ class ArmSearch:
         self._tables: dict[tuple[bool, int], tuple[Array, Array, float]] = {}
 
     def run(self, targets: Array, starts: Array | None, prepared: Prepared, threads: int = 1) -> Solutions:
-        """Search the targets (N, 16) from ``starts`` (N, nq), or from the table."""
+        """Search for the targets (N, 16) from ``starts`` (N, nq), or from the table."""
         return self.search.solve(
             targets, starts, prepared.settings.copy(), prepared.bounds, prepared.table, threads
         )
@@ -124,7 +124,7 @@ class ArmSearch:
         return known
 
     def _largest_steps(self, size: float) -> Array:
-        """Steps (n,) of one iteration; translations without limits have none, because they are linear."""
+        """Largest steps (n,) of one iteration; infinite for translations without limits."""
         limited = iter(self.robot.limits)
         steps: list[float] = []
         for joint in self.robot.joints:
@@ -138,9 +138,10 @@ class ArmSearch:
 
 
 def _pose_weights(mask: Array, size: float) -> Array:
-    """Weights of the squared differences of the 12 numbers of two poses.
+    """Weights of the squared differences between the 12 entries of two poses.
 
-    A column of the rotation counts if both rotations that move it count.
+    A column of the rotation matrix
+    has a weight if the mask contains both rotations that change the column.
     """
     weights = np.zeros((3, 4))
     for column in range(3):

@@ -97,7 +97,7 @@ def checked_poses(T: Target, where: str) -> tuple[Array, bool]:
 
 
 def _is_exact(T: list[list[float]]) -> bool:
-    """Whether a matrix is a pose up to rounding, which for one matrix is faster without NumPy."""
+    """Whether a matrix is a pose up to rounding; plain Python is faster than NumPy for one matrix."""
     (a, b, c, x), (d, e, f, y), (g, h, i, z), last = T
     products = (
         *(a * a + b * b + c * c - 1.0, d * d + e * e + f * f - 1.0, g * g + h * h + i * i - 1.0),

@@ -1,4 +1,4 @@
-"""The fastest motion of an arm along a path under limits of speed, acceleration and torque."""
+"""The time-optimal motion of an arm along a path under limits of speed, acceleration and torque."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def least_time(
     grid: int = 200,
     dt: float = 0.01,
 ) -> JointTrajectory:
-    """The fastest motion of ``arm`` from rest to rest along the path through ``points`` (K, n).
+    """The time-optimal motion of ``arm`` from rest to rest along the path through ``points`` (K, n).
 
     The path is the cubic spline through the points; with ``blend``, straight lines in joint space with
     parabolas at the inner points. A parabola replaces this fraction (0 to 0.5) of the shorter adjacent line.
@@ -134,7 +134,7 @@ def motion_limits(
 def fastest_motion(
     arm: Arm, path: PiecewisePolynomial, limits: MotionLimits, payload: Payload | float | None, s: Array
 ) -> PiecewisePolynomial:
-    """The fastest motion along a path ``q(s)`` with the grid ``s`` (N + 1,), which contains its knots."""
+    """The time-optimal motion along a path ``q(s)`` on the grid ``s`` (N + 1,), which contains its knots."""
     lengths, points = np.diff(s), _points(path, s)
     problem = _problem(arm, points, limits, payload, lengths)
     margin = np.zeros_like(problem.a[0])
@@ -211,7 +211,7 @@ def path_through(points: Array, limits: MotionLimits, blend: float | None) -> Pi
 
 
 def grid_of(arm: Arm, path: PiecewisePolynomial, count: int) -> Array:
-    """At least ``count`` segments of the path, with points at its knots and where Coulomb friction jumps."""
+    """A grid of at least ``count`` segments, with points at the knots and where Coulomb friction jumps."""
     slow = np.full(arm.n, 1e-9)
     has_coulomb = np.abs(arm.friction(slow)) + np.abs(arm.friction(-slow)) > 1e-6
     knots = path.times

@@ -80,10 +80,10 @@ def linearize(
 
     ``inputs``: perturbed signals. ``"step"`` or ``"step/y"`` adds a perturbation to that output,
     ``"plant/u"`` to that input only; ``"const.value"`` perturbs a tunable parameter, also of a mask.
-    ``outputs``: signal names as in a result. An output port is read before a perturbation that is added to
-    it, an input port after it. ``open``: loop openings. The signal after an opening is constant at its value
-    at the operating point, plus the perturbation of an input at the same port. So ``inputs="e", outputs="e",
-    open="e"`` is the loop transfer function, signs included.
+    ``outputs``: signal names as in a result. The value of an output port excludes a perturbation that is
+    added at this port; the value of an input port includes it. ``open``: loop openings. The signal after an
+    opening is constant at its value at the operating point, plus the perturbation of an input at the same
+    port. With ``inputs="e", outputs="e", open="e"`` the result is the loop transfer function, signs included.
 
     ``at``: a time of a run (0: the start), several times (one system each), the final state of a run
     (``result.final_state``) or the operating point of ``trim``. ``delay_order``: number of states of the Padé
@@ -92,7 +92,7 @@ def linearize(
     :func:`simulate`.
 
     Modes (a limiter at its limit) are constant. A diagram with sample times gives a discrete system with the
-    common period of all clocks and held inputs. The time t in equations is constant.
+    common period of all clocks and a zero-order hold at the inputs. The time t in equations is constant.
 
     Raises ``UnknownNameError`` and ``InputError`` for invalid names, ``SimulationError`` if a signal of the
     run or a derivative is not finite.

@@ -51,7 +51,7 @@ class CompiledDiagram(metaclass=ArgumentErrors):
 
     @cached_property
     def compiled(self) -> CompiledSystem:
-        """The equations as native code; with a cache entry there is no tracing."""
+        """The equations as native code; a cache entry makes tracing unnecessary."""
         key = content_key(self.diagram)
         with interrupts.kept():
             return compile_system(self.system) if key is None else cached_system(key, lambda: self.system)
@@ -133,7 +133,7 @@ def compile_diagram(diagram: Diagram | str | PathLike[str]) -> CompiledDiagram:
     entry = _compiled.get(id(diagram))
     if entry is None:
         # Cached by identity, because comparing by content would take longer than a run. The entry is removed
-        # with the diagram, and therefore refers to a copy of it.
+        # together with the diagram, and therefore refers to a copy of the diagram.
         _compiled[id(diagram)] = entry = CompiledDiagram(dataclasses.replace(diagram))
         weakref.finalize(diagram, _compiled.pop, id(diagram), None)
     return entry

@@ -1,4 +1,4 @@
-"""A cycle of picking and placing in the least time: approach, grip, transfer, release, retract."""
+"""A time-optimal pick-and-place cycle: approach, grip, transfer, release, retract."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ Array = NDArray[np.float64]
 _LINE_POINTS = 6
 """Number of poses on a vertical line, between which joints move linearly."""
 _MAX_JUMP = 1.0
-"""Greatest change of a joint (rad) between two poses of a line; a larger one is another configuration."""
+"""Greatest change of a joint (rad) between two poses of a line; a larger change means a change of
+configuration."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,7 +89,7 @@ def pick_and_place(
     up vertically over the height ``lift`` (m) at both poses, and rests ``grip_time`` (s) there. Between the
     vertical lines the joints move on straight lines in joint space. ``blend`` rounds the corners, and
     ``speed``, ``acceleration`` and ``torque`` are limits, as for :func:`~armblocks.least_time`. Each of the
-    three motions takes the least time, the second one with the ``payload``. ``mask``: as for ``arm.ikine``.
+    three motions is time-optimal, the second one with the ``payload``. ``mask``: as for ``arm.ikine``.
     ``dt``: time between samples, s.
 
     Raises InputError for a pose that the arm does not reach, with the reason, and for a vertical line on

@@ -39,7 +39,7 @@ def point_to_point(
     magnitudes, a number for all joints or (n,), in rad or m and s. All joints start and end together and the
     motion is a straight line in joint space. Without ``jerk`` the speed is a trapezoid, or a triangle if no
     joint reaches its speed; with ``jerk`` the acceleration is continuous (a double S). ``duration`` (s):
-    a longer duration, to which the motion is stretched. ``dt``: time between samples, s.
+    a longer duration, to which the motion is scaled. ``dt``: time between samples, s.
 
     Raises InputError for limits that are not positive and for a duration below the least one.
     """
@@ -90,10 +90,10 @@ def spline_trajectory(
     """A spline through ``points`` (K, n), at rest at both ends or with the end speeds ``qd0``, ``qd1`` (n,).
 
     ``times`` (K,), ascending, in s: when each point is passed. Without them, the times between points are
-    proportional to the largest joint motion relative to its ``speed``, and the whole motion is stretched so
-    that some joint reaches its ``speed`` or ``acceleration`` limit (numbers or (n,)). ``kind``: ``"cubic"``
-    has continuous accelerations, ``"quintic"`` also continuous jerk and no acceleration at the ends.
-    ``dt``: time between samples, s.
+    proportional to the largest joint motion relative to its ``speed``, and the whole motion is scaled in time
+    so that some joint reaches its ``speed`` or ``acceleration`` limit (numbers or (n,)). ``kind``:
+    ``"cubic"`` has continuous accelerations, ``"quintic"`` also continuous jerk and no acceleration at the
+    ends. ``dt``: time between samples, s.
     """
     where = "spline_trajectory"
     via = via_points("points", points, where)

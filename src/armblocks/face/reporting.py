@@ -41,8 +41,8 @@ def write_report(
 def write_files(folder: str | PathLike[str], diagram: Diagram, result: SimulationResult) -> tuple[Path, ...]:
     """Write the files of the To File blocks of a run into an existing folder.
 
-    A run itself writes no files. Here and in ``write_report`` the caller gives the folder to which the paths
-    of the blocks are relative; paths outside it are errors. Returns the paths. Raises DiagramError if two
+    The paths of the blocks are relative to this folder, or to the folder of ``write_report``; paths outside
+    of the folder are errors. ``simulate`` writes no files. Returns the paths. Raises DiagramError if two
     blocks write the same file, FormatError if a file cannot be written.
     """
     from armblocks.report.sink_files import write_files

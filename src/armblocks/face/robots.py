@@ -31,8 +31,9 @@ def load_robot(
     toolbox release, see :class:`FrictionModel`; by default that of the file. ``tip``: the link that carries
     the tool, by default the last one; in URDF and SDF files, the end of the chain with the most joints. If
     the joint of ``tip`` moves, its coordinate is the last one in q. ``packages``: folders of ROS packages and
-    Gazebo models by name, for ``package://`` and ``model://``; others are searched for in the folders above
-    the file. ``arguments``: values of the arguments of a xacro file, which needs the extra ``xacro``.
+    Gazebo models by name, for ``package://`` and ``model://``. Other packages and models are searched for in
+    the folders above the file. ``arguments``: values of the arguments of a xacro file, which needs the extra
+    ``xacro``.
 
     Raises UnknownNameError for a name that is not shipped and a tip that is not in the file, FormatError for
     a file that cannot be read.
@@ -45,8 +46,8 @@ def save_robot(robot: Robot | Arm, path: str | PathLike[str]) -> Path:
     """Write a robot atomically; returns the path.
 
     The suffix selects the format: ``.urdf``, ``.sdf``, ``.xml`` or ``.mjcf`` (MJCF), else canonical JSON.
-    JSON contains everything; data that another format does not have are left out with a warning. Raises
-    FormatError for joint types that the format does not have.
+    JSON contains all data of a robot. Data that another format cannot store are omitted with a warning.
+    Raises FormatError for joint types that the format does not have.
     """
     check_type(robot, (Robot, Arm), "a Robot or an Arm", where="save_robot")
     target = Path(path)

@@ -60,7 +60,7 @@ class SizingReport(metaclass=ArgumentErrors):
 
     @property
     def suggested(self) -> dict[str, DriveLoad | None]:
-        """For each joint the candidate of least stall torque times largest speed that passes, or ``None``."""
+        """For each joint the candidate within all limits of least stall torque times speed, or ``None``."""
         found: dict[str, DriveLoad | None] = {}
         for load in self.loads:
             best = found.setdefault(load.joint, None)
@@ -137,8 +137,8 @@ def size_drives(
     The torque of a motor is the torque of gravity and of the rigid bodies with the ``payload`` (a
     :class:`Payload`, or kg at the tool), converted by the ratio and efficiency of the gear, plus the torques
     of inertia and friction of the drive itself. The motors of the robot's file are replaced by the
-    candidates. In the pause the motor holds the arm, or its brake does (``brakes_in_pause``) and the torque
-    is 0. The brake must hold the largest gravity torque of the motion.
+    candidates. In the pause the motor holds the arm. With ``brakes_in_pause`` the brake holds it, and the
+    motor torque is 0. The brake must hold the largest gravity torque of the motion.
 
     Raises InputError without a drive for some joint or for an unknown joint of a drive; RobotError for robots
     with closed loops, ball joints, or motors at joints that depend on others.

@@ -120,7 +120,7 @@ def mtraj(
 
     ``function``: :func:`lspb`, :func:`tpoly`, or another function ``(q0, qf, t)`` of one joint that returns a
     :class:`JointTrajectory`. ``t``: times (N,) in s from 0, or a number of samples. Releases 9 and 10 replace
-    times by their number; here, as in roboticstoolbox-python, they stay times.
+    times by their number; here, as in roboticstoolbox-python, the given times are used.
     """
     start, goal = ends_of(q0, qf, "mtraj")
     parts = [function(a, b, t) for a, b in zip(start.tolist(), goal.tolist())]
@@ -158,8 +158,8 @@ def mstraj(
 
     The motion passes near the inner points and ends at the last one. As in releases 9 and 10, the durations
     of blends and, for given ``qdmax``, of segments are rounded up to multiples of ``dt``, a segment takes at
-    least two blends, and its speed is the distance between the points divided by its duration. The table also
-    has the start, which the toolbox leaves out. A duration that is a multiple of ``dt`` up to rounding is not
+    least two blends, and its speed is the distance between the points divided by its duration. The table
+    includes the start, which the toolbox omits. A duration that is a multiple of ``dt`` up to rounding is not
     lengthened.
     """
     via = via_points("points", points, "mstraj", least=1 if q0 is not None else 2)

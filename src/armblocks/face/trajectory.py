@@ -34,8 +34,9 @@ _JUMP = 1e-9
 class JointTrajectory(metaclass=ArgumentErrors):
     """Samples of a joint motion: ``t`` (N,) s, ``q`` (N, n) rad or m, derivatives ``qd`` and ``qdd`` (N, n).
 
-    ``trajectory(t)`` is the motion at any time. Without a ``curve`` from a function such as ``jtraj``, it is
-    between two samples the quintic that has their positions, speeds and accelerations.
+    ``trajectory(t)`` is the motion at any time. A function such as ``jtraj`` gives the exact ``curve``.
+    Without it, the motion between two samples is the quintic with the positions, speeds and accelerations of
+    both samples.
     """
 
     t: Array
@@ -71,8 +72,8 @@ class JointTrajectory(metaclass=ArgumentErrors):
     def __call__(self, t: ArrayLike) -> Motion[Array]:
         """The motion at ``t`` (s), a number or (N,): the tuple ``q, qd, qdd`` of arrays (n,) or (N, n).
 
-        Before the start and after the end the joints are at rest. Where an acceleration jumps, it is the
-        value after the jump.
+        Before the start and after the end the joints are at rest. Where an acceleration jumps, the result has
+        the value after the jump.
         """
         return self._curve.at(t)
 
@@ -113,11 +114,11 @@ class JointTrajectory(metaclass=ArgumentErrors):
         return Motion(*(np.array(extremes(self._curve, order)) for order in range(3)))
 
     def rows(self) -> Array:
-        """The motion as a table (M, 1 + 3 n) of t, q, qd, qdd, from which quintics reproduce it.
+        """The motion as a table (M, 1 + 3 n) of t, q, qd, qdd: the ends of quintic polynomials.
 
-        The rows are the ends of its polynomials; two rows with one time are a jump of a derivative. This is
-        the parameter of the block :class:`~armblocks.blocks.Trajectory`. It is exact for all trajectories up
-        to the fifth degree.
+        Two rows with
+        one time are a jump of a derivative. The table is the parameter of the block
+        :class:`~armblocks.blocks.Trajectory`, and is exact for all trajectories up to the fifth degree.
         """
         starts, ends = self._curve.pieces()
         times = self._curve.times

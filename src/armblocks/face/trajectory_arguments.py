@@ -37,7 +37,7 @@ def ends_of(q0: ArrayLike, qf: ArrayLike, where: str) -> tuple[Array, Array]:
 
 
 def check_same_length(start: Array, vectors: Mapping[str, Array | None], where: str, of: str = "q0") -> None:
-    """Raise InputError for a vector whose length is not that of ``start``."""
+    """Raise InputError for a vector whose length differs from the length of ``start``."""
     for name, vector in vectors.items():
         if vector is not None and vector.shape != start.shape:
             raise InputError(
@@ -142,7 +142,7 @@ def sample_count(t: ArrayLike | int) -> int | None:
 
 
 def as_array(value: ArrayLike) -> Array:
-    """The value as an array of doubles; an array without elements if it is none."""
+    """The value as an array of doubles; an empty array if the conversion fails."""
     try:
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):

@@ -25,10 +25,9 @@ def load_trajectory(path: str | PathLike[str], *, dt: float | None = None) -> Jo
 
     Columns: the times ``t`` or ``time`` in s, the positions ``q1`` … ``qn`` in rad or m, and optionally the
     speeds ``qd1`` … and accelerations ``qdd1`` …, as :meth:`JointTrajectory.save` writes them. Between rows
-    the motion is the quintic with the values of both rows. Without speeds and accelerations it is the cubic
-    spline through the positions, at rest at both ends. Units in headers, such as ``q1 [deg]`` or ``qd2
-    [mm/s]``, are converted. ``dt``: time between samples, s; ``None``: the rows of
-    the file.
+    the motion is the quintic with the values of both rows. Without speeds and accelerations, the motion is
+    the cubic spline through the positions, at rest at both ends. Units in headers, such as ``q1 [deg]`` or
+    ``qd2 [mm/s]``, are converted. ``dt``: time between samples, s; ``None``: the rows of the file.
 
     Raises ``FormatError`` and ``UnknownNameError`` as :func:`~armblocks.load_table`, and InputError for
     missing columns.

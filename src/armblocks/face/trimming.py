@@ -48,10 +48,10 @@ def trim(
     ``outputs``: required values of signals; NaN leaves an entry free. ``bounds``: ``(lower, upper)`` of
     states and free parameters. The search starts at the state of the run at time ``at`` (0: its start), with
     the values of ``guess``; time-dependent signals have their values at that time. A state is named
-    ``block/state``, or by its block if that has one state only.
+    ``block/state``, or by its block if the block has one state only.
 
-    Sampled blocks are in equilibrium if a tick changes no state. Every equation holds to ``tolerance``, in
-    its own unit, or to the rounding errors of its terms if these are larger.
+    Sampled blocks are in equilibrium if a tick changes no state. The residual of every equation is below
+    ``tolerance`` in the unit of the equation, or below the rounding errors of its terms if these are larger.
 
     Raises ``SimulationError``, with the equations that are not satisfied, the reason, and the best point
     found as ``partial``; ``UnknownNameError`` and ``InputError`` for invalid names and values.

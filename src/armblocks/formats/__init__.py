@@ -1,5 +1,5 @@
-"""Reading and writing of robots and diagrams. No code in files is executed, except Python functions of
-explicitly trusted diagrams."""
+"""Reading and writing of robots and diagrams. Readers execute no code in files, except Python functions of
+diagrams that the caller trusts."""
 
 from typing import TYPE_CHECKING
 

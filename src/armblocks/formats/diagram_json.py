@@ -81,7 +81,7 @@ def diagram_from_bytes(
     ``resolve_robot`` returns the robot of a shipped name or a path. The diagram's Python functions are
     loaded, which runs their files, only with ``trust``. With ``draft`` the diagram need not be able to run:
     inputs may be unconnected and shapes may not fit. ``read_library`` opens the libraries that blocks are
-    linked to, and ``read_data`` the tables and Python functions; without it, ``trust`` applies.
+    linked to. ``read_data`` reads the tables and Python functions; without ``read_data``, ``trust`` applies.
 
     Raises ``FormatError`` for violations of the format, ``UnknownNameError`` for unknown types, parameters,
     blocks, ports and robots, and ``DiagramError`` for a diagram that cannot be built. All name the file, and

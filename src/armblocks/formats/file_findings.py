@@ -1,4 +1,5 @@
-"""Findings about robot files: what a reader left out or changed, each with file, line and a stable code."""
+"""Findings about robot files: parts that a reader omitted or changed, each with file, line and a stable
+code."""
 
 from __future__ import annotations
 
@@ -26,8 +27,8 @@ class FileFinding:
     """One finding about a file.
 
     ``file`` and ``line`` (0 if unknown); ``element``: the named part of the robot, such as ``link 'a'``;
-    ``what``: the value that was found and how it is read. ``index``: the place of the XML element among the
-    start tags of the file, if the finding is about one; ``link``: the link that it is about.
+    ``what``: the value that was found and how it is read. ``index``: the index of the XML element among the
+    start tags of the file, if the finding concerns an element; ``link``: the link that the finding concerns.
     """
 
     rule: Rule
@@ -51,7 +52,7 @@ class FileFinding:
 
 @dataclass(kw_only=True)
 class FileContext:
-    """What the reader of a file may use besides its bytes, and what it found.
+    """The resources that a reader may use besides the bytes of a file, and the findings of the reader.
 
     ``folder``: the file's folder, if it has one. ``root``: no files outside it are read; ``None`` permits
     all. ``packages``: the folders of ROS packages by name. ``arguments``: the arguments of a xacro file.

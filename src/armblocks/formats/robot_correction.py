@@ -41,10 +41,10 @@ def correct_robot(
 ) -> CorrectedFile:
     """The content of a robot file in which the findings with an unambiguous remedy are corrected.
 
-    The arguments are those of ``load_robot``. Nothing is written. Everything else in the file stays as it is:
-    its other elements, comments and spaces. Findings in files that it includes remain, and so do those of
-    formats that are not corrected (xacro, MATLAB scripts). Poses change only where the finding is about an
-    angle; correcting the result again changes nothing.
+    The arguments are those of ``load_robot``. The function writes no file. All other text of the file,
+    including comments and spaces, is unchanged. Findings in included files, and in formats without
+    corrections (xacro, MATLAB scripts), remain. Poses change only where the finding is about an angle;
+    correcting the result again changes nothing.
 
     Raises ``FormatError`` for shipped robots and for files that cannot be read.
     """

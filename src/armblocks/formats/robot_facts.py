@@ -11,7 +11,7 @@ The member ``facts`` of ``robot.json`` contains them::
       "sources": ["author, title, year, table"]
     }
 
-A robot does not keep its facts, and the writer does not write them.
+``Robot`` objects do not contain the facts, and the writer omits them.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ class MassOrigin(StrEnum):
     """The origin of the masses, centres of mass and inertias of a robot."""
 
     PUBLISHED = "published"
-    """Those of a publication or of the manufacturer."""
+    """Values of a publication or of the manufacturer."""
     CAD = "cad"
     """Computed from CAD models by the authors of a package."""
     PACKAGE = "package"
-    """Those of a package that does not state their origin."""
+    """Values of a package that does not state their origin."""
     ESTIMATED = "estimated"
     """Estimated from the kinematics, see ``scripts/estimated_masses.py`` and ``scripts/palletisers.py``."""
     CHOSEN = "chosen"

@@ -34,8 +34,8 @@ def load_robot(
     ``friction_model`` replaces that of the file; scripts have none and get that of releases 9.5 to 10.
     ``tip`` names the link that carries the tool, see :func:`armblocks.robot.with_tip`; by default that of the
     file, in a URDF file the end of the chain with the most joints. ``packages`` maps names of ROS packages
-    to their folders; others are searched for in the folders above the file. ``arguments`` are the values of
-    the arguments of a xacro file. The robot's ``source`` is the shipped name or the path.
+    to their folders; other packages are searched for in the folders above the file. ``arguments`` are the
+    values of the arguments of a xacro file. The robot's ``source`` is the shipped name or the path.
 
     Raises ``UnknownNameError`` for a name that is not shipped and for a ``name`` or ``tip`` that is not in
     the file, ``FormatError`` for a file that is missing, has no known format or cannot be read. Issues
@@ -125,7 +125,8 @@ def read_robots(data: bytes, name: str, context: FileContext | None = None) -> M
     """The robots of a file's bytes, by their names in the file.
 
     ``name`` is the name of the file in messages; its suffix determines the format. ``context``: the files
-    that it may refer to; by default none. Raises ``FormatError``, and issues warnings for what is not read.
+    that it may refer to; by default none. Raises ``FormatError``, and issues warnings for parts that are not
+    read.
     """
     format = _check_size(data, name)
     context = context or FileContext()

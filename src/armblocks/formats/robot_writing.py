@@ -1,4 +1,4 @@
-"""What the writers of URDF, SDF and MJCF share: names, joint friction, warnings of data that are left out."""
+"""Functions for the writers of URDF, SDF and MJCF: names, joint friction, warnings of omitted data."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ _SECONDS = {
     **dict.fromkeys(("min", "mins", "minute", "minutes"), (60.0, 1.0)),
     **dict.fromkeys(("h", "hr", "hour", "hours"), (3600.0, 1.0)),
 }
-"""Factor and divisor from a unit of time to seconds. A division by 1000 is exact where 0.001 is not."""
+"""Factor and divisor from a unit of time to seconds. No double equals 0.001, so ms are divided by 1000."""
 _UNITS = frozenset(
     (
         *(

@@ -36,7 +36,7 @@ def load_table(path: str | PathLike[str], *, time: str = "", columns: Sequence[s
 
 
 def is_strict(file: Path) -> bool:
-    """Whether text in a column is an error where no columns are chosen: a typing error drops no column."""
+    """Whether text in a column is an error if no columns are chosen: a typing error must drop no column."""
     return file.suffix.lower() == ".csv"
 
 

@@ -106,8 +106,8 @@ def _rewritten(data: bytes, edits: Sequence[Edit]) -> bytes:
     text = data[len(mark) :].decode(encoding)
     spans = _spans(text)
     for edit in sorted(edits, key=lambda edit: edit.element.index, reverse=True):
-        # From the end of the file to its beginning, so that positions before the change stay valid. Elements
-        # inside this one have been changed before, which moves its end: the end tag is searched again.
+        # From the end of the file to its beginning, so that positions before the change stay valid. Changes
+        # inside an element move its end tag, so the end tag is searched for again.
         text = _changed(text, spans[edit.element.index], edit)
     return mark + text.encode(encoding, "xmlcharrefreplace")
 

@@ -224,7 +224,7 @@ def read_elements(data: bytes, file: str) -> Element:
     parser.forbid_dtd = True
     parser.setContentHandler(handler)
     try:
-        # In one piece: an attribute of many megabytes is then scanned only once.
+        # The file is parsed in one piece, so that an attribute of many megabytes is scanned only once.
         parser.feed(data)
         parser.close()
     except DefusedXmlException:

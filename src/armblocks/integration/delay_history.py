@@ -281,7 +281,7 @@ class DelayHistory:
     # Memory.
 
     def _ensure_capacity(self, r: Routine, time: Real, reals: Reals, counts: Integers) -> Boolean:
-        """Drop rows that no line reads any more; return whether there is memory for another step."""
+        """Drop rows that no line needs; return whether there is memory for another step."""
         workspace = self.workspace
         capacity = counts[Count.HISTORY_CAPACITY]
         needed = counts[Count.HISTORY_ROWS] + ROWS_OF_A_STEP

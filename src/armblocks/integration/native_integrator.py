@@ -393,7 +393,7 @@ class Integration:
         return int(self.counts[Count.EVENTS])
 
     def positive_guards(self, guards: Sequence[int]) -> list[int]:
-        """Those of ``guards`` that are positive at the present time."""
+        """The entries of ``guards`` that are positive at the present time."""
         signs = self._vector(self.integrator.workspace.signs, len(self.integrator.sizes.directions))
         return [guard for guard in guards if signs[guard] > 0.0]
 

@@ -1,4 +1,4 @@
-"""Modes that only rounding errors decide.
+"""Modes whose choice depends only on rounding errors.
 
 In an algebraic loop a signal depends on the modes that depend on it. At the boundary of a mode the signals of
 both choices are equal up to rounding. Rounding can then make each choice inconsistent. An example is a dead

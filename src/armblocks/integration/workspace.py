@@ -21,7 +21,7 @@ class Status(IntEnum):
     NON_FINITE_START = 4
     """The derivative at the start of a segment is NaN or infinite."""
     ENDLESS_EVENTS = 5
-    """Events without end: at one instant, or at decreasing distances."""
+    """Endless events: at one instant, or at decreasing distances."""
     HISTORY_FULL = 6
     """The history of delayed signals needs more memory: enlarge it and call again."""
     STOPPED = 7

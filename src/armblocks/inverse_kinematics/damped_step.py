@@ -1,4 +1,5 @@
-"""A damped least-squares step in each lane, ``dq = J' (J J' + l I)^-1 e``, with joints held at their limits.
+"""A damped least-squares step in each lane, ``dq = J' (J J' + l I)^-1 e``, with an active set of joints at
+limits.
 
 The damping is proportional to the squared error, ``l = k E`` (Chan and Lawrence, *General inverse kinematics
 with the error damped pseudoinverse*, ICRA 1988; Sugihara, *Solvability-unconcerned inverse kinematics by the
@@ -27,9 +28,9 @@ Matrix = Sequence[Sequence[Lanes]]
 
 
 def damped_step(r: Routine, J: Matrix, e: Sequence[Lanes], damping: Lanes) -> list[Lanes]:
-    """``dq`` for weighted rows ``J`` and errors ``e``; columns of joints that are held are zero.
+    """``dq`` for weighted rows ``J`` and errors ``e``; columns of joints in the active set are zero.
 
-    With fewer columns than rows the equal form ``(J' J + l I)^-1 J' e`` is the smaller system.
+    If J has fewer columns than rows, the equivalent form ``(J' J + l I)^-1 J' e`` has the smaller system.
     """
     n = len(J[0])
     columns = [[J[k][i] for k in range(ROWS)] for i in range(n)]

@@ -49,13 +49,13 @@ class Setting(IntEnum):
     BLOCKS = 8
     """Number of blocks in the table of starts."""
     FLAT = 9
-    """An attempt ends where the gradient is small: its square, relative to that of error and Jacobian."""
+    """Squared gradient, relative to the squared error and Jacobian, below which an attempt ends."""
     ROOT_DAMPING = 10
     """The damping divided by the weighted error, for targets that cannot be reached."""
     WEIGHTS = 11
     """Six weights of the rows of the error; 0 for rows that do not count."""
     POSE_WEIGHTS = 17
-    """Twelve weights of the squared differences of the numbers of two poses."""
+    """Twelve weights of the squared differences between the entries of two poses."""
     COUNT = 29
 
 

@@ -1,8 +1,8 @@
 """The search for solutions of a batch of targets as one native function.
 
 Each lane works on one target. When the attempt of a lane ends, the lane continues with the next start of its
-target, or with the next target, while the other lanes go on. Every decision about a target depends only on
-the target, its start and the settings, and all operations give the same bits in any number of lanes.
+target, or with the next target; the other lanes are not affected. Every decision about a target depends only
+on the target, its start and the settings, and all operations give the same bits in any number of lanes.
 Therefore the results do not depend on the other targets of the batch, on the lanes or on the threads.
 """
 
@@ -34,7 +34,7 @@ NEAR = 1e-10
 """Weighted squared error below which a small gradient does not end the attempt: the solution is near, and
 may be singular."""
 FARTHEST = 1e5
-"""Coordinates beyond this value end the attempt, because functions of lanes do not support large angles."""
+"""Coordinates beyond this value end the attempt: the vectorised sine does not support large angles."""
 ARRAYS = ("targets", "starts", "settings", "limits", "table", "poses", "q", "numbers", "counts")
 """The pointers of the search, in order; ``counts`` is an array of integers."""
 
@@ -183,7 +183,7 @@ class _Search:
             self._set_start(lane)
 
     def _take_target(self, lane: Integer, sample: Integer) -> None:
-        """Read a target; ``samples[lane]`` stays negative if it is invalid."""
+        """Read a target; ``samples[lane]`` stays negative if the target is invalid."""
         r = self.r
         counts, numbers = self._counts(sample), self._numbers(sample)
         for place in range(Number.COUNT):
@@ -206,7 +206,7 @@ class _Search:
                 self.rows["target"].reals[k * self.lanes + lane] = target[k]
 
     def _set_start(self, lane: Integer) -> None:
-        """The given start for the first attempt, if there is one; else the next entry of the table."""
+        """The start of an attempt: the given start for the first attempt, if any; else the next entry."""
         r, nq, settings = self.r, self.sizes.positions, self.arrays["settings"]
         sample = self.samples[lane]
         given = (settings[Setting.HAS_STARTS] != 0.0) & (self.attempts[lane] == 0)
@@ -253,7 +253,7 @@ class _Search:
         counts[Count.ATTEMPTS] = counts[Count.ATTEMPTS] + 1
 
     def _nearest_turn(self, sample: Integer, k: Integer, q: Real) -> Real:
-        """The coordinate less whole turns, where it is periodic: nearest to the given start, or to 0.
+        """A periodic coordinate, shifted by full turns to the value nearest to the given start, or to 0.
 
         A coordinate that would leave its limits is unchanged.
         """
@@ -281,7 +281,7 @@ class _Search:
 
     # ---- all lanes: one step ------------------------------------------------------------------------------
     def _step(self) -> Boolean:
-        """Take a step in the lanes that go on; return whether the attempt of a lane has ended."""
+        """Take a step in the lanes that continue; return whether the attempt of a lane has ended."""
         r, rows, n = self.r, self.rows, self.sizes.speeds
         error = [rows["error"][k] for k in range(ROWS)]
         weights = [in_all_lanes(self.arrays["settings"][Setting.WEIGHTS + k]) for k in range(ROWS)]
@@ -357,7 +357,7 @@ class _Search:
         return [value * factor for value in dq]
 
     def _inside(self, k: int, q: Lanes) -> Lanes:
-        """A coordinate within its limits: a turn less or more if that is inside, else the limit."""
+        """A coordinate within its limits: shifted by a full turn if that suffices, else set to the limit."""
         if k not in self.sizes.position_of_speed:
             return q
         lowest, highest = self._limit(Limit.LOWEST, k), self._limit(Limit.HIGHEST, k)

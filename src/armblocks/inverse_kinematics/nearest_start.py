@@ -22,7 +22,7 @@ def nearest(
 ) -> Integer:
     """The index of the next entry of the table in the order of distance; -1 if there is none.
 
-    ``previous``: distance and index of the previous entry, which are replaced; -1 and -1 for the first.
+    ``previous``: distance and index of the previous entry, which are overwritten; -1 and -1 for the first.
     Entries of equal distance are in the order of their indices. ``lanes``: the number of lanes of the table.
     """
     weights = [in_all_lanes(settings[Setting.POSE_WEIGHTS + k]) for k in range(POSE)]

@@ -125,13 +125,14 @@ class InverseKinematics:
         table: StartTable,
         threads: int = 1,
     ) -> Solutions:
-        """Search a solution for each of the targets (N, 16), from ``starts`` (N, nq) if they are given.
+        """Search for a solution of each of the targets (N, 16), from ``starts`` (N, nq) if they are given.
 
         ``settings`` and ``bounds`` are arrays of :func:`settings_array` and :meth:`bounds_array`. Arrays are
         C-contiguous; they are not checked.
         """
         N, nq = targets.shape[0], self.sizes.positions
-        # The results are in one array, because the address of an array takes as long as a step of the search.
+        # The results are in one array, because finding the address of an array takes as long as a search
+        # step.
         width = nq + _NUMBERS + _COUNTS
         results = np.empty(N * width)
         q, rest = results[: N * nq].reshape(N, nq), results[N * nq :]
@@ -164,7 +165,7 @@ class InverseKinematics:
         code = self._loaded(1)[0]
         search = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)(code.address("single"))
         nq = self.sizes.positions
-        # Arrays of ctypes are passed faster than the addresses of NumPy arrays are found.
+        # Passing ctypes arrays takes less time than finding the addresses of NumPy arrays.
         memory, of_target = ctypes.c_double * (nq + _NUMBERS + _COUNTS), ctypes.c_double * TARGET
         constant = np.array([_address(settings), _address(bounds), *table.addresses], dtype=np.uint64)
         kept = code, settings, bounds, table, constant  # the memory at these addresses

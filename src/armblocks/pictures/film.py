@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 Pixels: TypeAlias = NDArray[np.uint8]
-"""(rows, columns, 3), opaque."""
+"""An opaque image: (rows, columns, 3)."""
 FilmProgress: TypeAlias = Callable[[int, int], object]
 """Called with the number of written frames, and of all frames."""
 
@@ -42,7 +42,7 @@ _PALETTE_SAMPLES = 5
 
 
 def film_suffix(path: str | Path) -> str:
-    """The suffix of a film in lower case. Raises ``UnknownNameError`` for another one."""
+    """The suffix of a film in lower case. Raises ``UnknownNameError`` for other suffixes."""
     suffix = Path(path).suffix.lower()
     if suffix not in FILM_SUFFIXES:
         raise UnknownNameError("format of films", suffix, FILM_SUFFIXES, where=str(path))
@@ -50,7 +50,7 @@ def film_suffix(path: str | Path) -> str:
 
 
 def exact_rate(path: str | Path, rate: float) -> float:
-    """The frames per second that the format can have: those of a GIF last whole hundredths of a second."""
+    """The nearest frame rate that the format supports: GIF frames last whole hundredths of a second."""
     if film_suffix(path) == ".gif":
         return GIF_CENTISECONDS / max(2, round(GIF_CENTISECONDS / rate))
     return rate
@@ -91,9 +91,9 @@ def write_film(
 ) -> Path:
     """Write a film of the frames ``frame(0)`` to ``frame(count - 1)`` with ``rate`` frames per second.
 
-    The suffix ``.gif`` or ``.mp4`` selects the format. A row or column is removed from frames of an MP4 film
-    with an odd size, which H.264 does not have. Raises as :func:`check_film`, and ``FormatError`` if the file
-    cannot be written.
+    The suffix ``.gif`` or ``.mp4`` selects the format. H.264 requires even sizes: if the size of MP4 frames
+    is odd, a row or column is removed. Raises as :func:`check_film`, and ``FormatError`` if the file cannot
+    be written.
     """
     first = frame(0)
     suffix = film_suffix(path)
@@ -178,7 +178,7 @@ def _gif(
         if before is None:
             rows, columns = indices.shape
             file.stream.write(b"GIF89a" + struct.pack("<HHBBB", columns, rows, 0xF7, 0, 0) + table)
-            file.stream.write(b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")  # repeat without end
+            file.stream.write(b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")  # loop forever
         left, top, right, bottom = _changed(before, indices)
         part = Image.frombytes("P", (right - left, bottom - top), indices[top:bottom, left:right].tobytes())
         part.putpalette(table)
@@ -188,7 +188,7 @@ def _gif(
 
 
 def _palette(frames: list[Pixels]) -> tuple[Image, Pixels]:
-    """An image with 256 colours that represent those of the frames, and the most frequent colour (3,)."""
+    """An image with a palette of 256 colours for all frames, and the most frequent colour (3,)."""
     from PIL import Image
 
     together = np.concatenate([pixels[::2, ::2].reshape(-1, 3) for pixels in frames])

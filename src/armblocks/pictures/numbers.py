@@ -35,8 +35,9 @@ def nice_ticks(low: float, high: float, count: int, *, degrees: bool = False) ->
 
 
 def log_ticks(low: float, high: float) -> tuple[list[float], list[float]]:
-    """Positions on a logarithmic axis: those with a number (powers of ten; on a short axis also 2 and 5
-    times), and minor ones without a number."""
+    """Major and minor ticks of a logarithmic axis. Major ticks have a number: powers of ten, on a short axis
+    also 2 and 5 times these.
+    """
     first, last = math.floor(math.log10(low) + 1e-9), math.ceil(math.log10(high) - 1e-9)
     inside = [
         factor * 10.0**power

@@ -1,1 +1,1 @@
-"""Motions along a given path in the least time."""
+"""Time-optimal motions along a given path."""

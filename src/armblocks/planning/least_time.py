@@ -1,4 +1,4 @@
-"""The fastest motion along a path: linear constraints with exact viscous friction, and limits between points.
+"""Time-optimal motion along a path: linear constraints, viscous friction, and limits between grid points.
 
 With the path ``q(s)``, its speed ``y = ds/dt``, ``x = y^2`` and ``u = d²s/dt²``, each limited quantity (a
 torque or an acceleration) is ``a u + b x + d y + c``. In a segment of the grid ``u`` is constant, so ``u =
@@ -113,7 +113,7 @@ def _line(
 ) -> None:
     """Solve the constraint ``lower <= alpha x0 + beta x1 <= upper`` for x1: element ``k`` of the lines.
 
-    Without x1, it changes the two ``bounds`` of x0.
+    A constraint without x1 changes the two ``bounds`` of x0.
     """  # fmt: skip
     with r.when(abs(beta) <= abs(alpha) * NEGLIGIBLE):
         slope[k], bottom[k], top[k] = 0.0, -np.inf, np.inf

@@ -101,7 +101,7 @@ class Stage:
         )
 
     def meshes(self, pose: _Array) -> list[TriangleMesh]:
-        """The bodies in the world at one pose (L+2, 4, 4), with the pedestal."""
+        """The bodies and the pedestal in world coordinates, for one pose (L+2, 4, 4) of the links."""
         return [*(body.mesh.moved(pose[body.row]) for body in self.bodies), *self.pedestal]
 
     def render(self, meshes: Sequence[TriangleMesh]) -> Rendering:
@@ -243,7 +243,7 @@ def floor_marks(stage: Stage) -> list[Polyline]:
 
 
 def _clipped(line: _Array, width: float, height: float) -> _Array | None:
-    """The part of a straight line (2, 2) inside the panel, None if there is none (Liang and Barsky 1984)."""
+    """The part of a line segment (2, 2) inside the panel; None if it is outside (Liang and Barsky 1984)."""
     start, step = line[0], line[1] - line[0]
     enter, leave = 0.0, 1.0
     for axis, limit in ((0, width), (1, height)):
@@ -283,8 +283,7 @@ def path_marks(stage: Stage, body: Rendering, path: _Array, current: int) -> lis
 
 
 def _runs(flags: NDArray[np.bool_], first: int, last: int) -> list[tuple[int, int, bool]]:
-    """Maximal ranges ``a..b`` of equal flags within ``first..last``; neighbouring ranges share an end
-    point."""
+    """Maximal index ranges ``a..b`` of equal flags within ``first..last``; neighbours share an index."""
     runs: list[tuple[int, int, bool]] = []
     start = first
     for k in range(first, last):

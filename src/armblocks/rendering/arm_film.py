@@ -103,7 +103,7 @@ class MotionView:
         return picture
 
     def still(self) -> Picture:
-        """The last pose, the first one transparent, and the path of the tool."""
+        """The last pose, the first pose (transparent), and the path of the tool."""
         last = len(self.motion.time) - 1
         picture = self._panel(f"Motion of {self.motion.robot.name}")
         start, end = (position_text(self.motion.path[k]) for k in (0, last))
@@ -173,7 +173,7 @@ class FilmView:
 
 
 def spread(count: int, most: int) -> NDArray[np.intp]:
-    """At most ``most`` indices below ``count``, evenly spread, including the first and the last."""
+    """At most ``most`` evenly spaced indices below ``count``, including the first and the last."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
 
 

@@ -42,8 +42,7 @@ class Camera:
     ) -> Camera:
         """The camera that shows ``points`` (N, 3) m as large as possible in a panel with a margin, px.
 
-        Its distance is ``distance`` times the extent of the points, which gives the perspective of a long
-        lens.
+        Its distance is ``distance`` times the extent of the points, so the perspective distortion is small.
         """
         a, e = math.radians(azimuth), math.radians(elevation)
         toward_viewer = np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])

@@ -147,8 +147,7 @@ def shadow(
 ) -> NDArray[np.uint8]:
     """A soft black shadow on the floor ``z = floor`` (m), pixels (rows, columns, 4), ``scale`` per px.
 
-    The light comes from above and behind the viewer's left shoulder, so the shadow is behind and right of the
-    arm.
+    The light comes from above, left of and behind the camera, so the shadow is behind the arm, on its right.
     """
     columns, rows = round(width * scale), round(height * scale)
     right, up = camera.axes[0], np.array([0.0, 0.0, 1.0])
@@ -173,7 +172,7 @@ def composite(front: NDArray[np.uint8], back: NDArray[np.uint8]) -> NDArray[np.u
     """``front`` composited over ``back``, both with straight alpha (Porter and Duff 1984)."""
     result = back.copy()
     result[back[..., 3] == 0] = 0
-    covered = front[..., 3] > 0  # elsewhere the back is unchanged
+    covered = front[..., 3] > 0  # outside of the window, ``back`` is unchanged
     f, b = front[covered] / 255, back[covered] / 255
     alpha = f[:, 3:] + b[:, 3:] * (1 - f[:, 3:])
     colour = (f[:, :3] * f[:, 3:] + b[:, :3] * b[:, 3:] * (1 - f[:, 3:])) / np.maximum(alpha, 1e-9)
@@ -250,7 +249,7 @@ def _shade(normal: _Array, material: _Index) -> _Array:
     light = _GROUND + (_SKY - _GROUND) * (0.5 + 0.5 * normal[1])
     light += _KEY_STRENGTH * np.maximum(key @ normal, 0.0)
     light += _FILL_STRENGTH * np.maximum(fill @ normal, 0.0)
-    # Dark bodies have a light rim, so that graphite is visible on a dark background.
+    # A light rim makes dark (graphite) bodies visible on a dark background.
     white = 0.10 * (1.0 - np.clip(normal[2], 0.0, 1.0)) ** 3
     white += _GLOSS[material] * np.exp(_SHARPNESS[material] * np.log(np.maximum(halfway @ normal, 1e-6)))
     return np.clip(_BASE[:, material] * light + white, 0.0, 1.0)

@@ -204,15 +204,16 @@ class DriveLoad(metaclass=ArgumentErrors):
 
     @property
     def inertia_ratio(self) -> float:
-        """Load inertia at the motor divided by the inertia of the drive; infinite without the latter."""
+        """Load inertia at the motor divided by the inertia of the drive; infinite if the latter is zero."""
         return self.load_inertia / self.drive.inertia if self.drive.inertia else math.inf
 
     @cached_property
     def temperature_rise(self) -> float:
         """Peak of the winding's temperature rise in the periodic state, relative to the allowed one.
 
-        The rise follows (torque / continuous torque)² as a first-order lag with the thermal time constant of
-        the drive; without one, it is the mean of this square.
+        The temperature rise is the response of a first-order lag, with the thermal time constant of the
+        drive, to (torque / continuous torque)². Without a time constant, the result is the mean of this
+        square.
         """
         heat = (self.torque / self.drive.continuous_torque(self.speed)) ** 2
         heating = np.append((heat[:-1] + heat[1:]) / 2.0, (self.pause_torque / self.drive.stall_torque) ** 2)
@@ -241,7 +242,7 @@ class DriveLoad(metaclass=ArgumentErrors):
     def most_cycles_per_hour(self) -> float:
         """The largest number of cycles for which the RMS torque is allowed, with a longer or shorter pause.
 
-        It is 0 if the pause alone exceeds the continuous torque.
+        The result is 0 if the torque of the pause exceeds the continuous torque.
         """
         allowed = float(self.drive.continuous_torque(self.mean_speed)) ** 2
         missing = self._squared - allowed * self.duration
@@ -260,7 +261,7 @@ class DriveLoad(metaclass=ArgumentErrors):
 
     @cached_property
     def checks(self) -> tuple[LimitCheck, ...]:
-        """All limits of the drive with the values of the cycle; limits that are not given are left out."""
+        """All given limits of the drive with the values of the cycle."""
         drive = self.drive
         curve = drive.peak_torque_at(self.speed)
         worst = int(np.argmax(np.abs(self.torque) / curve))
@@ -321,9 +322,9 @@ def motor_torque(
 ) -> Array:
     """Torque of the motor (N,), N m, for a torque at the output of the gear.
 
-    ``speed`` (rad/s) and ``acceleration`` (rad/s²) of the motor; ``direction``: the sign of the speed, where
-    the speed is 0 that of the motion before or after. The gear loses power in both directions: the output
-    torque is divided by the efficiency if the motor drives, and multiplied by it if the load drives.
+    ``speed`` (rad/s) and ``acceleration`` (rad/s²) of the motor; ``direction``: the sign of the speed; where
+    the speed is 0, the sign of the motion before or after. The gear loses power in both directions: the
+    output torque is divided by the efficiency if the motor drives, and multiplied by it if the load drives.
     """
     loss = np.where(output_torque * direction > 0.0, 1.0 / drive.efficiency, drive.efficiency)
     loss = np.where(direction == 0.0, 1.0, loss)

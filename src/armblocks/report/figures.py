@@ -114,7 +114,7 @@ def in_display_unit(values: _Array, unit: str) -> tuple[_Array, str]:
         return values * _DEGREES, _UNIT_SPELLING.get(unit, unit)
     finite = np.abs(values[np.isfinite(values)])
     factor, prefix = si_prefix(float(finite.max(initial=0.0)))
-    # A prefix on a number without unit or on a unit with powers would mislead; usual numbers need no prefix.
+    # No prefix for numbers without unit and units with powers, where it is ambiguous, and for usual numbers.
     if not unit or unit.startswith("kg") or unit == "s" or 1e-3 < factor < 1e3:
         return values, _UNIT_SPELLING.get(unit, unit)
     return values * factor, prefix + _UNIT_SPELLING.get(unit, unit)

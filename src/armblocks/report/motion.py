@@ -1,7 +1,7 @@
 """Finds the signals of a run that are the motion of each robot.
 
-The ports of a block with a robot have the usual names (q, qd, qdd, tau, poses). This module groups the ports
-that belong to one arm. It does not depend on the classes of blocks.
+The ports of all blocks with a robot have the names q, qd, qdd, tau and poses. This module groups the ports
+that belong to one arm by these names, without the classes of the blocks.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _Array = NDArray[np.float64]
 class Motion:
     """One arm's motion: ``q`` (N, nq), ``qd``, ``qdd``, ``tau`` (N, n), world ``poses`` (N, L+2, 4, 4).
 
-    ``notes`` list the quantities that are not in the diagram and come from differences between samples.
+    ``notes`` list the quantities that are not in the diagram and are computed by finite differences.
     """
 
     robot: Robot
@@ -84,7 +84,7 @@ def moving_arms(diagram: Diagram, result: SimulationResult) -> tuple[MovingArm, 
         robot for (robot, _), names in groups.items() if any(_has_robot_view(diagram, n) for n in names)
     }
     for (robot, path), names in groups.items():
-        # A controller computes torques for several q of one arm; the drawn arm is the simulated one.
+        # If a diagram has several q of one arm (reference and simulated), the simulated arm is drawn.
         if robot in robots_with_views and not any(_has_robot_view(diagram, n) for n in names):
             continue
         arms.append(_moving_arm(robot, path, _sources_first(diagram, names), result))

@@ -41,7 +41,7 @@ class LimitFinding:
     kind: LimitKind
     limit: float
     first_time: float
-    """Time (s) at which the line between two samples crosses the limit; the start if it is exceeded there."""
+    """Time (s) at which the line between two samples crosses the limit, or the start time."""
     worst_time: float
     worst: float
     text: str

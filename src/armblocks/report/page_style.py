@@ -7,7 +7,7 @@ from armblocks.pictures.svg import page_rules
 
 
 def page_css() -> str:
-    """All rules, which are short enough to be part of the page."""
+    """The complete style sheet."""
     return (
         f":root{{color-scheme:light dark;{theme_variables('light')}}}"
         f"@media (prefers-color-scheme:dark){{:root{{{theme_variables('dark')}}}}}"

@@ -154,7 +154,7 @@ def _optional(value: float | None, factor: float = 1.0) -> str:
 
 
 def _range(low: float | None, high: float | None, factor: float) -> str:
-    """The range of a coordinate; empty for the speeds of ball joints, which have none."""
+    """The range of a coordinate; empty for ball joints, which have no range."""
     return "" if low is None or high is None else _span(low * factor, high * factor)
 
 

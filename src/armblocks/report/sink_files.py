@@ -60,10 +60,10 @@ def write_files(
 ) -> tuple[Path, ...]:
     """Write the files of the To File blocks of a diagram into ``folder``, each atomically.
 
-    Subfolders are created. Nothing is written outside the folder, also not through symbolic links.
-    ``taken``: names in the folder that must not be replaced. Returns the paths. Raises ``DiagramError`` if
-    two blocks write the same file, and ``FormatError`` if a file cannot be written or its path leaves the
-    folder.
+    Subfolders are created. Files are written only inside the folder; symbolic links that lead out of it are
+    errors. ``taken``: names in the folder that must not be replaced. Returns the paths. Raises
+    ``DiagramError`` if two blocks write the same file, and ``FormatError`` if a file cannot be written or its
+    path leaves the folder.
     """
     target = Path(folder)
     written_paths: list[Path] = []

@@ -37,7 +37,7 @@ class CoordinateMap:
 
 
 def dependent_joints(couplings: Sequence[Coupling]) -> dict[str, Coupling]:
-    """The joint that each coupling determines, by name: the first one of its terms."""
+    """The joint that each coupling determines, by name: the joint of its first term."""
     return {coupling.terms[0][0]: coupling for coupling in couplings}
 
 
@@ -84,12 +84,11 @@ def coordinate_map(links: Sequence[Link], couplings: Sequence[Coupling], where: 
 def remaining_coupling(
     links: Sequence[Link], couplings: Sequence[Coupling], added: Coupling
 ) -> Coupling | float | None:
-    """The coupling that has to be added to consistent ``couplings`` of ``links`` so that ``added`` holds.
+    """The coupling that extends consistent ``couplings`` of ``links`` so that ``added`` is satisfied.
 
-    This is ``added`` itself, perhaps with another joint first. If all its joints depend on others, it is an
-    equivalent coupling of independent coordinates. None: ``added`` follows from ``couplings``. A number:
-    ``added`` contradicts ``couplings``; the number is the value of its terms by ``couplings`` minus its
-    constant.
+    The result is ``added``, with its first dependent joint chosen, or an equivalent coupling of independent
+    coordinates if all its joints depend on others. None: ``added`` is redundant. A number: ``added``
+    contradicts ``couplings``; the number is the value of its terms by ``couplings`` minus its constant.
     """
     terms = added.terms
     for k in range(len(terms)):

@@ -1,4 +1,4 @@
-"""The limits of the coordinates q, with those of the joints that couplings make depend on them."""
+"""The limits of the coordinates q, including the limits of joints that depend on them by couplings."""
 
 from __future__ import annotations
 
@@ -48,11 +48,12 @@ def dependent_joints_of(links: Sequence[Link], coordinates: CoordinateMap) -> li
 def limits_with_couplings(
     own: Sequence[JointLimits], motors: Sequence[object], dependent: Sequence[DependentJoint]
 ) -> tuple[JointLimits, ...]:
-    """The limits of each entry of qd, from its ``own`` and those of the joints that depend on it alone.
+    """The limits of each entry of qd: its own limits and those of the joints that depend on it alone.
 
-    Positions and speeds satisfy the limits of all these joints. A position range without a common value with
-    the others is left out. A torque limit is that of the only joint with a motor, if the joint of the
-    coordinate has neither motor nor torque limit: the torques of several motors add up.
+    ``own``: the limits of the joint of each entry. Positions and speeds satisfy the limits of all these
+    joints. A position range that has no common value with the other ranges is ignored. If the joint of the
+    coordinate has neither motor nor torque limit, and only one joint has a motor, the torque limit is that of
+    this joint. The torques of several motors would add up.
     """
     limits = list(own)
     for joint in dependent:

@@ -13,7 +13,7 @@ _WIDTH = 10
 
 
 def dh_table(robot: Robot) -> list[str]:
-    """The D-H table as releases 9 and 10 of the toolbox print it, but with the names of the joints.
+    """The D-H table in the format of releases 9 and 10 of the toolbox, with the names of the joints.
 
     Empty if a link has no D-H row. The joint variable is printed as ``q``. theta, alpha and the offset of a
     revolute joint are in rad, the other numbers in m.

@@ -100,7 +100,7 @@ def _parents_first(robot: Robot) -> tuple[Link, ...]:
 def link_frames(robot: Robot, q: Sequence[float]) -> NDArray[np.float64]:
     """Poses of base, every link and tool in the world, (L+2, 4, 4), at coordinates ``q`` (nq,), rad and m.
 
-    They are the rows of ``dynamics.trace_link_poses``, computed without compilation, for drawings.
+    The same poses as ``dynamics.trace_link_poses``, computed without compilation, for drawings.
     ``q`` is not checked.
     """
     frames: dict[str | None, Transform] = {None: robot.base}
@@ -337,7 +337,7 @@ def _base_shapes(robot: Robot, plan: _Plan) -> list[Shape]:
         if np.linalg.norm(foot) > r:
             shapes += _casting(np.zeros(3), np.array([0.0, 0.0, 1.0]), 1.1 * r, foot, axis, r)
         upright = np.array([0.0, 0.0, 1.0])
-        # A column is above the base frame; a joint at the origin of the frame needs a foot below it.
+        # A vertical column needs no foot, because it starts at the base; other joints at the origin need one.
         bottom = 0.0 if plan.is_column(link) else -1.16 * r
         shapes += [
             Housing(

@@ -31,7 +31,7 @@ class NamedFrame(metaclass=ArgumentErrors):
         object.__setattr__(self, "pose", pose(self.pose, where=f"pose of frame '{self.name}'"))
 
     def with_renamed_link(self, old: str, new: str) -> Self:
-        """The frame after a link has got another name."""
+        """The frame with the new name of a link."""
         return replace(self, link=new) if self.link == old else self
 
 

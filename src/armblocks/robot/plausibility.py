@@ -109,7 +109,7 @@ def _findings(robot: Robot) -> Iterator[PlausibilityFinding]:
 
 
 def _limits_left_out(robot: Robot) -> Iterator[PlausibilityFinding]:
-    """Limits of joints that couplings determine and that are no limits of one coordinate."""
+    """Limits of coupled joints that depend on several coordinates."""
     names = [entry.name for entry in robot.speeds]
     for joint in robot.coupled_joints:
         if joint.limits == JointLimits(torque=joint.limits.torque):

@@ -184,12 +184,12 @@ class Robot(metaclass=ArgumentErrors):
 
     @cached_property
     def limits(self) -> tuple[JointLimits, ...]:
-        """The limits of each entry of qd, with those of joints that a coupling makes depend on it alone.
+        """The limits of each entry of qd, including the limits of joints that depend on this entry alone.
 
         Limits of joints that depend on several entries are not included; a finding of
         :func:`armblocks.robot.plausibility_findings` names these joints. A torque limit is that of the
-        entry's own joint; if this has neither motor nor torque limit, that of the only dependent joint with
-        a motor, at the entry of qd.
+        entry's own joint. If this joint has neither motor nor torque limit, and only one dependent joint has
+        a motor, the limit is that of this motor, converted to the entry of qd.
         """
         own = tuple(limits for joint in self.joints for limits in joint.coordinate_limits)
         return limits_with_couplings(own, self.motors, self.coupled_joints) if self.couplings else own

@@ -47,7 +47,7 @@ class Housing:
     """A tapered casting along z, from ``z = 0`` to ``z = length``.
 
     ``start`` and ``end`` are the half widths (x, y) of its two faces. ``roundness`` 1 gives elliptic sections
-    (a cone, if the half widths are equal), 0 gives rectangles, between them superellipses.
+    (a cone, if the half widths are equal), 0 gives rectangles, and values between 0 and 1 give superellipses.
     """
 
     start: tuple[float, float]

@@ -19,9 +19,9 @@ def with_tip(robot: Robot, tip: str) -> Robot:
 
 
 def deepest_tip(links: Sequence[Link]) -> str:
-    """The link without children that has the most degrees of freedom between the base and itself.
+    """The end link of the chain with the most degrees of freedom; the last one of several such links.
 
-    Of several such links it is the last one. ``links``: parents before their children.
+    ``links``: parents before their children.
     """
     joints: dict[str | None, int] = {None: 0}
     for link in links:

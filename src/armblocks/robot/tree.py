@@ -34,9 +34,9 @@ class Body:
     - the first body of a ball joint (``ball`` is 0) is the rotation by the quaternion ``q[position … + 3]``;
     - the second and the third body of a ball joint (``ball`` is 1 or 2) is none.
 
-    The axes of the three bodies of a ball joint are those of the joint's last side in cyclic order, so that
-    their z axes are its x, y and z axes. These axes rotate with the joint; the axis of a second or third body
-    is therefore not fixed in the body before it (:mod:`armblocks.dynamics.ball_joints`).
+    The z axes of the three bodies of a ball joint are the x, y and z axes of the joint's distal frame. These
+    axes rotate with the joint; the axis of a second or third body is therefore not fixed in the body before
+    it (:mod:`armblocks.dynamics.ball_joints`).
 
     ``parent``: index of another body, or BASE. ``inertia``: of all lumped links, in the body frame.
     ``motor``: the motor of this degree of freedom.
@@ -74,7 +74,7 @@ class KinematicTree:
 
     ``robot``: without couplings, so that every joint has coordinates of its own.
     ``bodies``: parents before children. ``links``: the frame of each link, in the robot's order. ``tip``: the
-    frame of the last link. ``tool``: the tool frame, or the frame ``end`` if it is given. ``base``: pose of
+    frame of the last link. ``tool``: the tool frame, or the frame ``end`` if given. ``base``: pose of
     the base in the world. ``gravity``: m/s2, in *base* axes. ``grounded``: the inertia of the links fixed to
     the base.
     """
@@ -220,7 +220,7 @@ def _parents_first(links: Sequence[Link]) -> list[Link]:
     remaining = list(links)
     while remaining:
         ready = [link for link in remaining if link.parent in placed]
-        # One link at a time, so that links already in a valid order keep it.
+        # Links are placed one at a time, so that a valid given order is preserved.
         link = ready[0]
         ordered.append(link)
         placed.add(link.name)

@@ -180,7 +180,7 @@ def skew(w: ArrayLike) -> Array:
 
 @with_argument_errors
 def vex(S: ArrayLike) -> Array:
-    """The vector (3,) of the skew-symmetric part of a matrix (3, 3)."""
+    """The vector (3,) of the skew-symmetric part of a matrix (3, 3): the inverse of :func:`skew`."""
     matrix = np.asarray(S, dtype=np.float64)
     if matrix.shape[-2:] != (3, 3):
         raise _shape_error(matrix.shape, "(3, 3) or (N, 3, 3)", "vex")
@@ -246,7 +246,8 @@ def trinterp(T0: PoseLike, T1: PoseLike, s: ArrayLike) -> PoseLike:
 def tr2delta(T0: PoseLike, T1: PoseLike) -> Array:
     """The small motion (6,) from ``T0`` to ``T1`` in frame T0: displacement, then ``vex(R0' R1 - I)``.
 
-    As in release 10 and in Python. Releases up to 9 use world axes, as the block ``Tr2Delta`` can.
+    The axes are those of release 10 and of the Python toolbox. Releases up to 9 use world axes, which the
+    block ``Tr2Delta`` also supports.
     """
     first, last = pose_array(T0, "tr2delta"), pose_array(T1, "tr2delta")
     if first.shape[-1] != 4 or last.shape[-1] != 4:

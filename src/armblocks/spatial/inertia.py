@@ -56,7 +56,7 @@ class RigidInertia(NamedTuple):
         """The same body in a frame with the same axes, in which this frame's origin is at ``p`` m.
 
         With ``x = y + p``: first ``h + m p``, second ``I + (2 p.h + m p.p) 1 - p h' - h p' - m p p'``
-        (parallel-axis theorem for two origins that are not the centre of mass).
+        (parallel-axis theorem; neither origin needs to be the centre of mass).
         """
         mass, h, S = self
         # k = h + m p / 2 combines the first-moment and the mass terms of the correction.

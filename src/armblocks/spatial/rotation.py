@@ -24,9 +24,10 @@ Matrix3: TypeAlias = tuple[Vector3, Vector3, Vector3]
 IDENTITY3: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 SINGULAR = 2.2e-15
-"""Maximum cosine of the middle one of three angles at which the orientation is singular: ten roundings.
+"""Cosine of the middle of three angles below which the orientation is singular: ten rounding errors.
 
-Only the sum or the difference of the other two angles is then determined.
+At a
+singular orientation only the sum or the difference of the other two angles is determined.
 """
 
 

@@ -24,7 +24,8 @@ from armblocks.spatial.rotation import (
 )
 
 ORTHONORMALITY = 1e-8
-"""Maximum deviation of ``R' R`` from the identity. Matrices with eight digits are accepted, with four not."""
+"""Maximum deviation of ``R' R`` from the identity. Matrices with eight digits are accepted, matrices with
+four digits are not."""
 
 
 @dataclass(frozen=True, init=False)
@@ -105,7 +106,7 @@ class Transform(metaclass=ArgumentErrors):
         (_, xy, xz), (_, yy, yz), (zx, zy, zz) = self.rotation
         cosine = hypot(zz, zy)
         roll = 0.0 if cosine < SINGULAR else atan2(zy, zz)
-        # The y axis without the roll does not depend on the pitch.
+        # The y axis of Rz(yaw) Ry(pitch) does not depend on the pitch.
         c, s = cos(roll), sin(roll)
         return roll, atan2(-zx, cosine), atan2(s * xz - c * xy, c * yy - s * yz)
 

@@ -100,7 +100,7 @@ class DeadZone(Block):
     title: ClassVar[str] = "Dead Zone"
     sign: ClassVar[FaceSign] = DEAD_ZONE
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Between -0.5 and 0.5 the output is 0. Outside it is the distance to the zone.",
+        shows="Between -0.5 and 0.5 the output is 0; outside, the output is the distance to this zone.",
     )
 
     start: ArrayLike = parameter(-0.5, kind=ParameterKind.ARRAY, doc="lower end of the zone")
@@ -146,7 +146,7 @@ class DeadZone(Block):
 class Relay(Block):
     """A relay with hysteresis: on_value once u rises to on_point, off_value once u falls to off_point.
 
-    At t = 0 it is off, unless u is at or above on_point.
+    At t = 0 the relay is off, unless u is at or above on_point.
     """
 
     title: ClassVar[str] = "Relay"

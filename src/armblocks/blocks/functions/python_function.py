@@ -49,7 +49,7 @@ class PythonFunction(Block):
     ``results``.
 
     The file of a diagram stores ``file.py:name`` and runs no code unless it is trusted. The studio shows the
-    code, and runs it in a separate process after you have trusted this version of it.
+    code, and runs the code in a separate process after you have trusted the present content of the file.
     """
 
     title: ClassVar[str] = "Python Function"
@@ -128,8 +128,8 @@ class CalledPythonFunction(Block):
     The run stops at each tick and calls the function with numbers and NumPy arrays. The report of the run
     gives the number of calls and their share of the computing time. Blocks that tick at the same time use the
     new values. The function may store data between calls, but these data are not states of the diagram: they
-    are neither saved with a state nor reset before another run. A function that can be traced should be a
-    Python Function: it is much faster, works in continuous time and can be linearised.
+    are neither saved with a state nor reset before another run. Use a Python Function for a function that can
+    be traced: it is much faster, works in continuous time and can be linearised.
 
     The file of a diagram stores ``file.py:name`` and runs no code unless it is trusted.
     """

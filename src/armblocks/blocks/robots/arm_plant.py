@@ -1,6 +1,6 @@
 """The arm with stick-slip friction, end stops, a variable payload and a force at the tip.
 
-The equations are those of :mod:`armblocks.dynamics.held_joints`, which names the sources.
+The equations are those of :mod:`armblocks.dynamics.lockable_joints`, which names the sources.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from armblocks.diagram import (
     parameter,
 )
 from armblocks.dynamics.constrained import ConstrainedMotion, restoring_rates
-from armblocks.dynamics.held_joints import (
+from armblocks.dynamics.lockable_joints import (
     DryFriction,
     JointEquations,
     JointModes,
@@ -49,7 +49,7 @@ from armblocks.dynamics.held_joints import (
     locked_joints,
     viscous_torque,
 )
-from armblocks.dynamics.held_mechanism import MechanismEquations, check_lockable, consistent_state
+from armblocks.dynamics.lockable_mechanism import MechanismEquations, check_lockable, consistent_state
 from armblocks.errors import InputError
 from armblocks.robot import Robot
 
@@ -245,8 +245,8 @@ class ArmPlant(Block):
             _, holding_torque = self._motion(x, u, p)
             dry = DryFriction.of(self.robot)
             forward, backward = (p["breakaway"] * SX(side) for side in (dry.forward, dry.backward))
-            held, rigid = mode == 0.0, self._rigid(contact)
-            free_forwards, free_backwards = logic_and(held, rigid <= 0.0), logic_and(held, rigid >= 0.0)
+            locked, rigid = mode == 0.0, self._rigid(contact)
+            free_forwards, free_backwards = logic_and(locked, rigid <= 0.0), logic_and(locked, rigid >= 0.0)
             values["forwards"] = if_else(free_forwards, holding_torque - forward - THRESHOLD_OFFSET, -1.0)
             values["backwards"] = if_else(free_backwards, holding_torque - backward + THRESHOLD_OFFSET, 1.0)
         beyond_upper, beyond_lower = q - self._limits(1), q - self._limits(0)

@@ -54,8 +54,8 @@ from armblocks.trajectories import Quintic
 class JTraj(Block):
     """A quintic from q0 to qf in tmax, at rest at both ends: q = q0 + (qf - q0)(10 s^3 - 15 s^4 + 6 s^5).
 
-    s = t / tmax; qd and qdd are its exact derivatives. After tmax the joints stay at qf, as in the toolbox
-    since release 10; up to release 9.10 its block gave NaN. The toolbox interpolates a table of 101 points
+    s = t / tmax; qd and qdd are its exact derivatives. After tmax the joints stay at qf, as in release 10 of
+    the toolbox; the block of releases up to 9.10 gives NaN. The toolbox interpolates a table of 101 points
     linearly; this block evaluates the polynomial (they differ by up to 7.2e-5 (qf - q0)).
     """
 

@@ -50,10 +50,11 @@ MOVING_POSE = driver("Fkine").named("target").by(q=MOTION)
 class Ikine(Block):
     """Inverse kinematics in closed form: q = ikine(T), the joint coordinates of one branch.
 
-    For arms with a closed form (``arm.ikine_all``): a spherical wrist, three parallel axes, SCARA and planar
-    arms, palletisers. ``branch`` counts the branches in the order of ``arm.ikine_all(T).q``. Angles are
-    within half a turn of ``q0``. q is NaN where the branch does not exist, so the run ends there. For other
-    arms, and through singular configurations, use DifferentialIkine.
+    The block supports arms with a closed form (``arm.ikine_all``): with a spherical wrist or three parallel
+    axes, SCARA and planar arms, palletisers. ``branch`` is the number of a branch in the order of
+    ``arm.ikine_all(T).q``, from 1. Angles are within half a turn of ``q0``. q is NaN where the branch does
+    not exist, so the run ends there. For other arms, and through singular configurations, use
+    DifferentialIkine.
     """
 
     title: ClassVar[str] = "ikine"
@@ -104,11 +105,11 @@ class ResolvedRate(Block):
     """Joint speeds for a velocity of the tool, bounded near singular configurations: (v; w) = J(q) qd.
 
     Resolved-rate motion control (Whitney, 1969) with damped least squares: near a singular configuration,
-    where the manipulability falls below ``region``, damping up to ``damping`` bounds the speeds and the tool
-    leaves the commanded velocity. The manipulability is that of the Jacobian whose linear rows are divided by
-    the size of the arm. All speeds are reduced in proportion, so that none exceeds ``max_speed``.
-    ``avoidance`` moves joints towards the middle of their ranges without moving the tool. This requires more
-    joints than degrees of freedom of the tool.
+    where the manipulability falls below ``region``, damping up to ``damping`` bounds the speeds, and the tool
+    velocity deviates from the commanded velocity. The manipulability is that of the Jacobian whose linear
+    rows are divided by the size of the arm. All speeds are reduced in proportion, so that none exceeds
+    ``max_speed``. ``avoidance`` moves joints towards the middle of their ranges without moving the tool. This
+    requires more joints than degrees of freedom of the tool.
     """
 
     title: ClassVar[str] = "Resolved Rate"

@@ -35,7 +35,8 @@ class StopSimulation(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Assertion(Block):
-    """Asserts that its input is not 0. When it becomes 0, the run fails, or reports this at its end."""
+    """Asserts that its input is not 0. If the input becomes 0, the run fails, or its message has a
+    warning."""
 
     title: ClassVar[str] = "Assertion"
     example: ClassVar[WorkedExample] = WorkedExample(

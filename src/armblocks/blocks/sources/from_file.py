@@ -27,9 +27,9 @@ class FromFile(BlockWithRows):
     and the columns of the times and of the values. In the studio the file is chosen in the block's dialog,
     with a preview, or dropped on the sheet. In Python, ``data`` is the result of ``load_table``, or rows
     (time, value, …). Each row is an event, so that no step passes over a row. The cost of a row does not
-    depend on the length of the table. Before the table the first row is held, and after it the last row; or
-    the signal is ``zero`` before the first row and from the time of the last row on. Values are not
-    converted: the unit in a header such as ``q1 [deg]`` is that of the signal.
+    depend on the length of the table. Before the first row and after the last row, the values of that row are
+    held; or, with ``zero``, the signal is 0 before the first row and from the time of the last row on. Values
+    are not converted: the unit in a header such as ``q1 [deg]`` is that of the signal.
     """
 
     title: ClassVar[str] = "From File"

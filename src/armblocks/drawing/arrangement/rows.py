@@ -141,7 +141,7 @@ class _Rows:
         return end.relative_height > 0
 
     def place(self) -> None:
-        """Place all rows, then move each between its neighbours to where its lines are shortest."""
+        """Place all rows, then move each row between its neighbours to the height with the shortest lines."""
         rank = {row: (-self._weight[row], -len(self._members[row]), row) for row in self._lines}
         unplaced = set(self._lines)
         queue: list[tuple[tuple[float, int, int], int]] = []

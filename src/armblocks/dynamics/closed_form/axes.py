@@ -59,9 +59,10 @@ class Chain:
         return one.parallel(other) and float(np.linalg.norm(apart)) <= SAME * self.size
 
     def from_tool_to_base(self) -> Chain:
-        """The chain of the inverse pose: ``T_0 T⁻¹`` is the pose of its end, with the same angles.
+        """The reversed chain, from the tool to the base: for the same angles its end has the pose ``T_0
+        T⁻¹``.
 
-        With ``T = E_1 … E_n T_0``, the motions are the inverse ones in the opposite order.
+        For ``T = E_1 … E_n T_0``, the reversed chain applies the inverse motions in reverse order.
         """
         axes = tuple(replace(axis, direction=-axis.direction) for axis in reversed(self.axes))
         return replace(self, axes=axes, tool=np.eye(4))

@@ -1,4 +1,4 @@
-"""The form of a closed solution: branches of angles with the measures of their singularities."""
+"""Data types of closed-form solutions: branches of joint angles, with their distances from singularities."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Solver(NamedTuple):
 
 
 def placed(chain: Chain, T: SX, point: Array) -> SX:
-    """The position at the pose ``T`` of a point that is fixed to the tool: ``point`` is that at zero."""
+    """The position of a tool-fixed point at the pose ``T``; ``point``: the position at zero joint angles."""
     in_tool = chain.tool[:3, :3].T @ (point - chain.tool[:3, 3])
     return SX(T[:3, :3] @ in_tool + T[:3, 3])
 

@@ -16,7 +16,8 @@ def three_parallel_axes(chain: Chain) -> Solver | None:
     """Six revolute joints: axes 2, 3, 4 are parallel, axes 5 and 6 intersect.
 
     The intersection of axes 5 and 6 is fixed to the tool, and joints 2 to 4 do not change its component along
-    their axes. This gives joint 1; the orientation gives joints 5 and 6; joints 2 to 4 are a planar arm.
+    their axes. This condition determines joint 1, the orientation determines joints 5 and 6, and joints 2 to
+    4 are a planar arm.
     """
     if len(chain.axes) != 6 or any(axis.prismatic for axis in chain.axes):
         return None
@@ -121,7 +122,8 @@ def arm_of_parallel_axes(chain: Chain) -> Solver | None:
 
     In palletisers, couplings keep the sum of the angles of the parallel axes constant, so that the last axis
     keeps its inclination. In other arms, the orientation of the tool gives this sum. These arms reach only
-    some poses; solutions of other poses do not have the whole pose and are left out when they are checked.
+    some poses. For other poses a solution has only a part of the pose, and the check by forward kinematics
+    rejects it.
     """
     if len(chain.axes) not in (4, 5) or any(axis.prismatic for axis in chain.axes):
         return None

@@ -1,8 +1,8 @@
 """Six joints whose last three axes intersect: position and orientation are solved one after the other.
 
 The centre of the wrist does not depend on the last three joints, so the first three follow from its position
-(Pieper, 1968). They are: two parallel axes after the first one, or two intersecting axes and a third joint
-that is revolute or prismatic.
+(Pieper, 1968). Supported are two parallel axes after the first one, and two intersecting axes before a third
+joint that is revolute or prismatic.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def spherical_wrist(chain: Chain) -> Solver | None:
 def arm_with_one_wrist_axis(chain: Chain) -> Solver | None:
     """Three or four revolute joints: axes 2 and 3 are parallel, and not parallel to axis 1.
 
-    These arms reach only some poses; solutions of other poses are left out when they are checked.
+    These arms reach only some poses. The check by forward kinematics rejects the solutions of other poses.
     """
     if len(chain.axes) not in (3, 4) or any(axis.prismatic for axis in chain.axes):
         return None
@@ -72,8 +72,8 @@ def arm_with_one_wrist_axis(chain: Chain) -> Solver | None:
 def _parallel_arm(chain: Chain, centre: Array, y: SX) -> Iterator[tuple[list[SX], list[SX]]]:
     """The angles of three joints that take the point ``centre`` to ``y``; axes 2 and 3 are parallel.
 
-    Joints 2 and 3 do not change the component along their axes, which gives the first angle. The distance of
-    the point from axis 2 gives the third angle.
+    Joints 2 and 3 do not change the component along their axes. This condition determines the first angle.
+    The distance of the point from axis 2 gives the third angle.
     """
     first, second, third = chain.axes[:3]
     h, p1, p2, p3 = second.direction, first.point, second.point, third.point
@@ -81,7 +81,7 @@ def _parallel_arm(chain: Chain, centre: Array, y: SX) -> Iterator[tuple[list[SX]
     for s in (1.0, -1.0):
         one = shoulder.angle(s)
         x = SX(p1 + rotated(-first.direction, one, SX(y - p1)))
-        # Components along the axes are equal by the choice of the first angle; only the others count.
+        # The first angle makes the components along the axes equal; only the other components count.
         target = SX(x - p2) - dot(SX(h), SX(x - p2)) * h
         elbow = distance(_flat(p2 - p3, h), _flat(centre - p3, h), third.direction, SX(dot(target, target)))
         for e in (1.0, -1.0):
@@ -94,7 +94,7 @@ def _parallel_arm(chain: Chain, centre: Array, y: SX) -> Iterator[tuple[list[SX]
 def _intersecting_arm(
     chain: Chain, shoulder: Array | None, centre: Array, y: SX
 ) -> Iterator[tuple[list[SX], list[SX]]]:
-    """The same for axes 1 and 2 that intersect: the distance from the intersection gives the third joint."""
+    """The angles where axes 1 and 2 intersect: the distance from the intersection gives the third joint."""
     assert shoulder is not None
     first, second, third = chain.axes[:3]
     target = SX(y - shoulder)

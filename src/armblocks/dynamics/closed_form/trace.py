@@ -115,7 +115,7 @@ def trace_branches(robot: Robot, frame: str | None = None) -> TracedFunction:
 
 
 def _reversed(chain: Chain, solver: Solver) -> Solver:
-    """The solver of a chain from the solver of the chain from the tool to the base."""
+    """The solver of a chain, derived from the solver of its reversed chain (from the tool to the base)."""
 
     def branches(T: SX) -> Iterator[Branch]:
         R, p = T[:3, :3], T[:3, 3]
@@ -127,7 +127,7 @@ def _reversed(chain: Chain, solver: Solver) -> Solver:
 
 
 def _coordinates(robot: Robot, chain: Chain, inverse: Array, branch: Branch) -> SX:
-    """The coordinates q (nq,) of a branch; angles are within their limits if a whole turn allows it."""
+    """The coordinates q (nq,) of a branch; angles are shifted by full turns into their limits if possible."""
     tree = [value / axis.factor - axis.offset for axis, value in zip(chain.axes, branch.angles)]
     q = SX(inverse @ SX(vertcat(*tree)))
     rows: list[SX] = []
@@ -137,7 +137,7 @@ def _coordinates(robot: Robot, chain: Chain, inverse: Array, branch: Branch) -> 
 
 
 def _turned(angle: SX, lowest: float, highest: float) -> SX:
-    """The angle less whole turns: from -π to π, or a turn away from there if only that is in the limits."""
+    """The equivalent angle from -π to π, or one full turn away if only that angle is within the limits."""
     turn = 2.0 * math.pi
     angle = SX(angle - turn * floor(angle / turn + 0.5))
     if highest < math.pi:

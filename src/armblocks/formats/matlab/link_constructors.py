@@ -4,8 +4,8 @@ In both, a row of more than six numbers is a legacy DYN row: five D-H parameters
 Izz Ixy Iyz Ixz [Jm [G [B [Tc+ Tc-]]]]`` with offset 0. The order of the D-H parameters is ``alpha A theta D
 sigma`` for ``link`` and ``theta d a alpha sigma`` for ``Link``.
 
-The default gear ratio is 1, as in the toolbox's manual. (In the code of releases 9 and 10 it is 0, so that
-motor inertia and motor friction are silently ignored.)
+The default gear ratio is 1, as in the toolbox's manual. (In the code of releases 9 and 10 the default is 0,
+which ignores motor inertia and motor friction.)
 """
 
 from __future__ import annotations

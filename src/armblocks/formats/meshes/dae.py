@@ -1,7 +1,7 @@
 """COLLADA meshes (DAE, versions 1.4 and 1.5): polygons, placed by the nodes of the scene.
 
-``<unit>`` is applied. ``<up_axis>`` is not: Gazebo, RViz and MoveIt leave it out, and robot files are written
-for these programs. Materials, textures, lines and joints are not used; a skin has the pose of its binding.
+``<unit>`` is applied. ``<up_axis>`` is ignored, as in Gazebo, RViz and MoveIt, for which robot files are
+written. Materials, textures, lines and joints are not used; a skin has the pose of its binding.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ _UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 _NUMBERS = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _APPEARANCE = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_")
-"""Beginnings of the names of extensions that do not change the triangles."""
+"""Prefixes of the names of extensions that do not change the triangles."""
 
 
 def glb_corners(data: bytes, name: str) -> NDArray[np.float64]:

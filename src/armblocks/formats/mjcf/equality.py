@@ -39,7 +39,7 @@ class Parts:
 def constraints_of(
     root: Element, defaults: Defaults, parts: Parts, context: FileContext
 ) -> tuple[Constraint, ...]:
-    """The active constraints of a file; a finding for each one that a robot cannot have."""
+    """The active constraints of a file; unsupported constraints become findings."""
     constraints: list[Constraint] = []
     used: set[str] = set()
     poses = _initial_poses(parts.links)

@@ -34,7 +34,7 @@ def mass_properties(
     meshes: MeshAssets,
     context: FileContext,
 ) -> MassProperties:
-    """Those of ``<inertial>``, or of the shapes of the body, within the bounds of the settings."""
+    """The mass properties of ``<inertial>``, or of the shapes, within the bounds of the settings."""
     inertial = body.first("inertial")
     from_shapes = settings.inertia_from_shapes
     if inertial is not None and not from_shapes:

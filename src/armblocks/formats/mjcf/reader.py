@@ -1,8 +1,8 @@
 """Robots from MJCF: the tree of the bodies of ``<worldbody>``.
 
-A body with several joints becomes a series of links: one without mass for each joint but the last. Each of
-them has the name of its joint; the last one has the name of the body. A free body is at its initial pose at
-the neutral coordinates. Shapes of the world itself are surroundings and not part of the robot.
+A body with several joints becomes a series of links: a massless link for each joint except the last, with the
+name of the joint, and then the link of the body, with the name of the body. A free body is at its initial
+pose at the neutral coordinates. Shapes of the world itself are surroundings and not part of the robot.
 
 Source: MuJoCo documentation, *XML reference* and *Modeling* (versions 3.x).
 """
@@ -52,7 +52,7 @@ from armblocks.spatial import Transform, transl
 
 _NOT_READ = ("replicate", "attach", "composite", "flexcomp", "plugin")
 _FLAGS = ("constraint", "equality", "frictionloss", "limit", "damper")
-"""Flags that switch off parts of a model that a robot has nevertheless."""
+"""Flags that disable parts of a model in MuJoCo; these parts are active in the robot."""
 MAX_NAME = 200
 """Maximum number of characters of the name of a link."""
 
@@ -112,7 +112,7 @@ def _gravity(root: Element) -> tuple[float, float, float]:
 
 @dataclass(frozen=True, kw_only=True)
 class _Place:
-    """Where an element is: the parent link, the pose of the frame around it, and its default class."""
+    """The location of an element: the parent link, the pose of the enclosing frame, and the default class."""
 
     parent: str | None
     pose: Transform = field(default_factory=Transform)

@@ -37,7 +37,7 @@ class GivenSpring(NamedTuple):
 def spring_of(element: Element, kind: str, unit: float, context: FileContext) -> GivenSpring | None:
     """The spring of a joint with its defaults; ``unit``: rad per unit of the file's angles.
 
-    A finding for springs that a robot cannot have.
+    Unsupported springs become findings.
     """
     stiffness, *higher = _polynomial(element, "stiffness")
     time, ratio = (
@@ -94,7 +94,7 @@ def with_joint_springs(
 def _inertias(links: Sequence[Link]) -> dict[str, float]:
     """The inertia at each joint with one coordinate while all other joints are free.
 
-    It is that of the initial configuration: the inverse of the diagonal of the inverse inertia matrix.
+    It is computed in the initial configuration, as the inverse of the diagonal of the inverse inertia matrix.
     """
     robot = Robot(name="springs", links=tuple(links))
     q = [value for link in robot.moving_links for value in _initial_coordinates(link)]

@@ -104,7 +104,7 @@ def write_mjcf(robot: Robot) -> bytes:
 
 
 def _is_changed(name: str) -> bool:
-    """Whether the reader would give a body with this name another one."""
+    """Whether the reader would rename a body with this name."""
     return name == "world" or name != name.strip() or len(name) > MAX_NAME
 
 
@@ -189,7 +189,7 @@ def _bodies(robot: Robot) -> tuple[dict[str, _Body], list[str]]:
 
 
 def _only_carries_a_joint(robot: Robot, link: Link, children: Sequence[Link]) -> bool:
-    """Whether a link has no other purpose than to connect two joints."""
+    """Whether a link without mass and shapes only connects two joints."""
     return (
         len(children) == 1
         and children[0].joint.nv == 1

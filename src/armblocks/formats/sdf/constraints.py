@@ -108,7 +108,7 @@ def _cross(a: Sequence[float], b: Sequence[float]) -> list[float]:
 def couplings_of(
     links: Sequence[Link], coordinates: Sequence[Coordinate], gearboxes: Sequence[Frame], frames: Frames
 ) -> tuple[Constraint, ...]:
-    """The couplings of mimic joints and gearboxes; a finding for those that a robot cannot have."""
+    """The couplings of mimic joints and gearboxes; unsupported elements become findings."""
     couplings: list[Coupling] = []
     moving = [link for link in links if link.joint.moves]
     used: set[str] = set()

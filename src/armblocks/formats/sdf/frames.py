@@ -200,7 +200,7 @@ class Frames:
     def _chains(self, a: Frame, b: Frame) -> tuple[list[Frame], list[Frame]]:
         """The frames from a and from b to the first frame that both are relative to, without that one.
 
-        Both chains are extended in turns, so that the effort depends only on the distance of the frames.
+        Both chains are extended alternately, so that the effort depends only on the distance of the frames.
         """
         chains: tuple[dict[Frame, None], dict[Frame, None]] = ({a: None}, {b: None})
         ends = [a, b]

@@ -1,4 +1,4 @@
-"""Expansion of a xacro file in a process of its own: ``python -m armblocks.formats.urdf.xacro_process``.
+"""Expansion of a xacro file in a separate process: ``python -m armblocks.formats.urdf.xacro_process``.
 
 xacro evaluates Python expressions of the file. Here each expression is checked first: it may contain numbers,
 texts, operators, comprehensions over lists, and calls of the functions that xacro documents, but no lambda

@@ -149,7 +149,7 @@ def _point_label(points: _Array, x: float, y: float, word: str, frame: _Frame) -
         dy = np.maximum(np.maximum(base - SMALL_SIZE - points[:, 1], points[:, 1] - base), 0.0)
         return float(np.nanmin(np.hypot(dx, dy)))
 
-    # The position above is preferred; a clearance of more than a few px makes no difference.
+    # The position above the point is preferred; a clearance of more than a few px has no advantage.
     left, base = max(candidates, key=lambda position: (inside(position), min(clearance(position), 7.0)))
     background = Rectangle(
         left - 2, base - SMALL_SIZE + 1, width + 4, SMALL_SIZE + 2, 2, fill=Tone.SURFACE, opacity=0.8

@@ -94,7 +94,7 @@ def _response_picture(
     for index, (row, column, _) in enumerate(shown):
         x, y = time, response.values[:, row, column]
         if system.is_discrete:
-            # The value is held until the next sample.
+            # Zero-order hold: the value is constant until the next sample.
             x, y = np.repeat(x, 2)[1:], np.repeat(y, 2)[:-1]
         points = clip_line(area.points(x, y), box)
         picture.add(Polyline(points, trace_tone(index), 1.8, trace_dash(index)))

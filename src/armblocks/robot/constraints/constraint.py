@@ -69,8 +69,8 @@ class Constraint(ABC, metaclass=ArgumentErrors, methods=False):
 class Closure(Constraint):
     """A joint between two links that closes a loop of the tree, described by the relations of two frames.
 
-    ``first`` and ``second``: frames on the two links. Each relation is one equation; equations that follow
-    from others are allowed, because the algorithms find and omit them.
+    ``first`` and ``second``: frames on the two links. Each relation is one equation; redundant equations are
+    allowed, because the algorithms detect and remove them.
     """
 
     first: Attachment

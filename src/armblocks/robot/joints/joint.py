@@ -21,7 +21,8 @@ from armblocks.spatial import Transform, Vector3, vector3
 class Joint(ABC, metaclass=ArgumentErrors, methods=False):
     """A joint: a sequence of elementary motions from the parent to the link.
 
-    Its coordinates q (nq,) are those of its motions, one after the other, and its speeds qd (nv,) as well.
+    Its coordinates q (nq,) are the coordinates of its motions, in order, and its speeds qd (nv,) are their
+    speeds.
 
     ``axis``: the axis of its motion in the joint frame, a unit vector; it is normalised here, and the robot
     rejects a zero axis. ``offset`` (rad or m) is added to the coordinate. ``limits``: one value for all
@@ -131,7 +132,8 @@ class Joint(ABC, metaclass=ArgumentErrors, methods=False):
     def travel(self) -> tuple[float, float] | None:
         """Lowest and highest translation along the axis within the limits, m, or None without limits.
 
-        The offset is included. Of several translations it is the first one with limits.
+        The offset is included. For several translations, the limits are those of the first translation with
+        limits.
         """
         motions = [motion for motion in self.motions for _ in motion.speeds]
         for motion, limits in zip(motions, self.coordinate_limits):
@@ -155,7 +157,7 @@ class Joint(ABC, metaclass=ArgumentErrors, methods=False):
 
 
 def unit_axis(value: object) -> Vector3:
-    """An axis as a unit vector. An axis of unit length up to rounding is unchanged, zero as well."""
+    """An axis as a unit vector. A zero axis, and an axis of unit length up to rounding, are unchanged."""
     axis = vector3(value, where="axis of a joint")  # pyright: ignore[reportArgumentType] - checked there
     length = hypot(*axis)
     if length > 0 and abs(length - 1) > 1e-15 and math.isfinite(length):

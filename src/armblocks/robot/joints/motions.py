@@ -1,7 +1,7 @@
 """The elementary motions of which the motions of all joints are composed.
 
-A joint is a sequence of them, from its parent to its link. The algorithms of :mod:`armblocks.dynamics` use
-these two motions only, so the sequence describes a joint type completely.
+A joint is a sequence of elementary motions, from its parent to its link. There are two types, and the
+algorithms of :mod:`armblocks.dynamics` use only these, so the sequence describes a joint type completely.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class AxisMotion:
 
     @property
     def speeds(self) -> tuple[Coordinate, ...]:
-        """The coordinate whose rate is the speed."""
+        """The speed: the rate of the coordinate."""
         return self.positions
 
     @property

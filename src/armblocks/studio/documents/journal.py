@@ -6,8 +6,8 @@ line of JSON preceded by its length and CRC-32, so that a record cut off by a cr
     <length> <crc32> {"change": …}\n
 
 :mod:`armblocks.studio.documents.file_journal` defines the content of the records; this module writes them,
-flushes them to disk and reads them. While a journal is open its file is locked, so that another studio leaves
-it alone. The system releases the lock when the process ends, also after a crash.
+flushes them to disk and reads them. While a journal is open its file is locked, so that no other studio uses
+it. The system releases the lock when the process ends, also after a crash.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ MessageT = TypeVar("MessageT", bound="Message")
 
 
 class Message(BaseModel):
-    """A value that travels between front end and server; unknown fields are rejected.
+    """A value that front end and server exchange; unknown fields are rejected.
 
     The validator is built at its first use, when all files of messages are imported; see :class:`AnyOf`.
     """

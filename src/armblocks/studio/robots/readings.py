@@ -15,9 +15,9 @@ from armblocks.spatial import Transform
 from armblocks.studio.protocol.messages.robots import Readings
 
 SINGULAR_RATIO = 1e-6
-"""The arm is called singular if the ratio of the extreme singular values of its Jacobian is smaller."""
+"""Ratio of the extreme singular values of the Jacobian below which an arm is reported as singular."""
 NEARLY_SINGULAR_RATIO = 0.02
-"""The arm is called close to singular below this ratio: joint speeds can exceed 50 times the tool speed."""
+"""Ratio below which an arm is close to singular: joint speeds can exceed 50 times the tool speed."""
 _NAMED_FRACTION = 0.1
 """Fraction of the largest entry above which a joint or a direction is named."""
 

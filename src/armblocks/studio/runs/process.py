@@ -113,7 +113,7 @@ class RunProcess:
             pass
 
     async def _next_message(self) -> bytes | None:
-        """Return the next message of the worker; kill a worker that is silent or runs for too long."""
+        """Return the next message of the worker; kill a worker that sends no message or runs for too long."""
         remaining = max(self._deadline - monotonic(), 0.0)
         timeout = min(SILENT_SECONDS, remaining) if self.state == "running" else remaining
         try:

@@ -52,7 +52,7 @@ MAX_NUMBERS = 16_000_000
 
 def work(pipe: Connection) -> None:
     """Prepare for any run, wait for the job, and run it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C in the terminal is for the server
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server handles Ctrl-C in the terminal
     limit_process()
     host_target()  # starts LLVM, which takes longer than most runs
     with contextlib.suppress(EOFError, OSError):

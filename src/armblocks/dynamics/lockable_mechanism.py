@@ -85,8 +85,8 @@ class MechanismEquations:
     def motion(self, torque: SX, free: SX) -> tuple[SX, SX]:
         """``qdd`` (n,), exactly 0 for locked joints, and the torque that holds each locked joint (n,)."""
         qdd, multipliers = self._solve(torque - self.bias, free, -self._J_bias)
-        held = torque - self.bias - mtimes(self.M, qdd)
-        return qdd, held + mtimes(self._J.T, multipliers) if self._J.shape[0] else held
+        holding = torque - self.bias - mtimes(self.M, qdd)
+        return qdd, holding + mtimes(self._J.T, multipliers) if self._J.shape[0] else holding
 
     def speeds_after_impact(self, qd: SX, stopping: SX) -> SX:
         """Speeds after an impact that stops some joints (1) and leaves the others free (0).
@@ -145,7 +145,7 @@ def consistent_state(robot: Robot, q: SX, qd: SX, free: SX, near: Array | None) 
 def _shortest_step(
     robot: Robot, tree: KinematicTree, q: SX, free: SX, relations: Sequence[int]
 ) -> tuple[SX, Callable[[SX], SX]]:
-    """The residuals, and the function to the step of least norm of the free joints that removes them."""
+    """The residuals, and the function that maps them to the least-norm correction of the free joints."""
     residuals, of_all = _relations(robot, tree, q, relations)
     J = _free_columns(of_all, free)
     solve = symmetric_solver(mtimes(J, J.T))

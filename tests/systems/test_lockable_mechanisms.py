@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 import armblocks as ab
 from armblocks import blocks
-from armblocks.dynamics.held_mechanism import MechanismEquations, check_lockable
+from armblocks.dynamics.lockable_mechanism import MechanismEquations, check_lockable
 from armblocks.dynamics.mechanism import Mechanism
 from armblocks.errors import InputError, RobotError
 from armblocks.robot import Coupling, JointLimits, Motor, Revolute, Robot, Screw

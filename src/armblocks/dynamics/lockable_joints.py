@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from armblocks.dynamics.base_parameters import regrouped
 from armblocks.dynamics.crba import FactoredInertia, SquareMatrix, crba
 from armblocks.dynamics.forward import check_accelerations_exist
-from armblocks.dynamics.held_mechanism import MechanismEquations
 from armblocks.dynamics.joint_motion import entries, joint_motions
 from armblocks.dynamics.loads import tip_wrench, with_payload
+from armblocks.dynamics.lockable_mechanism import MechanismEquations
 from armblocks.dynamics.mechanism import Array
 from armblocks.dynamics.rnea import rnea
 from armblocks.dynamics.springs import spring_torques
@@ -173,10 +173,10 @@ class JointModes:
     contact: SX
 
 
-def breakaway_direction(held_torque: SX, contact: SX, forward: SX, backward: SX) -> SX:
+def breakaway_direction(holding_torque: SX, contact: SX, forward: SX, backward: SX) -> SX:
     """Direction in which a locked joint starts to move: 1 forwards, -1 backwards, 0 if it remains locked."""
-    forwards = logic_and(held_torque > forward, contact <= 0.0)
-    backwards = logic_and(held_torque < backward, contact >= 0.0)
+    forwards = logic_and(holding_torque > forward, contact <= 0.0)
+    backwards = logic_and(holding_torque < backward, contact >= 0.0)
     return forwards - backwards
 
 
@@ -201,8 +201,8 @@ def locked_joints(
 
     ``driving`` is the torque (n,) at the joints without Coulomb friction and hard stops; ``start`` is the
     initial guess. A moving joint slides. Of the joints at rest, those beyond their friction limit are
-    released, and those that would slide against their direction are locked; this is repeated as many times as
-    there are joints. (The accelerations minimise 1/2 qdd' M qdd - qdd' (torque - bias) + sum of friction
+    released, and those that would slide against their direction are locked. The number of repetitions is the
+    number of joints. (The accelerations minimise 1/2 qdd' M qdd - qdd' (torque - bias) + sum of friction
     |qdd|, the principle of least constraint. This function is convex and has a unique minimum.) Guards detect
     remaining inconsistencies.
     """
@@ -222,7 +222,7 @@ def locked_joints(
             inertia = SX(vertcat(*(equations.M[i, i] for i in range(n))))
             slides = if_else(mode * qdd * inertia < -tolerance, 0.0, mode)
         dry_mode = if_else(qd != 0.0, sign(qd), if_else(mode == 0.0, released, slides))
-        held = logic_and(logic_and(contact != 0.0, mode == 0.0), released == 0.0)
-        mode = if_else(has_friction, dry_mode, if_else(held, 0.0, 1.0))
+        stays_locked = logic_and(logic_and(contact != 0.0, mode == 0.0), released == 0.0)
+        mode = if_else(has_friction, dry_mode, if_else(stays_locked, 0.0, 1.0))
         contact = if_else(logic_or(mode != 0.0, qd != 0.0), 0.0, contact)
     return JointModes(mode, contact)
