@@ -1,11 +1,11 @@
-"""Least-time motions along paths under speed, acceleration and torque limits, beside toppra.
+"""Time-optimal motions along paths under speed, acceleration and torque limits, compared with toppra.
 
     python benchmarks/least_time.py
 
 Needs ``toppra`` (extra ``benchmark``) and Pinocchio. Both programs have the same path (natural cubic spline),
 grid and limits. toppra evaluates torques in Python, by Pinocchio's ``rnea`` or by ``arm.rne``. Its
 constraints are interpolated (both ends of each segment), as those of armblocks. The robot is the Panda
-without friction, because toppra's torques have no viscous friction. Processor time of this process, least
+without friction, because toppra's torques have no viscous friction. Processor time of this process, minimum
 of the repetitions.
 """
 

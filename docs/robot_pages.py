@@ -26,7 +26,7 @@ OTHER = "Exercises"
 MASSES = {
     MassOrigin.PUBLISHED: "published",
     MassOrigin.CAD: "from CAD models",
-    MassOrigin.PACKAGE: "of a package, origin unknown",
+    MassOrigin.PACKAGE: "from a package that does not state their origin",
     MassOrigin.ESTIMATED: "estimated",
     MassOrigin.CHOSEN: "chosen",
 }

@@ -30,8 +30,8 @@ KUKA_AXES = (
 )
 KUKA_NOTE = (
     "Joints A1, A2, A3 and A6 are turret, lower_arm, upper_arm and flange. A1 rotates about the downward "
-    "and A6 about the upward vertical, A2 = 0 is the lower arm stretched forward, and A3 is relative "
-    "to the lower arm, as in the source."
+    "and A6 about the upward vertical, the lower arm is stretched forward at A2 = 0, and A3 is "
+    "relative to the lower arm, as in the source."
 )
 ABB_NOTE = (
     "Joints 1, 2, 3 and 6 are turret, lower_arm, drive_lever and flange. Axis 2 is measured from the "
@@ -40,9 +40,9 @@ ABB_NOTE = (
 )
 FANUC_NOTE = (
     "Joints J1, J2, J3 and J4 are turret, lower_arm, drive_lever and flange. J2 is measured from the "
-    "vertical, positive forward, and J3 from the horizontal, positive up, independent of J2: with this "
-    "convention the heights of the data sheet follow. The data sheet gives the widths of the ranges of "
-    "J2 and J3, but not their zeros: they are omitted. The signs of J1 and J4 are a choice of "
+    "vertical, positive forward, and J3 from the horizontal, positive up, independent of J2; this "
+    "convention gives the heights of the data sheet. The data sheet gives the widths of the ranges of "
+    "J2 and J3, but not their zeros, so these ranges are omitted. The signs of J1 and J4 are a choice of "
     "armblocks."
 )
 
@@ -105,10 +105,11 @@ class Arm:
             "Palletiser with four driven axes. Parallelogram linkages move the upper arm by a lever at the "
             f"turret and keep the flange level; their rods and levers are bodies of the model. {self.note} "
             f"The pins of the linkages are not published: lever {LEVER:g}, level rods {TRIANGLE:g} of the "
-            f"upper arm. {self.payload_note} Masses are estimated, not measured: those of the KUKA KR 180 of "
-            "the paper, in proportion to payload and length (armblocks.robot.palletiser.Masses; two digits), "
-            "in beams of square section. Real values may differ by a factor of two. The counterbalance "
-            "spring is not modelled. The model has no friction and no motor data."
+            f"upper arm. {self.payload_note} Masses are estimated, not measured: the masses of the KUKA "
+            "KR 180 of the paper are scaled in proportion to payload and length "
+            "(armblocks.robot.palletiser.Masses) and rounded to two digits. The links are beams of square "
+            "section. Real values may differ by a factor of two. The counterbalance spring is not modelled. "
+            "The model has no friction and no motor data."
         )
 
     @property
@@ -126,8 +127,8 @@ class Arm:
         return canonical_bytes(document, one_line=lambda path: path[-1:] == ("position",))
 
 
-MODEL_NAME = "The payload is that of the model's name."
-ASSUMED = "The payload {} kg that scales the masses is an assumption from the name of the variant."
+MODEL_NAME = "The payload follows from the model's name."
+ASSUMED = "The masses are scaled with a payload of {} kg, which is assumed from the name of the variant."
 ARMS = {
     "kr40_pa": Arm(
         name="KR 40 PA",

@@ -69,7 +69,7 @@ def slider_crank() -> Robot:
 
 
 def bricard() -> Robot:
-    """Bricard's mechanism: six hinges in a loop of rods of 0.8 m. It moves although a count gives 0."""
+    """Bricard's mechanism: six hinges in a loop of rods of 0.8 m. It moves, although it has six equations."""
     L, m = 0.8, 2.0
     thin, thick = m * 0.08**2 / 6, m * (L**2 + 0.08**2) / 12
     steps = (

@@ -252,10 +252,12 @@ MIXED_ROBOTS: tuple[Robot, ...] = (
     build_mixed_tree(5, MOVING_TYPES),
     build_mixed_tree(6, (Spherical, Fixed, Revolute, Universal, Free, Spherical)),
 )
-"""Trees of all joint types; the first one has more joints than the mass matrix is factored for."""
+"""Trees of all joint types. The first one has too many joints for a factorisation of its inertia matrix.
+"""
 
 LAW_NAMES = ("kr180", "kr180_cell", "panda", "planar3r", "puma560", "stanford", "twolink")
-"""Shipped robots of different kinds; ``tests/shipped/test_catalogue.py`` has light laws of all of them."""
+"""Shipped robots of different kinds. ``tests/shipped/test_catalogue.py`` checks a few laws for all robots.
+"""
 
 LAW_ROBOTS: dict[str, Robot] = {
     robot.name: robot

@@ -1,4 +1,4 @@
-"""Public constructors and functions answer arguments that do not fit with the errors of the package."""
+"""Wrong arguments of public constructors and functions raise errors of the package."""
 
 import copy
 import importlib
@@ -57,7 +57,7 @@ PUBLIC = public_calls()
 
 
 def public_methods() -> dict[str, Callable[..., object]]:
-    """The methods of all public classes but those whose methods only the package calls."""
+    """The methods of all public classes, except classes whose methods only the package calls."""
     classes = {
         base
         for value in PUBLIC.values()

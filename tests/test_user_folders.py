@@ -1,4 +1,4 @@
-"""The user's folders are those of earlier versions, on each operating system."""
+"""The paths of the user's folders on each operating system, where earlier versions stored their files."""
 
 import os
 from pathlib import Path

@@ -122,7 +122,7 @@ def test_ground_pulse_and_chirp_have_their_closed_forms() -> None:
     assert evaluate(Ground())["y"] == 0.0
     pulse = Pulse(amplitude=[2.0, 3.0], start=1.0, width=0.5)
     assert [float(evaluate(pulse, t=t)["y"][0]) for t in (0.99, 1.0, 1.49, 1.5)] == [0, 2, 2, 0]
-    expected = chirp(3.7, f0=0.1, t1=10.0, f1=2.0, phi=-90)  # SciPy's is a cosine
+    expected = chirp(3.7, f0=0.1, t1=10.0, f1=2.0, phi=-90)  # SciPy's chirp is a cosine
     block = Chirp(initial_frequency=0.1, final_frequency=2.0, target_time=10.0)
     assert evaluate(block, t=3.7)["y"] == pytest.approx(expected, rel=1e-12)
 

@@ -145,7 +145,7 @@ def test_outputs_of_sampled_lags_agree_with_their_transfer_functions(
     block: Block, numerator: list[float], denominator: list[float]
 ) -> None:
     t, (u, y) = run(SineWave(frequency=3.0, phase=0.4), block)
-    at_ticks = slice(None, None, 4)  # 200 samples in 5 s: four to a tick
+    at_ticks = slice(None, None, 4)  # 200 samples in 5 s, four in each sample time of 0.1 s
     assert t[at_ticks][1] == pytest.approx(0.1)
     np.testing.assert_allclose(y[at_ticks], signal.lfilter(numerator, denominator, u[at_ticks]), atol=1e-13)
 

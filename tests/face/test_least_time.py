@@ -1,4 +1,4 @@
-"""Least-time motions: limits hold on all joints at all times, one of them binds; closed forms."""
+"""Time-optimal motions: all limits hold at all times, and one of them is reached; closed forms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs with many events, advanced in parts: each call reaches what it requests."""
+"""Runs with many events, advanced in parts: each call ends at the requested time or step."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def ends_of_steps(diagram: Diagram, seed: int) -> list[float]:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_each_call_of_advance_reaches_what_it_requests(seed: int) -> None:
+def test_each_call_of_advance_ends_where_requested(seed: int) -> None:
     diagram, random = with_many_events(seed), np.random.default_rng(seed)
     whole = ab.simulate(diagram, **settings(seed))  # pyright: ignore[reportArgumentType]
     assert whole.run.events + whole.run.ticks > 2000

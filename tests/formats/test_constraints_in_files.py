@@ -184,7 +184,7 @@ def test_inactive_and_mocap_constraints_do_not_hold_the_robot() -> None:
 
 
 def test_joints_of_actuators_have_the_motors_of_a_mechanism() -> None:
-    """The legs and a weld: seven joints less six equations is one motor too few or too many elsewhere."""
+    """The joints of actuators have motors only if they are as many as the degrees of freedom."""
     robot = read_mjcf(mjcf(EQUALITIES["connect by bodies"]).encode(), "robot.xml", FileContext())
     assert [link.name for link in robot.links if link.motor is not None] == ["a"]
     tree = read_mjcf(mjcf("").encode(), "robot.xml", FileContext())

@@ -37,7 +37,7 @@ def test_lines_have_a_contrast_of_at_least_3(theme: Theme, tone: Tone) -> None:
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_the_colours_of_six_joints_are_far_apart(theme: Theme) -> None:
-    """Euclidean distance in CIE L*a*b*; two blues had a distance of 9."""
+    """Euclidean distance in CIE L*a*b*; colours at a distance of 9 are hard to distinguish."""
     colours = [_lab(PALETTE[tone].of(theme)) for tone in TRACES[:6]]
     assert min(math.dist(*pair) for pair in combinations(colours, 2)) > 40
 

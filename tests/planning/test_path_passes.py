@@ -1,4 +1,4 @@
-"""The native passes of least-time motions, compared with linear programs."""
+"""The native passes of time-optimal motions, compared with linear programs."""
 
 from __future__ import annotations
 
@@ -58,7 +58,8 @@ def test_the_passes_find_the_largest_speeds_of_a_linear_program(seed: int, turni
     if not turning:
         assert_allclose(profile.x, expected, rtol=0, atol=1e-7 * limit.max())
         return
-    # Near points without inertia no solution is the fastest at all points; a larger speed costs others.
+    # Near points without inertia no solution is the fastest at all points: a larger speed at one point
+    # reduces the speed at others.
     durations = [
         2.0 / N / (np.sqrt(x[:-1]) + np.sqrt(x[1:])) for x in (profile.x, expected) for N in [len(x) - 1]
     ]

@@ -178,12 +178,12 @@ def expect_well_posed(case: Case, run: Signals) -> None:
     """Raise ``InconclusiveError`` if tiny changes of the diagram explain the difference from the reference.
 
     If a signal stays at a switching value, or reaches it exactly at a tick, rounding errors decide the
-    result. In the neighbours, ``PERTURBATION`` with a random sign is added to the signals of all
-    connections, then to the signal of one connection: with all, a signal that stays at a switching value may
-    have events without end. Rounding also decides whether a signal that passes through 0 is exactly 0 at an
-    instant; the first neighbour is the diagram itself where it always is. A signal that touches a switching
-    value may cross it for less than a step of the reference; then the native run of a neighbour agrees with
-    the reference.
+    result. The neighbours are changed diagrams. In some of them, ``PERTURBATION`` with a random sign is added
+    to the signals of all connections. In the others, it is added to one signal only, because changes of all
+    signals may cause events without end. Rounding also decides whether a signal that passes through 0 is
+    exactly 0 at an instant. The first neighbour is therefore the unchanged diagram, in a run in which every
+    such signal is 0 for a moment. A signal that touches a switching value may cross it for less than a step
+    of the reference. Then the native run of a neighbour agrees with the reference.
     """
     results = [case.reference]
     candidates = [case.recipe, *neighbours(case.recipe), *neighbours_with_one_change(case.recipe)]

@@ -57,7 +57,7 @@ def judged(recipe: Recipe, laws: Sequence[str]) -> Found:
 
 
 class Judge:
-    """A process that judges diagrams, replaced when a diagram takes ``seconds`` of processor time."""
+    """A process that checks the laws, replaced if a diagram takes ``seconds`` of processor time."""
 
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds

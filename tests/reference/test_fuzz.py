@@ -37,7 +37,7 @@ def test_a_seed_always_gives_the_same_diagram() -> None:
 
 
 def test_a_finding_is_reduced_to_the_necessary_block() -> None:
-    """The judge of this test reports only sine waves, in a diagram of many blocks."""
+    """The check of this test reports only sine waves, in a diagram of many blocks."""
     recipe = next(
         recipe for recipe in map(random_recipe, range(100)) if contains_kind(recipe.nodes, "SineWave")
     )

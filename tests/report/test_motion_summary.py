@@ -64,7 +64,7 @@ def test_a_sine_has_its_peaks_and_root_mean_square() -> None:
 
 
 def test_positive_and_negative_work_of_a_spring_are_equal() -> None:
-    """tau = k q over one period: every quarter transfers k/2 in or out."""
+    """tau = k q over one period: in each quarter the spring stores or returns the work k/2."""
     q, qd, qdd = sine()
     (joint,) = summarise(one_joint(), TIME, q, qd, qdd, 3.0 * q, tool_of(q)).joints
     assert joint.work_done == pytest.approx(2 * 1.5, rel=1e-5)

@@ -24,7 +24,7 @@ PALLETISERS = runpy.run_path(str(Path(__file__).parents[2] / "scripts" / "pallet
 MOTIONS = json.loads((Path(__file__).parent / "catalogue_motions.json").read_text(encoding="utf-8"))
 PANDA = json.loads((Path(__file__).parent / "panda_dynamics.json").read_text(encoding="utf-8"))
 EXERCISES = {"kr180", "kr180_cell", "planar3r", "puma560", "twolink"}
-"""Robots that are older than the catalogue."""
+"""Robots of the paper and of exercises, which are not part of the catalogue."""
 CATALOGUE = sorted(set(list_robots()) - EXERCISES)
 ESTIMATED = [name for name in CATALOGUE if shipped_facts(name).masses is MassOrigin.ESTIMATED]
 NOT_COMPARED = {"phantomx", "puma560_akb", "stanford"}
@@ -103,7 +103,7 @@ def test_the_palletiser_of_fanuc_has_the_envelope_of_its_data_sheet() -> None:
 
 @pytest.mark.parametrize("name", PALLETISERS)
 def test_the_palletisers_have_the_lengths_and_linkages_of_the_table(name: str) -> None:
-    """The file is that of the table, and its flange is level wherever its four joints are."""
+    """The file is generated from the table of lengths, and the flange is level for all joint angles."""
     path = Path(__file__).parents[2] / "robots" / name / "robot.json"
     assert path.read_bytes() == PALLETISERS[name].document
     robot = load_robot(name)
@@ -122,7 +122,7 @@ REACHES = {name: facts for name in CATALOGUE if (facts := shipped_facts(name)).r
 
 @pytest.mark.parametrize("name", REACHES)
 def test_the_reach_is_that_of_the_data_sheet(name: str) -> None:
-    """The greatest distance of the flange from axis 1; data sheets state that of the wrist."""
+    """The greatest distance of the flange from axis 1; data sheets state the distance of the wrist."""
     robot = load_robot(name)
     low, high = np.clip(robot.qlim, -math.pi, math.pi).T
     q = np.random.default_rng(1).uniform(low, high, (2000, robot.n))

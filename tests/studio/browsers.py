@@ -69,7 +69,8 @@ Object.defineProperty(window, '__pw_bidiInsertText', {
     set: () => {},
 })
 """
-"""Replaces Playwright's insertion of text by that of Firefox: React overlooks the change of Playwright's."""
+"""Inserts text by a command of Firefox: React does not notice text that Playwright inserts.
+"""
 LOST_CONNECTION = re.compile("ERR_CONNECTION_|ERR_CONTENT_LENGTH_MISMATCH|(connection to|server at) ws://")
 """Messages of Chromium and Firefox about a studio that has ended."""
 SCRIPTS = (INSERT_TEXT,) if IN_FIREFOX else ()

@@ -84,7 +84,7 @@ def test_a_payload_and_a_wrench_act_on_a_mechanism() -> None:
 
 
 def test_a_four_bar_with_dry_friction_comes_to_rest_as_in_maximal_coordinates() -> None:
-    """The reference integrates the sliding phases; at each rest its holding torque decides."""
+    """The reference integrates until the crank stops. Its holding torque determines the next motion."""
     robot = with_motor(four_bar(), "crank", coulomb_friction=BREAK)
     result = run(robot, 1.5, qd=1.5)
     frictionless = four_bar()

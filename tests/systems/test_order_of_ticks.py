@@ -63,7 +63,7 @@ class SampledNetwork:
             self.delayed[f"delay{k}"] = f"small{k}"
 
     def run(self, change: float = 0.0) -> dict[str, list[float]]:
-        """All signals at the ticks, block by block; ``change``: of the amplitude of the first source."""
+        """All signals at the ticks, by block. ``change`` is added to the amplitude of the first source."""
         self.change = change
         rows: list[Values] = []
         states = dict.fromkeys(self.delayed, 0.0)

@@ -126,7 +126,7 @@ def drag_from_library(page: Page, kind: str, x: float, y: float) -> None:
     """Drop a block with the mouse at a position of the canvas, px."""
     library = page.locator(".palette")
     library.get_by_role("textbox", name="Search the library").fill(kind)
-    target = page.locator(".canvas")  # an empty one has examples on it
+    target = page.locator(".canvas")  # the list of examples covers an empty sheet
     drop_entry(library.locator(f'.kind[data-type="{kind}"]'), target, x, y)
     library.get_by_role("button", name="Clear the search").click()
 

@@ -151,4 +151,4 @@ def test_a_reloaded_page_shows_the_run_again(page: Page) -> None:
     page.reload()
     expect(state).to_contain_text("done")
     expect(state).to_contain_text("10.00 s")
-    save_as(page, "run.json")  # no unsaved edits remain that a later test would be offered
+    save_as(page, "run.json")  # so that the studio does not offer these edits to a later test

@@ -206,7 +206,7 @@ def test_a_subsystem_shows_a_picture_of_its_sheet_while_it_has_the_keyboard_focu
     expect(block(sheet, "Subsystem")).to_be_focused()
     expect(block(sheet, "Subsystem")).to_have_class(re.compile("selected"))
 
-    # Moving on closes the picture; Enter opens the sheet that it shows.
+    # The picture closes when the focus moves to another block. Enter opens the displayed sheet.
     sheet.keyboard.press("Shift+Tab")
     focus_subsystem()
     expect(preview).to_be_visible()

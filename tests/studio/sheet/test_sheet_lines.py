@@ -1,4 +1,4 @@
-"""The lines of displayed sheets equal those of the report, also after drags; blocks that lines ignore."""
+"""The lines of a displayed sheet equal those of the report, also after a drag, and avoid blocks."""
 
 from __future__ import annotations
 

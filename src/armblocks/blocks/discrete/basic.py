@@ -195,7 +195,7 @@ class DiscreteDerivative(Block):
     title: ClassVar[str] = "Discrete Derivative"
     broadcast_parameters: ClassVar[tuple[str, ...]] = ("gain", "initial")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The derivative of the sine from two samples: it lags by half a period.",
+        shows="The derivative of the sine from two samples: it lags by half a sample time.",
     )
     sampled: ClassVar[bool] = True
 

@@ -335,8 +335,8 @@ class TruthTable(Block):
     """A decision table: y = the actions of the first decision whose conditions are all met.
 
     Each row of ``decisions`` is a decision: it states for every condition whether it must be true (1), false
-    (0) or may be either (-1). The same row of ``actions`` is the output for this decision. Every combination
-    of conditions must be decided; a last row of -1 covers all others.
+    (0) or may be either (-1). The row of ``actions`` with the same number is the output of this decision.
+    Every combination of conditions must be decided; a last row of -1 covers all others.
     """
 
     title: ClassVar[str] = "Truth Table"

@@ -108,7 +108,8 @@ class JTraj(Block):
 class Fkine(Block):
     """Forward kinematics: T = fkine(q), the pose of the tool in the world frame.
 
-    ``frame``: the name of a named frame or a link of the robot, whose pose is computed instead.
+    ``frame``: the name of a named frame or a link of the robot; its pose is computed instead of the tool
+    pose.
     """
 
     title: ClassVar[str] = "fkine"

@@ -152,7 +152,7 @@ class SampledJointPID(JointPidBlock):
     """PID of joints at ticks: tau(k) = limit(Kp e + Kd (qdr - qd) + i(k)), i(k+1) = i(k) + T Ki e.
 
     e = qr - q. Each joint has its own controller. Clamping: the integral stops while the torque is at a limit
-    and e drives it further beyond the limit. In a triggered subsystem T is t(k+1) - t(k).
+    and e drives it further beyond the limit. In a triggered subsystem, T is t(k+1) - t(k).
     """
 
     title: ClassVar[str] = "Sampled PID Joint Controller"

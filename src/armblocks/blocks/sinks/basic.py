@@ -113,8 +113,8 @@ class ToFile(Block):
 
     The run itself writes no file. ``write_report`` (and thus ``armblocks run``) writes the file into the
     report's folder; ``write_files`` writes it into a given folder. The path must be inside that folder. The
-    file has one row for every ``decimation``-th recorded sample time, beginning with the first. Of more than
-    ``limit`` rows, the last ones are stored.
+    file has one row for every ``decimation``-th recorded sample time, beginning with the first. If there are
+    more than ``limit`` rows, the file has only the last ones.
     """
 
     title: ClassVar[str] = "To File"
