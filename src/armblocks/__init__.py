@@ -57,6 +57,11 @@ if TYPE_CHECKING:
     from armblocks.face.trajectory_file import load_trajectory
     from armblocks.face.trajectory_report import BindingInterval, TrajectoryReport, trajectory_report
     from armblocks.face.trimming import trim
+    from armblocks.face.workspace.capacity import payload_capacity
+    from armblocks.face.workspace.cells import MeasureMap, WorkspaceSlice
+    from armblocks.face.workspace.dexterity import dexterity
+    from armblocks.face.workspace.result import Workspace
+    from armblocks.face.workspace.sampling import workspace
     from armblocks.formats import load_table
     from armblocks.report.drive_load import Drive, DriveLoad
     from armblocks.robot import (
@@ -127,6 +132,7 @@ else:
             "LineSpring": "armblocks.robot",
             "LinearSystem": "armblocks.analysis.linear_system",
             "Link": "armblocks.robot",
+            "MeasureMap": "armblocks.face.workspace.cells",
             "Motor": "armblocks.robot",
             "NamedFrame": "armblocks.robot",
             "OperatingPoint": "armblocks.analysis.operating_point",
@@ -155,11 +161,14 @@ else:
             "Universal": "armblocks.robot",
             "UniversalClosure": "armblocks.robot",
             "WeldClosure": "armblocks.robot",
+            "Workspace": "armblocks.face.workspace.result",
+            "WorkspaceSlice": "armblocks.face.workspace.cells",
             "begin": "armblocks.face.model",
             "block_example": "armblocks.face.block_examples",
             "blocks": "armblocks.blocks",
             "compile_diagram": "armblocks.face.model",
             "ctraj": "armblocks.face.toolbox_trajectories",
+            "dexterity": "armblocks.face.workspace.dexterity",
             "diagram_difference": "armblocks.diagram",
             "draw_diagram": "armblocks.face.reporting",
             "errors": "armblocks.errors",
@@ -182,6 +191,7 @@ else:
             "modified_dh": "armblocks.robot",
             "mstraj": "armblocks.face.toolbox_trajectories",
             "mtraj": "armblocks.face.toolbox_trajectories",
+            "payload_capacity": "armblocks.face.workspace.capacity",
             "pick_and_place": "armblocks.face.pick_and_place",
             "point_to_point": "armblocks.face.planned_trajectories",
             "robot_widget": "armblocks.studio.notebook",
@@ -200,6 +210,7 @@ else:
             "trim": "armblocks.face.trimming",
             "with_comments": "armblocks.diagram",
             "with_parameter_set": "armblocks.diagram",
+            "workspace": "armblocks.face.workspace.sampling",
             "write_files": "armblocks.face.reporting",
             "write_film": "armblocks.face.run_films",
             "write_report": "armblocks.face.reporting",
@@ -235,6 +246,7 @@ __all__ = [
     "LineSpring",
     "LinearSystem",
     "Link",
+    "MeasureMap",
     "Motor",
     "NamedFrame",
     "OperatingPoint",
@@ -263,11 +275,14 @@ __all__ = [
     "Universal",
     "UniversalClosure",
     "WeldClosure",
+    "Workspace",
+    "WorkspaceSlice",
     "begin",
     "block_example",
     "blocks",
     "compile_diagram",
     "ctraj",
+    "dexterity",
     "diagram_difference",
     "draw_diagram",
     "errors",
@@ -290,6 +305,7 @@ __all__ = [
     "modified_dh",
     "mstraj",
     "mtraj",
+    "payload_capacity",
     "pick_and_place",
     "point_to_point",
     "robot_widget",
@@ -308,6 +324,7 @@ __all__ = [
     "trim",
     "with_comments",
     "with_parameter_set",
+    "workspace",
     "write_files",
     "write_film",
     "write_report",

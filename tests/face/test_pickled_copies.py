@@ -64,7 +64,9 @@ def examples() -> Mapping[str, Any]:
     sizing = ab.size_drives(arm, ab.jtraj([0, 0], [1, 1], 5), [drive])
     phase = ab.CyclePhase(name="grip", start=0.0, end=1.0, loaded=True)
     cycle = ab.PickAndPlaceCycle(trajectory=ab.jtraj([0, 0], [1, 1], 5), phases=(phase,))
+    region = ab.workspace(arm, 50)
     values = [
+        *(region, region.maps["manipulability"], region.slice("y")),
         *(arm, robot, robot.links[0], ab.Motor(inertia=1.0), ab.Revolute(), ab.Prismatic(), ab.Fixed()),
         *(
             kind(name="c", first=ab.Attachment(), second=ab.Attachment(link="a"), **more)

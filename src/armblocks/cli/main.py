@@ -28,6 +28,7 @@ from armblocks.cli import (
     size,
     studio,
     trim,
+    workspace,
 )
 from armblocks.cli.terminal import debugging, messages_console, show_error, tidy_warnings
 from armblocks.errors import ArmblocksError
@@ -73,6 +74,7 @@ app.command("convert")(convert.convert)
 app.command("show")(show.show)
 app.command("lint")(lint.lint)
 app.command("size")(size.size)
+app.command("workspace")(workspace.workspace)
 app.command("list")(listing.list_names)
 app.command("blocks")(blocks.describe_blocks)
 app.command("docs")(docs.docs)

@@ -96,21 +96,25 @@ def jacobian_matrix(columns: Sequence[Column]) -> SX:
 
 
 def yoshikawa(columns: Sequence[Column]) -> SX:
-    """Yoshikawa's measure: the product of the min(6, n) singular values of the Jacobian.
+    """Yoshikawa's measure: the product of the min(6, n) singular values of the Jacobian."""
+    return singular_value_product([list(v + w) for v, w in columns])
 
-    It is ``sqrt(det(J J'))`` for six joints or more, and ``sqrt(det(J' J))`` for fewer, for which the
-    toolbox's formula is zero. By the Cauchy-Binet formula it is the square root of the sum of all squared
+
+def singular_value_product(entries: Sequence[Sequence[Scalar]]) -> SX:
+    """The product of the singular values of a Jacobian, or of some of its rows, given by its n columns.
+
+    Of six rows it is ``sqrt(det(J J'))`` for six joints or more, and ``sqrt(det(J' J))`` for fewer, for which
+    the toolbox's formula is zero. By the Cauchy-Binet formula it is the square root of the sum of all squared
     minors. This formula has no cancellation and no division, so it is accurate near a singularity. For more
     than eight joints there are too many minors, and ``det(J J')`` is computed directly. Source: Yoshikawa,
     *Manipulability of Robotic Mechanisms*, IJRR 1985.
     """
-    entries = [list(v + w) for v, w in columns]
     n = len(entries)
     if n > MAX_COLUMNS_BY_MINORS:
         rows = list(zip(*entries))
         gram = [[_dot(a, b) for b in rows] for a in rows]
         return SX(sqrt(fmax(_minors(gram)[0], 0.0)))
-    wide = entries if n <= 6 else [list(row) for row in zip(*entries)]
+    wide = entries if n <= len(entries[0]) else list(zip(*entries))
     minors = _minors(wide)
     if len(minors) == 1:
         return SX(fabs(minors[0]))

@@ -205,7 +205,7 @@ def save_picture(arm: ShownArm, rows: Array, path: str | PathLike[str], look: Ap
         poses = poses_of(arm, rows[spread(len(rows), MAX_PATH_POINTS)], where)
         motion = ArmMotion(robot=arm.robot, time=np.arange(float(len(poses))), poses=poses)
         picture = MotionView.of(motion, width, height, view=look.view).still()
-    write_atomically(target, _encoder(target)(picture, look.theme))
+    write_atomically(target, picture_encoder(target)(picture, look.theme))
     return target
 
 
@@ -214,7 +214,8 @@ def _check_suffix(path: Path, suffixes: tuple[str, ...]) -> None:
         raise UnknownNameError("format of pictures", path.suffix, suffixes, where=str(path))
 
 
-def _encoder(path: Path) -> Callable[[Picture, Theme | None], bytes]:
+def picture_encoder(path: Path) -> Callable[[Picture, Theme | None], bytes]:
+    """The function that writes a picture in the format of the suffix, which is in ``PICTURE_SUFFIXES``."""
     match path.suffix.lower():
         case ".svg":
             from armblocks.pictures.svg import svg_file

@@ -198,6 +198,35 @@ def _identifier(name: str, used: set[str]) -> str:
     return candidate
 
 
+TABLE_SUFFIXES = (".csv", ".parquet", ".npz")
+"""Suffixes of the formats of :func:`save_table`."""
+
+
+def save_table(path: Path, columns: Mapping[str, Array]) -> None:
+    """Write columns (N,) of doubles in the format of the suffix, which is in ``TABLE_SUFFIXES``.
+
+    Raises ``MissingLibraryError`` for Parquet files without pyarrow.
+    """
+    check_format(path)
+    buffer = io.BytesIO()
+    match path.suffix.lower():
+        case ".csv":
+            buffer.write(_csv_head(list(columns)))
+            _write_csv_rows(buffer, list(columns.values()))
+        case ".parquet":
+            import pyarrow as pa
+            import pyarrow.parquet as pq
+
+            arrays = [_column(values) for values in columns.values()]
+            pq.write_table(pa.table(arrays, names=list(columns)), buffer)
+        case _:
+            with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+                for name, values in columns.items():
+                    with archive.open(f"{name}.npy", "w", force_zip64=True) as entry:
+                        np.lib.format.write_array(entry, np.ascontiguousarray(values), allow_pickle=False)
+    write_atomically(path, buffer.getvalue())
+
+
 _WRITERS: dict[str, Callable[[RunData], bytes]] = {
     ".csv": _csv,
     ".parquet": _parquet,

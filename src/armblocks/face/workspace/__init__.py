@@ -1,0 +1,1 @@
+"""The workspace of an arm: sampling, the result, its pictures and files."""
