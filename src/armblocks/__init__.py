@@ -52,6 +52,8 @@ if TYPE_CHECKING:
     from armblocks.face.run_films import write_film
     from armblocks.face.sensitivity import SensitivityResult, sensitivity
     from armblocks.face.sizing import SizingReport, size_drives
+    from armblocks.face.symbolic_arm import SymbolicArm, symbolic_dh
+    from armblocks.face.symbolic_expression import SymbolicExpression
     from armblocks.face.toolbox_trajectories import ctraj, jtraj, lspb, mstraj, mtraj, tpoly
     from armblocks.face.trajectory import JointTrajectory
     from armblocks.face.trajectory_file import load_trajectory
@@ -156,6 +158,8 @@ else:
             "SizingReport": "armblocks.face.sizing",
             "Spherical": "armblocks.robot",
             "SphericalClosure": "armblocks.robot",
+            "SymbolicArm": "armblocks.face.symbolic_arm",
+            "SymbolicExpression": "armblocks.face.symbolic_expression",
             "TrajectoryReport": "armblocks.face.trajectory_report",
             "Transform": "armblocks.spatial",
             "Universal": "armblocks.robot",
@@ -204,6 +208,7 @@ else:
             "size_drives": "armblocks.face.sizing",
             "spline_trajectory": "armblocks.face.planned_trajectories",
             "standard_dh": "armblocks.robot",
+            "symbolic_dh": "armblocks.face.symbolic_arm",
             "to_python": "armblocks.face.diagrams",
             "tpoly": "armblocks.face.toolbox_trajectories",
             "trajectory_report": "armblocks.face.trajectory_report",
@@ -270,6 +275,8 @@ __all__ = [
     "SizingReport",
     "Spherical",
     "SphericalClosure",
+    "SymbolicArm",
+    "SymbolicExpression",
     "TrajectoryReport",
     "Transform",
     "Universal",
@@ -318,6 +325,7 @@ __all__ = [
     "size_drives",
     "spline_trajectory",
     "standard_dh",
+    "symbolic_dh",
     "to_python",
     "tpoly",
     "trajectory_report",

@@ -18,6 +18,7 @@ LIBRARIES = {
     "film": ("PIL", "imageio_ffmpeg"),
     "notebook": ("anywidget", "traitlets"),
     "studio": ("pydantic", "starlette", "uvicorn", "websockets"),
+    "symbolic": ("sympy",),
     "xacro": ("xacro",),
 }
 """The libraries of each extra, by import name."""

@@ -84,6 +84,8 @@ def examples() -> Mapping[str, Any]:
             ab.Coupling(name="c", terms=(("a", 1.0), ("b", 2.0))),
             arm.assemble(),
             arm.parametric(["link1"]),
+            arm.symbolic,
+            arm.symbolic.fkine()[0, 3],
             arm.ikine(arm.fkine([0.1, 0.2])),
             arm.ikine_all(arm.fkine([0.1, 0.2])),
         ),
@@ -120,6 +122,10 @@ def content(value: Any) -> object:
         return ab.Arm, content(value.robot)
     if isinstance(value, ab.ParametricArm):
         return ab.ParametricArm, content(value.robot), value.links
+    if isinstance(value, ab.SymbolicArm):
+        return ab.SymbolicArm, content(value.robot), value.names
+    if isinstance(value, ab.SymbolicExpression):
+        return ab.SymbolicExpression, repr(value), value.text()
     if isinstance(value, ab.CompiledDiagram):
         return ab.CompiledDiagram, content(value.diagram)
     if isinstance(value, ab.DiagramBuilder):

@@ -73,6 +73,7 @@ for name, call in {
     "poles": linear.poles,
     "widget": lambda: ab.robot_widget(ab.load_robot("puma560")),
     "xacro": lambda: ab.load_robot("arm.xacro"),
+    "sympy": lambda: ab.load_robot("puma560").symbolic.fkine().to_sympy(),
     "gif": lambda: ab.load_robot("puma560").animate([[0.0] * 6] * 2, 0.1, save="x.gif"),
     "mp4": lambda: ab.load_robot("puma560").animate([[0.0] * 6] * 2, 0.1, save="x.mp4"),
 }.items():
@@ -122,6 +123,7 @@ def test_the_core_runs_without_the_extras_and_names_missing_libraries(tmp_path: 
         "poles": ("scipy", "analysis", "poles of a linear system"),
         "widget": ("anywidget", "notebook", "widgets in notebooks"),
         "xacro": ("xacro", "xacro", "xacro files"),
+        "sympy": ("sympy", "symbolic", "expressions of SymPy"),
         "gif": ("PIL", "film", "GIF films"),
         "mp4": ("imageio_ffmpeg", "film", "MP4 films"),
     }

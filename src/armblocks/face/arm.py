@@ -47,6 +47,7 @@ from armblocks.robot.fields import check_kind
 if TYPE_CHECKING:
     from armblocks.face.arm_inverse import ArmInverse
     from armblocks.face.ikine_targets import Target
+    from armblocks.face.symbolic_arm import SymbolicArm
     from armblocks.face.trajectory import JointTrajectory
     from armblocks.pictures.film import FilmProgress
 
@@ -388,8 +389,7 @@ class Arm(metaclass=ArgumentErrors):
 
     @cached_property
     def potential_energy(self) -> ConfigurationFunction:
-        """``potential_energy(q)`` → energy in J, zero if the centre of mass is at the height of the
-        origin."""
+        """``potential_energy(q)`` → energy in J, zero with the centre of mass at the origin's height."""
         return self._code.entry("potential_energy")
 
     @cached_property
@@ -404,6 +404,11 @@ class Arm(metaclass=ArgumentErrors):
         :class:`ParametricArm`. Raises UnknownNameError for an unknown link.
         """
         return ParametricArm(self.robot, links, self._near, self._code.description_key)
+
+    @property
+    def symbolic(self) -> SymbolicArm:
+        """Kinematics and dynamics in symbols: CasADi, SymPy, text and LaTeX; see :class:`SymbolicArm`."""
+        return self._code.symbolic
 
     # ---- views -------------------------------------------------------------------------------------------
     def plot(

@@ -20,6 +20,7 @@ from armblocks.robot import Robot
 if TYPE_CHECKING:
     from armblocks.equations import TracedFunction
     from armblocks.face.ikine_search import ArmSearch
+    from armblocks.face.symbolic_arm import SymbolicArm
 
 Array = NDArray[np.float64]
 Maker = tuple[Callable[..., object], tuple[object, ...]]
@@ -50,6 +51,13 @@ class ArmKernels:
         """The content on which the equations depend: all except appearance and source file."""
         links = tuple(replace(link, geometry=None) for link in self.robot.links)
         return hashlib.sha256(repr(replace(self.robot, links=links, source="")).encode()).hexdigest()
+
+    @cached_property
+    def symbolic(self) -> SymbolicArm:
+        """The equations in symbols; one object, because each has its own symbols."""
+        from armblocks.face.symbolic_arm import SymbolicArm
+
+        return SymbolicArm(self.robot)
 
     def kernel(self, method: str) -> Kernel:
         """The kernel of a method, such as ``"fkine"`` or ``"rne_loaded"``."""
