@@ -110,7 +110,7 @@ class Batch:
 def palletiser_ratio(name: str) -> None:
     """The arm with its linkages, and the serial chain of its four axes with the same links.
 
-    The links of the linkage that are not between base and tool are left out of the chain.
+    The links of the linkage that are not between base and tool are not part of the chain.
     """
     robot = ab.load_robot(name).nofriction("all").robot
     tip, chain = robot.links[-1].name, []

@@ -69,8 +69,8 @@ export interface AskMask {
  * Show a document again: after a reload, after a lost connection, or in a second client.
  *
  * A server that was restarted and does not have the document open recovers it from its journal, or else
- * opens the file ``path`` or the shipped ``origin``, under the same key. Edits that the client sends again
- * then find their document. ``inside`` is the path of the displayed sheet of a diagram.
+ * opens the file ``path`` or the shipped ``origin``, under the same key, so that edits that the client sends
+ * again are applied to this document. ``inside`` is the path of the displayed sheet of a diagram.
  */
 export interface Attach {
   kind: "attach";
@@ -779,7 +779,7 @@ export interface BlockCorner {
 /**
  * Start a run. ``speed`` is simulated seconds per second; ``None`` runs as fast as possible.
  *
- * ``tuned``: trial values of tunable parameters, by ``block.parameter``; the model keeps its own values.
+ * ``tuned``: tried values of tunable parameters, by ``block.parameter``; the model keeps its own values.
  */
 export interface Run {
   kind: "run";
@@ -1129,8 +1129,8 @@ export interface Documents {
  *
  * ``path`` is its file, or ``None`` if it was never saved. ``began`` and ``last`` are the times of the first
  * and the last edit since the save (s since 1970), ``edits`` is their number, ``parts`` the number of blocks
- * or links. ``disk`` says whether the file has changed since the edits. ``missing`` describes the edits that
- * could not be recovered.
+ * or links. ``disk`` states whether the file has changed since the edits. ``missing`` describes the edits
+ * that could not be recovered.
  */
 export interface Recovery {
   document: string;

@@ -417,4 +417,4 @@ def test_text_and_notebook_representations_summarise_the_system() -> None:
     assert text.startswith("<LinearSystem linear system: continuous, 5 states, 2 inputs, 3 outputs, stable>")
     html = random_system(0, 20)._repr_html_()
     assert "<caption>A</caption>" in html
-    assert "…" in html  # the middle of a large matrix is left out
+    assert "…" in html  # the middle of a large matrix is omitted

@@ -149,7 +149,7 @@ def test_limits_are_the_reason_where_only_they_prevent_a_solution() -> None:
     T = limited.fkine([0.1, 1.5, 0.2])
     result = limited.ikine(T)
     assert result.reason == "limits" and not result.success
-    assert result.excess.max() > 1.0 and "the pose needs joints beyond their limits" in result.explain()
+    assert result.excess.max() > 1.0 and "solutions exist only beyond joint limits" in result.explain()
     free = limited.ikine(T, limits=False)
     assert free.success and np.allclose(limited.fkine(free.q), T, atol=1e-8)
 
@@ -254,7 +254,7 @@ def test_the_invalid_target_of_a_batch_is_named() -> None:
         ({"mask": [1, 1, 1]}, "six numbers 0 or 1"),
         ({"mask": [0.5] * 6}, "six numbers 0 or 1"),
         ({"mask": [0] * 6}, "six numbers 0 or 1"),
-        ({"limits": 1}, "write limits=False to allow joints beyond their limits"),
+        ({"limits": 1}, "write limits=False to allow solutions beyond the joint limits"),
         ({"tolerance": 0.0}, "a number from 1e-14 to 1"),
         ({"restarts": -1}, "an integer, zero or more"),
         ({"seed": 0.5}, "an integer, zero or more"),

@@ -223,10 +223,10 @@ def test_the_nearest_solution_and_the_text() -> None:
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("panda", "with 7 joints the solutions of a pose are infinitely many"),
+        ("panda", "with 7 joints a pose has infinitely many solutions"),
         ("xarm6", "do not intersect in one point, and the axes"),
         ("nao_left_arm", "5 joints whose axes are not parallel"),
-        ("kr180", "coincide, so solutions are infinitely many"),
+        ("kr180", "coincide, so a pose has infinitely many solutions"),
     ],
 )
 def test_arms_without_closed_form_are_refused_with_the_reason(name: str, message: str) -> None:

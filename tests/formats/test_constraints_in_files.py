@@ -92,7 +92,7 @@ def test_equality_constraints_are_those_of_mujoco(equality: str) -> None:
     tree_q = robot.coordinate_map.positions @ q + offsets
     model = mujoco.MjModel.from_xml_string(mjcf(equality))
     data = mujoco.MjData(model)
-    # The links of the robot are in the order of MuJoCo's joints, but for the tip.
+    # The links of the robot are in the order of MuJoCo's joints, except for the tip.
     order = [model.joint(name).qposadr[0] for name in _joints(robot)]
     data.qpos[order], data.qvel[order] = tree_q, C @ qd
     mujoco.mj_forward(model, data)
@@ -149,15 +149,15 @@ def _jacobian(model: mujoco.MjModel, tree_q: np.ndarray, order: list[int]) -> np
         ("<tendon tendon1='t'/>", "a robot has constraints of bodies and of two joints"),
         (
             "<joint joint1='a1'/><joint joint1='a1'/>",
-            "the coupling follows from other constraints; it is left out",
+            "the coupling follows from other constraints; it is omitted",
         ),
         (
             "<joint joint1='a1' joint2='b1'/><joint joint1='b1' joint2='a1' polycoef='0.3 1 0 0 0'/>",
-            "the coupling contradicts other constraints, by 0.3 rad or m; it is left out",
+            "the coupling contradicts other constraints, by 0.3 rad or m; it is omitted",
         ),
         (
             "<joint joint1='a1'/><joint joint1='a1' polycoef='0.25 0 0 0 0'/>",
-            "the coupling contradicts other constraints, by 0.25 rad or m; it is left out",
+            "the coupling contradicts other constraints, by 0.25 rad or m; it is omitted",
         ),
     ],
 )
@@ -368,8 +368,8 @@ def test_contradicting_couplings_and_limits_of_closing_joints_are_findings() -> 
     text = f"<sdf version='1.11'><model name='m'>{parts}</model></sdf>"
     (robot,) = read_sdf(text.encode(), "r.sdf", context).values()
     found = {finding.rule.code: finding.what for finding in context.findings}
-    assert found["sdf-coupling"] == "the coupling follows from other constraints; it is left out"
-    assert found["sdf-closure"] == "its limits, friction and springs are left out"
+    assert found["sdf-coupling"] == "the coupling follows from other constraints; it is omitted"
+    assert found["sdf-closure"] == "its limits, friction and springs are omitted"
     assert len(robot.couplings) == 1 and [closure.title for closure in robot.closures] == ["revolute"]
 
 

@@ -1,4 +1,4 @@
-"""MJCF files: random models compared with MuJoCo, and what the reader leaves out."""
+"""MJCF files: random models compared with MuJoCo, and what the reader omits."""
 
 from __future__ import annotations
 

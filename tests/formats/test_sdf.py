@@ -94,22 +94,22 @@ FOUND = [
     (
         two(axis("<lower>2</lower><upper>1</upper>")),
         "sdf-limit",
-        "the lower limit 2 is above the upper limit 1; both are left out",
+        "the lower limit 2 is above the upper limit 1; both are omitted",
     ),
     (
         two(axis("<effort>0</effort>")),
         "sdf-limit",
-        "the effort limit is 0, with which the joint cannot move; it is left out",
+        "the effort limit is 0, with which the joint cannot move; it is omitted",
     ),
     (
         two(axis("", "<damping>-1</damping>")),
         "sdf-dynamics",
-        "damping -1 and friction 0 would accelerate the joint; they are left out",
+        "damping -1 and friction 0 would accelerate the joint; they are omitted",
     ),
     (
         two(axis("", "<spring_stiffness>-7</spring_stiffness>")),
         "sdf-spring",
-        "the spring with the stiffness -7 is left out",
+        "the spring with the stiffness -7 is omitted",
     ),
     (
         two(axis(more="<mimic joint='k'/>")),
@@ -182,7 +182,7 @@ FOUND = [
             1,
         ),
         "sdf-shape",
-        "the box has the size 0 m; it is left out",
+        "the box has the size 0 m; it is omitted",
     ),
     (
         two(Z).replace(

@@ -186,12 +186,12 @@ FOUND = [
     (
         joint('<limit lower="2" upper="1" effort="1" velocity="1"/>'),
         "urdf-limit",
-        "the lower limit 2 is above the upper limit 1; both are left out",
+        "the lower limit 2 is above the upper limit 1; both are omitted",
     ),
     (
         joint('<limit lower="0" upper="1" effort="0" velocity="1"/>'),
         "urdf-limit",
-        "the effort limit is 0, with which the joint cannot move; it is left out",
+        "the effort limit is 0, with which the joint cannot move; it is omitted",
     ),
     (joint(f'<axis xyz="0 0 2"/>{LIMIT}'), "urdf-axis", "the axis has the length 2; its direction is used"),
     (
@@ -202,7 +202,7 @@ FOUND = [
     (
         joint(f'{LIMIT}<dynamics damping="-1"/>'),
         "urdf-dynamics",
-        "damping -1 and friction 0 would accelerate the joint; they are left out",
+        "damping -1 and friction 0 would accelerate the joint; they are omitted",
     ),
     (
         joint(f'{LIMIT}<mimic joint="other"/>'),
@@ -228,7 +228,7 @@ FOUND = [
     (
         joint(LIMIT).replace(INERTIAL, '<visual><geometry><box size="1 0 1"/></geometry></visual>'),
         "urdf-shape",
-        "the box has the size 0 m; it is left out",
+        "the box has the size 0 m; it is omitted",
     ),
     (
         joint(LIMIT).replace(INERTIAL, "<visual><geometry><cone/></geometry></visual>"),

@@ -10,7 +10,7 @@ export function sameValues(one: Values, other: Values): boolean {
   return paths.length === Object.keys(other).length && paths.every((path) => equal(one[path], other[path]))
 }
 
-/** The set whose values are exactly the trial values. */
+/** The set whose values are exactly the tried values. */
 export function activeSet(table: ParameterSetTable, trialValues: Values): string | undefined {
   if (!Object.keys(trialValues).length) return undefined
   return Object.keys(table.sets).find((name) => sameValues(table.sets[name]!, trialValues))
@@ -68,7 +68,7 @@ export function refusalReason(table: ParameterSetTable, name: string, asTrial: b
 }
 
 /**
- * The parameter changes of a run in progress that replace the trial values `before` by `next`. Parameters
+ * The parameter changes of a run in progress that replace the tried values `before` by `next`. Parameters
  * that are no longer tried return to the values of the model.
  */
 export function changedTrials(

@@ -26,7 +26,7 @@ export interface StoredRun {
   reason: string
   samples: RunSamples
   views: SinkView[]
-  /** Trial values at the start. */
+  /** Tried values at the start. */
   trialValues: Record<string, unknown>
   tunings: Tuning[]
 }
@@ -37,7 +37,7 @@ const MAX_BYTES = 384 * 2 ** 20
 interface Runs {
   runs: StoredRun[]
   /**
-   * Trial values of tunable parameters by `block.parameter`; they are not in the model until they are kept.
+   * Tried values of tunable parameters by `block.parameter`; they are not in the model until they are kept.
    */
   trialValues: Record<string, unknown>
   /** Simulated seconds per second of clock time; null: as fast as possible. */

@@ -46,7 +46,7 @@ export async function parameterSets(
 }
 
 /**
- * Replace all trial values: the next run starts with them. In a run in progress, parameters that are no
+ * Replace all tried values: the next run starts with them. In a run in progress, parameters that are no
  * longer tried return to the values of the model.
  */
 export async function setTrialValues(next: Values): Promise<void> {
@@ -68,7 +68,7 @@ export async function dropTrialValues(paths: string[]): Promise<void> {
   )
 }
 
-/** Keep all trial values in the model, as one undo step. */
+/** Keep all tried values in the model, as one undo step. */
 export async function keepTrialValues(): Promise<void> {
   const { document } = useStudio.getState()
   const { trialValues } = useRuns.getState()

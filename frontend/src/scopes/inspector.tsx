@@ -69,7 +69,7 @@ export function SignalInspector() {
   )
 }
 
-/** Values of a run that differ from the model: trial values at the start, or tuned values. */
+/** Values of a run that differ from the model: tried values at the start, or tuned values. */
 function changesOf({ trialValues, tunings }: StoredRun): string[] {
   return [
     ...Object.entries(trialValues).map(([parameter, value]) => `${parameter} = ${valueText(value)}`),

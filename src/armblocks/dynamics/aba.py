@@ -26,8 +26,8 @@ def aba(
 
     ``on_bodies``: wrenches that bodies exert on the surroundings, each in its body's frame. Spatial vectors
     have the angular part first. The cost is proportional to n instead of n^3, an advantage for long chains.
-    Source: Featherstone, *Rigid Body Dynamics Algorithms*, table 7.1 (with its numbers of the passes); rotor
-    inertia is added to the inertia of each joint.
+    Source: Featherstone, *Rigid Body Dynamics Algorithms*, table 7.1, which numbers the passes in the same
+    way; rotor inertia is added to the inertia of each joint.
     """
     bodies = tree.bodies
     X = [_motion_transform(joint) for joint in joints]

@@ -31,7 +31,7 @@ TINY = 1e-200
 
 
 def ball_rotation(body: Body, q: Sequence[Scalar]) -> Rotation | RotationZ:
-    """The rotation of one of the three bodies of a ball joint against the body before it."""
+    """The rotation of one of the three bodies of a ball joint relative to the body before it."""
     if body.ball != 0:
         return RotationZ(1.0, 0.0)
     w, x, y, z = _moderate(q[body.position : body.position + 4])

@@ -233,7 +233,7 @@ def constrained_motion(
 ) -> ConstrainedMotion:
     """The motion of a robot with constraints under the joint torques ``tau`` (n, 1).
 
-    The state is the consistent one nearest to ``q``, ``qd``. ``near``: see :func:`independent_relations`.
+    The state is the consistent state nearest to ``q``, ``qd``. ``near``: see :func:`independent_relations`.
     ``on_bodies``: see :func:`armblocks.dynamics.rnea.rnea`. ``loads``: the symbols on which the inertias of
     ``tree`` and ``on_bodies`` depend.
     """

@@ -15,7 +15,7 @@ from armblocks.spatial.vectors import Rotation, RotationZ, Scalar, Vector, add, 
 
 @dataclass(frozen=True, eq=False)
 class JointMotion:
-    """The motion of a body's joint at one q: ``rotation``, about z but for ball joints, and ``p``.
+    """The motion of a body's joint at one q: ``rotation``, about z except for ball joints, and ``p``.
 
     ``p`` is the position of the body's origin in the parent body's frame, m.
     """

@@ -141,7 +141,8 @@ class Mechanism:
         raise self._assembly_error(best, locked)
 
     def assembled_anywhere(self) -> Array:
-        """Coordinates that satisfy the constraints: near the neutral ones, or else within the joint ranges.
+        """Coordinates that satisfy the constraints: near the neutral configuration, or else within the joint
+        ranges.
 
         Joints without range rotate by at most pi or move by at most 1 m. Raises AssemblyError.
         """

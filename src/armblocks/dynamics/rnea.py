@@ -48,7 +48,7 @@ def rnea(
 
     ``gravity``: m/s2 in base axes. ``on_bodies``: wrenches that bodies exert on the surroundings, each in its
     body's frame. Source: Luh, Walker, Paul 1980 in the form of Khalil and Dombre, *Modeling, Identification
-    and Control of Robots*, 9.5 (with its numbers of the passes), with three-vectors in link frames.
+    and Control of Robots*, 9.5, which numbers the passes in the same way, with three-vectors in link frames.
     """
     bodies = tree.bodies
     qdd = axis_accelerations(tree, qd, qdd)

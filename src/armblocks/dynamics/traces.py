@@ -377,7 +377,7 @@ def trace_centre_of_mass(robot: Robot) -> TracedFunction:
 
 
 def trace_position_rates(robot: Robot) -> TracedFunction:
-    """``rates (nq,)``: dq/dt for the speeds ``qd``, which are these rates but for quaternions."""
+    """``rates (nq,)``: dq/dt for the speeds ``qd``; equal to ``qd`` except for quaternions."""
 
     def equations(q: SX, qd: SX) -> SX:
         return column_sum(position_rates(robot, entries(q), entries(qd)))

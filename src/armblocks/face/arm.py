@@ -456,7 +456,7 @@ class Arm(metaclass=ArgumentErrors):
         0.05 s. ``save``: write a film instead, ``.mp4`` or ``.gif``, and return its path; ``.png`` and
         ``.svg`` show the path of the tool. Films need the extra ``film``. ``rate``: frames per second.
         ``speed`` 2 plays twice as fast. ``progress(done, all)`` is called after each frame. Ctrl-C leaves an
-        old file unchanged.
+        existing file unchanged.
         """
         from armblocks.face import arm_views
 

@@ -47,7 +47,7 @@ MAX_PATH_POINTS = 2000
 MAX_ROWS = 200_000
 """Maximum number of configurations of a motion."""
 TOOLBOX_INTERVAL = 0.05
-"""Interval between the rows of a motion without times, s: that of the Python toolbox."""
+"""Interval between the rows of a motion without times, s; the same as in the Python toolbox."""
 
 
 class ShownArm(Protocol):

@@ -94,7 +94,7 @@ def checked_options(
             f"limits={limits!r}",
             where=where,
             allowed="True or False",
-            fix="write limits=False to allow joints beyond their limits",
+            fix="write limits=False to allow solutions beyond the joint limits",
         )
     if isinstance(tolerance, bool) or not isinstance(tolerance, float | int) or not 1e-14 <= tolerance < 1.0:
         raise InputError(

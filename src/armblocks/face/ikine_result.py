@@ -30,8 +30,8 @@ class IkineResult(metaclass=ArgumentErrors):
     ``success``: whether ``q`` is a solution, within the tolerance and the limits. ``reason``:
 
     - ``"converged"``: ``q`` is a solution;
-    - ``"limits"``: there are solutions only beyond the limits of joints; ``excess`` (nq,) rad or m: by
-      how much one of them exceeds the limits of each coordinate;
+    - ``"limits"``: there are solutions only beyond the limits of joints; ``excess`` (nq,) rad or m: the
+      amount by which one of these solutions exceeds the limits of each coordinate;
     - ``"out of reach"``: no configuration has this pose; ``position_error`` and ``rotation_error`` are those
       of the nearest pose, and ``lost_direction`` is the direction from there to the target;
     - ``"singular"``: ``q`` is near a solution, where the arm cannot move along ``lost_direction``;
@@ -93,9 +93,7 @@ class IkineResult(metaclass=ArgumentErrors):
                 beyond = [
                     f"{name} by {value:.3g}" for name, value in zip(self.names, self.excess) if value > 0.0
                 ]
-                return (
-                    f"the pose needs joints beyond their limits: {', '.join(beyond)}; nearest pose: {error}"
-                )
+                return f"solutions exist only beyond joint limits: {', '.join(beyond)}; nearest pose: {error}"
             case "out of reach":
                 return f"out of reach: the nearest pose is {error} away, along {self._direction()}"
             case "singular":

@@ -92,7 +92,7 @@ def least_time(
             f"grid = {grid!r}",
             where=where,
             allowed="an integer of 10 or more: the least number of segments",
-            fix="leave out grid for 200 segments",
+            fix="omit grid for 200 segments",
         )
     path = path_through(via, limits, blend)
     result = sampled(fastest_motion(arm, path, limits, payload, grid_of(arm, path, grid)), step)
@@ -205,7 +205,7 @@ def path_through(points: Array, limits: MotionLimits, blend: float | None) -> Pi
             f"blend = {blend!r}",
             where="least_time",
             allowed="a number above 0 and up to 0.5: the fraction of a line that a blend replaces",
-            fix="leave out blend for a path through the points",
+            fix="omit blend for a path through the points",
         )
     return blended_path(points, scale, blend)
 

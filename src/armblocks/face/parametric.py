@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 class ParametricFunction(Protocol):
-    """A function with a last argument for the parameters (k, 10), or (N, k, 10) of a batch."""
+    """A function whose last argument is the parameters (k, 10), or (N, k, 10) of a batch."""
 
     def __call__(self, *arguments: ArrayLike, out: Array | None = None, threads: int = 1) -> Array: ...
 

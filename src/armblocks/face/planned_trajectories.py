@@ -41,7 +41,7 @@ def point_to_point(
     joint reaches its speed; with ``jerk`` the acceleration is continuous (a double S). ``duration`` (s):
     a longer duration, to which the motion is scaled. ``dt``: time between samples, s.
 
-    Raises InputError for limits that are not positive and for a duration below the least one.
+    Raises InputError for limits that are not positive and for a duration below the minimum.
     """
     where = "point_to_point"
     start, goal = ends_of(q0, qf, where)
@@ -57,7 +57,7 @@ def point_to_point(
             "jerk and deceleration are both given",
             where=where,
             allowed="a deceleration without jerk limit, or a jerk limit for equal ramps at both ends",
-            fix="leave out one of them",
+            fix="omit one of them",
         )
     if not moves.any():
         return sampled(at_rest(start, 0.0 if duration is None else duration), step)

@@ -43,7 +43,7 @@ def write_film(
     The arms are those of the report: one for each signal of joint coordinates, at most four. ``rate``: frames
     per second. ``speed`` 2 plays the run twice as fast. ``size``: width and height, px. ``view``: azimuth
     and elevation of the camera, degrees. ``progress(done, all)`` is called after each frame. The file is
-    replaced when the film is complete; Ctrl-C leaves an old file unchanged.
+    replaced when the film is complete; Ctrl-C leaves an existing file unchanged.
 
     Raises InputError if the diagram has no moving arm and for values out of range, UnknownNameError for
     another suffix, MissingLibraryError without the extra ``film``, FormatError if the file cannot be written.

@@ -42,7 +42,7 @@ def jtraj(
 
     ``t`` is either the times (N,) in s, from 0 to the end of the motion, or a number of samples N: then the
     time is normalised as in the toolbox, ``linspace(0, 1, N)``, and rates are per unit of this time. ``qd0``,
-    ``qd1`` (n,): speeds at the ends, zero by default. Same polynomial as the toolbox's ``jtraj``. ``q, qd,
+    ``qd1`` (n,): speeds at the ends, zero by default. The polynomial is the same as in the toolbox. ``q, qd,
     qdd = jtraj(…)`` unpacks the motion. Warns of angles that look like degrees.
     """
     start, goal = ends_of(q0, qf, "jtraj")
@@ -82,7 +82,7 @@ def lspb(q0: ArrayLike, qf: ArrayLike, t: ArrayLike | int, speed: ArrayLike | No
 
     ``t`` (N,): times in s from 0, or a number of samples N for the times 0, 1 … N - 1. ``speed``: a number or
     (n,), between one and two times the mean speed; its sign is ignored, as in release 10 (release 9.4
-    compares it with the sign). By default it is 1.5 times the mean speed, which gives three equal parts. All
+    compares the signed value). By default it is 1.5 times the mean speed, which gives three equal parts. All
     joints end at the same time. At a time at which the acceleration jumps, the table has the value before the
     jump, as in the toolbox. Raises InputError for a speed that is too small or too large.
     """
@@ -103,7 +103,7 @@ def lspb(q0: ArrayLike, qf: ArrayLike, t: ArrayLike | int, speed: ArrayLike | No
             f"the speed {abs(speeds[k]):g} of joint {k + 1} is too {size}",
             where="lspb",
             allowed=f"{abs(mean[k]):g} to {2 * abs(mean[k]):g}: one to two times the mean speed",
-            fix="change the speed or the duration, or leave out the speed",
+            fix="change the speed or the duration, or omit the speed",
         )
     ends = zip(start.tolist(), goal.tolist(), speeds.tolist())
     joints = [lspb_profile(a, b, duration, v) for a, b, v in ends]

@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 BINDING = 0.95
 """Fraction of a limit from which it counts as binding."""
 _SHORT = 0.01
-"""Fraction of the cycle time below which intervals are left out."""
+"""Fraction of the cycle time below which intervals are omitted."""
 _ROUNDING = 1e-14
 """Positions that are smaller, relative to the largest one of the joint, are rounding errors of 0."""
 _SAMPLES = 1000
@@ -108,7 +108,7 @@ class TrajectoryReport(metaclass=ArgumentErrors):
     def binding(self) -> tuple[BindingInterval, ...]:
         """The times in which a limit binds: the quantity nearest to its limit, from 95 % of the limit.
 
-        Interruptions and intervals of less than 1 % of the cycle time are left out.
+        Interruptions and intervals of less than 1 % of the cycle time are omitted.
         """
         ratios = self.ratios.reshape(len(self.time), -1)
         nearest = np.where(ratios.max(axis=1) >= BINDING, ratios.argmax(axis=1), -1)

@@ -44,11 +44,11 @@ def trim(
 
     The unknowns are all states except those with given values in ``states``. All derivatives must be zero,
     except those of the ``moving`` states. ``free``: tunable parameters that are also unknowns,
-    ``"torque.value"`` (or ``"torque"`` for a block that has one only), or an entry, ``"map.table[3]"``.
-    ``outputs``: required values of signals; NaN leaves an entry free. ``bounds``: ``(lower, upper)`` of
-    states and free parameters. The search starts at the state of the run at time ``at`` (0: its start), with
-    the values of ``guess``; time-dependent signals have their values at that time. A state is named
-    ``block/state``, or by its block if the block has one state only.
+    ``"torque.value"`` (or ``"torque"`` for a block with one tunable parameter), or an entry,
+    ``"map.table[3]"``. ``outputs``: required values of signals; NaN leaves an entry free. ``bounds``:
+    ``(lower, upper)`` of states and free parameters. The search starts at the state of the run at time ``at``
+    (0: its start), with the values of ``guess``; time-dependent signals have their values at that time. A
+    state is named ``block/state``, or by its block if the block has one state only.
 
     Sampled blocks are in equilibrium if a tick changes no state. The residual of every equation is below
     ``tolerance`` in the unit of the equation, or below the rounding errors of its terms if these are larger.

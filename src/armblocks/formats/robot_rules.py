@@ -26,8 +26,8 @@ LINT_RULES = (INERTIA, IMPLAUSIBLE, NO_MASS, WARNED)
 
 
 def left_out_coupling(contradiction: float | None) -> str:
-    """The finding about a coupling that is left out; see :func:`remaining_coupling` for ``contradiction``."""
+    """The finding about a coupling that is omitted; see :func:`remaining_coupling` for ``contradiction``."""
     if contradiction is None:
-        return "the coupling follows from other constraints; it is left out"
+        return "the coupling follows from other constraints; it is omitted"
     what = f"the coupling contradicts other constraints, by {abs(contradiction):.3g} rad or m"
-    return f"{what}; it is left out"
+    return f"{what}; it is omitted"

@@ -131,7 +131,7 @@ class Element:
                 raise self.error(
                     f"{subject} contains '{shortened(word)}', which is too large",
                     allowed=f"magnitudes up to {limit:g}",
-                    fix="correct the number, or leave it out where it means no limit",
+                    fix="correct the number, or omit it where it means no limit",
                 )
             values.append(value)
         return values

@@ -75,7 +75,7 @@ class Solution:
 def solve(limits: Limits, margin: Array | None = None) -> Solution:
     """The fastest squared path speeds from rest to rest; limits also hold in the middle of the segments.
 
-    ``margin`` (N, R): by how much the limits of each segment are reduced; it is increased in place.
+    ``margin`` (N, R): the reductions of the limits of each segment, which are increased in place.
     """
     _, N, R = np.shape(limits.a)
     inputs = [
@@ -111,7 +111,7 @@ def _line(
     bounds: Reals,
     k: Integer,
 ) -> None:
-    """Solve the constraint ``lower <= alpha x0 + beta x1 <= upper`` for x1: element ``k`` of the lines.
+    """Solve the constraint ``lower <= alpha x0 + beta x1 <= upper`` for x1, into element ``k`` of the lines.
 
     A constraint without x1 changes the two ``bounds`` of x0.
     """  # fmt: skip

@@ -34,8 +34,8 @@ MAX_NEWTON = 100
 """Maximum number of Newton steps at one grid point; each step excludes at least one pair of constraints."""
 
 NEGLIGIBLE = 1e-9
-"""Ratio of the coefficients of x1 and x0 below which a constraint is one of x0 alone. The division by smaller
-coefficients would hide other constraints in rounding errors."""
+"""Ratio of the coefficients of x1 and x0 below which a constraint is treated as a constraint on x0 alone. The
+division by smaller coefficients would hide other constraints in rounding errors."""
 
 
 class Rows(NamedTuple):
@@ -56,7 +56,7 @@ class Profile(NamedTuple):
 
 class Lines(NamedTuple):
     """The constraints solved for x1: ``bottom + slope x0 <= x1 <= top + slope x0``, each array (R, N), and
-    ``least <= x0 <= most`` (N,) from those of x0 alone."""
+    ``least <= x0 <= most`` (N,) from the constraints on x0 alone."""
 
     slope: Array
     bottom: Array
@@ -129,7 +129,8 @@ def backward(
     N: Integer,
     R: Integer,
 ) -> Integer:
-    """Fill the intervals ``low``, ``high`` (N + 1,) of squared speeds; those of the last point are given.
+    """Fill the intervals ``low``, ``high`` (N + 1,) of squared speeds; the interval of the last point is
+    given.
 
     Returns -1, or the index of a point whose interval is empty.
     """
@@ -154,7 +155,8 @@ def backward(
                     r.return_(i)
                 step = length / rise
                 bound.value = bound.value - step
-                # Where x1 has almost no effect, the gap has large rounding errors, but not its zero.
+                # Where x1 has almost no effect, the length of the interval has large rounding errors, but its
+                # zero is accurate.
                 search.leave_when(abs(step) <= abs(bound.value) * 1e-13)
         with r.when(end.value < begin.value):
             with r.when(begin.value - end.value > 1e-12 * begin.value):

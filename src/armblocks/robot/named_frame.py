@@ -43,7 +43,7 @@ def check_frames(robot: str, links: Sequence[Link], frames: Sequence[NamedFrame]
             f"it has {len(frames)} named frames",
             where=where,
             allowed=f"at most {MAX_FRAMES}",
-            fix="leave out frames that are not used",
+            fix="omit frames that are not used",
         )
     link_names = {link.name for link in links}
     names: set[str] = set()

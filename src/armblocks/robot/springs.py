@@ -127,7 +127,7 @@ SPRING_TYPES: tuple[type[Spring], ...] = (JointSpring, LineSpring)
 def check_springs(robot: str, links: Sequence[Link], springs: Sequence[Spring]) -> None:
     """Raise RobotError or UnknownNameError for the first inconsistency. ``robot`` is the robot's name."""
     where = f"robot '{robot}'"
-    fix = "leave out springs that are not used"
+    fix = "omit springs that are not used"
     check_parts(springs, Spring, "spring", MAX_SPRINGS, where=where, fix=fix)
     joints = {link.name: link.joint for link in links}
     for spring in springs:

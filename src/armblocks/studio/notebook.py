@@ -52,7 +52,7 @@ def run_widget(
             f"show is {show!r}",
             where="run_widget",
             allowed="'scopes', 'robot', or None for both",
-            fix="leave it out for both",
+            fix="omit it for both",
         )
     views = [(name, view) for name, view in diagram_views(diagram) if view.kind in DISPLAYED_KINDS]
     robots = [(name, view.subject) for name, view in views if isinstance(view.subject, Robot)]

@@ -24,7 +24,7 @@ def turning_points(path: PiecewisePolynomial, joints: NDArray[np.bool_]) -> Arra
     c[:, : path.coefficients.shape[1]] = path.coefficients[:, :, joints]
     slope, half, three = c[:, 1], c[:, 2], 3.0 * c[:, 3]
     root = np.sqrt(np.maximum(half * half - three * slope, 0.0))
-    # The two zeros of three u² + 2 half u + slope, without cancellation; NaN and infinity are left out.
+    # The two zeros of three u² + 2 half u + slope, without cancellation; NaN and infinity are omitted.
     larger = -(half + np.where(half >= 0.0, root, -root))
     with np.errstate(divide="ignore", invalid="ignore"):
         u = np.stack([larger / three, slope / larger])

@@ -21,7 +21,7 @@ def from_derivatives(durations: Sequence[float], highest: Sequence[float], order
     """A motion of one joint from rest at 0, of which the derivative of ``order`` is constant in each piece.
 
     ``durations`` (s) and the values ``highest`` of the derivative, piece after piece; pieces of length 0 are
-    left out. The end is exactly at rest.
+    omitted. The end is exactly at rest.
     """
     state = [0.0] * order
     times, rows = [0.0], list[list[float]]()
@@ -57,7 +57,7 @@ def double_s(speed: float, acceleration: float, jerk: float) -> PiecewisePolynom
     """The fastest motion over the distance 1 under limits of speed, acceleration and jerk (1/s, 1/s², 1/s³).
 
     The speed rises in an S, is constant, and falls in the same S. Phases of constant acceleration and speed
-    are left out where the limits are not reached.
+    are omitted where the limits are not reached.
     """
     v, a, j = speed, acceleration, jerk
     if v * j < a * a:

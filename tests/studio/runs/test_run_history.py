@@ -128,7 +128,7 @@ def test_a_run_in_a_process_is_tuned_rewound_and_finished() -> None:
         run.start({"diagram": source, "folder": ".", "speed": 5.0, "tuned": {"PID.I": "1/2"}})
         started = await received.until(run_messages.RunStarted)
         assert {t.path: t.value for t in started.tunables}["PID.I"] == 0.5, (
-            "trial values apply from the start"
+            "tried values apply from the start"
         )
         while len(received.times) < 100:
             await asyncio.sleep(0.02)

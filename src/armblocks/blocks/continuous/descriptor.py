@@ -147,7 +147,7 @@ def _explicit(*matrices: Any) -> _Explicit:
             "the part of x in the null space of E",
             where="DescriptorStateSpace",
             allowed="equations of index 1: A restricted to the left and right null spaces of E is regular",
-            fix="differentiate the algebraic equations by hand, or leave out one that repeats another",
+            fix="differentiate the algebraic equations by hand, or omit one that repeats another",
         )
     w_of_z = -np.linalg.solve(algebraic, U2.T @ A @ V1)
     w_of_u = -np.linalg.solve(algebraic, U2.T @ B)

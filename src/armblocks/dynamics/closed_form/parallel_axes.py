@@ -122,8 +122,8 @@ def arm_of_parallel_axes(chain: Chain) -> Solver | None:
 
     In palletisers, couplings keep the sum of the angles of the parallel axes constant, so that the last axis
     keeps its inclination. In other arms, the orientation of the tool gives this sum. These arms reach only
-    some poses. For other poses a solution has only a part of the pose, and the check by forward kinematics
-    rejects it.
+    some poses. For other poses, a solution satisfies only a part of the pose, and the check by forward
+    kinematics rejects it.
     """
     if len(chain.axes) not in (4, 5) or any(axis.prismatic for axis in chain.axes):
         return None

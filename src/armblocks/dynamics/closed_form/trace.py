@@ -46,7 +46,10 @@ def closed_solver(robot: Robot, frame: str | None = None) -> tuple[Chain, Solver
     chain = chain_of(robot, frame)
     for one, other in pairwise(axis for axis in chain.axes if not axis.prismatic):
         if chain.coincide(one, other):
-            _refuse(robot, f"the axes {one.name} and {other.name} coincide, so solutions are infinitely many")
+            _refuse(
+                robot,
+                f"the axes {one.name} and {other.name} coincide, so a pose has infinitely many solutions",
+            )
     for geometry in GEOMETRIES:
         solver = geometry(chain)
         if solver is not None:
@@ -71,7 +74,7 @@ def _refuse(robot: Robot, why: str) -> NoReturn:
 def _why(chain: Chain) -> str:
     axes = chain.axes
     if len(axes) > 6:
-        return f"with {len(axes)} joints the solutions of a pose are infinitely many"
+        return f"with {len(axes)} joints a pose has infinitely many solutions"
     if len(axes) < 6:
         return f"{len(axes)} joints whose axes are not parallel"
     wrist = f"the axes {names_of(axes[3:])} do not intersect in one point"

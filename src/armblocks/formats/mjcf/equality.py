@@ -49,9 +49,7 @@ def constraints_of(
             continue
         found = _constraint(element, parts, poses)
         if isinstance(found, str):
-            note(
-                context, EQUALITY, element, f"the constraint <{shortened(element.tag)}> is left out: {found}"
-            )
+            note(context, EQUALITY, element, f"the constraint <{shortened(element.tag)}> is omitted: {found}")
             continue
         found = replace(found, name=free_name(found.name, used))
         if isinstance(found, Coupling):

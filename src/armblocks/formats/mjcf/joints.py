@@ -67,13 +67,13 @@ def joint_of(
     driven = actuation.get(element.attributes.get("name", "").strip(), Actuation())
     if kind in ("ball", "free"):
         if driven.armature or driven.damping:
-            what = f"armature and damping of the actuators of the {kind} joint are left out"
+            what = f"armature and damping of the actuators of the {kind} joint are omitted"
             note(context, FRICTION, element, what)
         motor = _motor_of(element, Actuation(), context)
         if kind == "free":
             return PlacedJoint(Free(), (0.0, 0.0, 0.0), motor, None)
         if _range(element, 1.0, settings, context) is not None:
-            note(context, LIMIT, element, "the range of the ball joint is left out")
+            note(context, LIMIT, element, "the range of the ball joint is omitted")
         return PlacedJoint(Spherical(), element.vector("pos", (0.0, 0.0, 0.0)), motor, None)
     position = element.vector("pos", (0.0, 0.0, 0.0))
     axis = element.vector("axis", (0.0, 0.0, 1.0))
@@ -103,7 +103,7 @@ def _range(
         return None
     low, high = (unit * value for value in element.numbers("range", (2,)))
     if low > high or (low == high == 0.0):
-        note(context, LIMIT, element, f"the range from {low:g} to {high:g} is left out")
+        note(context, LIMIT, element, f"the range from {low:g} to {high:g} is omitted")
         return None
     return low, high
 
@@ -113,10 +113,10 @@ def _motor_of(element: Element, driven: Actuation, context: FileContext) -> Moto
     damping, friction = _first(element, "damping"), element.number("frictionloss", 0.0)
     armature = element.number("armature", 0.0)
     if "damping" in element.attributes and any(element.numbers("damping", range(1, 9))[1:]):
-        note(context, FRICTION, element, "damping of higher degree than the speed itself is left out")
+        note(context, FRICTION, element, "damping of higher degree than the speed itself is omitted")
     if min(damping, friction, armature) < 0.0:
         text = f"damping {damping:g}, frictionloss {friction:g}, armature {armature:g}"
-        what = f"{text}: negative values are left out"
+        what = f"{text}: negative values are omitted"
         note(context, FRICTION, element, what)
         damping, friction, armature = (max(value, 0.0) for value in (damping, friction, armature))
     damping, armature = damping + driven.damping, armature + driven.armature
@@ -152,7 +152,7 @@ def actuation_of(root: Element, defaults: Defaults, context: FileContext) -> dic
     for element in sections(root, "actuator"):
         actuator = defaults.applied(element)
         if any(name in actuator.attributes for name in _TRANSMISSIONS_OF_TENDONS):
-            note(context, TENDON, actuator, "the actuator does not act on a joint; it is left out")
+            note(context, TENDON, actuator, "the actuator does not act on a joint; it is omitted")
             continue
         names = [actuator.attributes.get(key, "").strip() for key in ("joint", "jointinparent")]
         joint = names[0] or names[1]
@@ -162,9 +162,9 @@ def actuation_of(root: Element, defaults: Defaults, context: FileContext) -> dic
             force = _force_limit(actuator, "ctrlrange", gear)
         armature, damping = actuator.number("armature", 0.0), _first(actuator, "damping")
         if "damping" in actuator.attributes and any(actuator.numbers("damping", range(1, 9))[1:]):
-            note(context, FRICTION, actuator, "damping of higher degree than the speed itself is left out")
+            note(context, FRICTION, actuator, "damping of higher degree than the speed itself is omitted")
         if min(armature, damping) < 0.0:
-            what = f"damping {damping:g}, armature {armature:g}: negative values are left out"
+            what = f"damping {damping:g}, armature {armature:g}: negative values are omitted"
             note(context, FRICTION, actuator, what)
         if joint:
             others = found.get(joint, Actuation())

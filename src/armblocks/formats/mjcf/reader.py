@@ -331,7 +331,7 @@ class _Model:
         """Findings for the parts of a model that a robot does not have."""
         for body in _bodies(self.root):
             if body.number("gravcomp", 0.0):
-                note(self.context, STIFFNESS, body, "the gravity compensation of the body is left out")
+                note(self.context, STIFFNESS, body, "the gravity compensation of the body is omitted")
         for option in self.root.all("option"):
             for flag in option.all("flag"):
                 off = [name for name in _FLAGS if flag.attributes.get(name, "").strip() == "disable"]
@@ -339,7 +339,7 @@ class _Model:
                     what = f"the disabling of {', '.join(off)} is not read"
                     note(self.context, UNREAD, flag, what)
             if option.number("density", 0.0) or option.number("viscosity", 0.0):
-                note(self.context, STIFFNESS, option, "the forces of the surrounding medium are left out")
+                note(self.context, STIFFNESS, option, "the forces of the surrounding medium are omitted")
 
 
 def _bodies(element: Element) -> Iterator[Element]:

@@ -22,7 +22,7 @@ TENDON = Rule(
 LIMIT = Rule(
     code="mjcf-limit",
     allowed="range limits in increasing order",
-    remedy="correct the range, or leave it out where it is unknown",
+    remedy="correct the range, or omit it where it is unknown",
 )
 FRICTION = Rule(
     code="mjcf-friction",

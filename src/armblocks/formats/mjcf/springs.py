@@ -46,15 +46,15 @@ def spring_of(element: Element, kind: str, unit: float, context: FileContext) ->
     if stiffness == 0.0 and not any(higher) and time == ratio == 0.0:
         return None
     if kind in ("ball", "free"):
-        note(context, STIFFNESS, element, f"the spring of the {kind} joint is left out")
+        note(context, STIFFNESS, element, f"the spring of the {kind} joint is omitted")
         return None
     if any(higher):
-        note(context, STIFFNESS, element, "stiffness of higher degree than the displacement is left out")
+        note(context, STIFFNESS, element, "stiffness of higher degree than the displacement is omitted")
     by_inertia = (time, ratio) if time > 0.0 and ratio > 0.0 else None
     if by_inertia is None and (time or ratio):
-        note(context, STIFFNESS, element, f"springdamper {time:g} {ratio:g} is left out")
+        note(context, STIFFNESS, element, f"springdamper {time:g} {ratio:g} is omitted")
     if stiffness < 0.0:
-        note(context, STIFFNESS, element, f"the stiffness {stiffness:g} is left out")
+        note(context, STIFFNESS, element, f"the stiffness {stiffness:g} is omitted")
         stiffness = 0.0
     if stiffness == 0.0 and by_inertia is None:
         return None
@@ -136,14 +136,14 @@ def line_springs(
         ends = [child.attributes.get("site", "").strip() for child in own.children if child.tag == "site"]
         is_line = own.tag == "spatial" and len(own.children) == len(ends) == 2
         if not is_line or not all(end in sites for end in ends) or stiffness < 0.0 or any(higher):
-            note(context, TENDON, own, "the forces of the tendon are left out")
+            note(context, TENDON, own, "the forces of the tendon are omitted")
             continue
         if others:
-            note(context, TENDON, own, f"the {', '.join(others)} of the tendon is left out")
+            note(context, TENDON, own, f"the {', '.join(others)} of the tendon is omitted")
         first, second = (sites[end] for end in ends)
         lengths = tendon.numbers("springlength", range(1, 3)) if "springlength" in tendon.attributes else [-1]
         if min(lengths) != max(lengths):
-            note(context, TENDON, own, "the forces of the tendon are left out: its rest length is a range")
+            note(context, TENDON, own, "the forces of the tendon are omitted: its rest length is a range")
             continue
         if not stiffness or first.link == second.link or len(springs) >= MAX_SPRINGS:
             continue

@@ -71,7 +71,7 @@ def closure_of(
     if joint.element.first("axis") is not None and any(
         axis.first(tag) is not None for axis in joint.element.all("axis") for tag in ("limit", "dynamics")
     ):
-        note(frames.context, CLOSURE, joint.element, "its limits, friction and springs are left out")
+        note(frames.context, CLOSURE, joint.element, "its limits, friction and springs are omitted")
     x = (1.0, 0.0, 0.0)
     axes = [direction_of(joint, joint.element.first(tag), tag, frames) for tag in AXES[kind]]
     first = _with_axis(axes[0], 2, x) if axes else Transform()

@@ -120,7 +120,7 @@ def _limits(joint: Frame, axis: Element | None, continuous: bool, context: FileC
     low, high = (_bound(limit, tag, sign * math.inf) for tag, sign in (("lower", -1), ("upper", 1)))
     position: tuple[float, float] | None = None
     if low > high:
-        what = f"the lower limit {low:g} is above the upper limit {high:g}; both are left out"
+        what = f"the lower limit {low:g} is above the upper limit {high:g}; both are omitted"
         note(context, LIMIT, limit, what, joint.element.label)
     elif not continuous and math.isfinite(low) and math.isfinite(high):
         position = (low, high)
@@ -137,7 +137,7 @@ def _magnitude(limit: Element, tag: str, joint: Frame, context: FileContext) -> 
     """A limit of speed or torque; ``None`` for absent, infinite and negative values and for zero."""
     value = _bound(limit, tag, math.inf)
     if value == 0:
-        what = f"the {tag} limit is 0, with which the joint cannot move; it is left out"
+        what = f"the {tag} limit is 0, with which the joint cannot move; it is omitted"
         note(context, LIMIT, limit, what, joint.element.label)
     return value if math.isfinite(value) and value > 0 else None
 
@@ -153,7 +153,7 @@ def motor_of(joint: Frame, axis: Element | None, context: FileContext) -> Motor 
     rotor = number_in(joint.element, "drake:rotor_inertia", 0.0)
     gear = number_in(joint.element, "drake:gear_ratio", 1.0)
     if rotor < 0 or gear == 0:
-        what = f"rotor inertia {rotor:g} and gear ratio {gear:g} are left out"
+        what = f"rotor inertia {rotor:g} and gear ratio {gear:g} are omitted"
         note(context, DAMPING, joint.element, what)
         rotor, gear = 0.0, 1.0
     damping, friction = _friction(joint, axis.first("dynamics"), context)
@@ -173,7 +173,7 @@ def spring_of(joint: Frame, tag: str, link: str, context: FileContext) -> JointS
         return None
     stiffness = number_in(dynamics, "spring_stiffness", 0.0)
     if stiffness < 0.0:
-        what = f"the spring with the stiffness {stiffness:g} is left out"
+        what = f"the spring with the stiffness {stiffness:g} is omitted"
         note(context, SPRING, dynamics, what, joint.element.label)
     if stiffness <= 0.0:
         return None
@@ -187,7 +187,7 @@ def _friction(joint: Frame, dynamics: Element | None, context: FileContext) -> t
         return 0.0, 0.0
     damping, friction = number_in(dynamics, "damping", 0.0), number_in(dynamics, "friction", 0.0)
     if damping < 0 or friction < 0:
-        what = f"damping {damping:g} and friction {friction:g} would accelerate the joint; they are left out"
+        what = f"damping {damping:g} and friction {friction:g} would accelerate the joint; they are omitted"
         note(context, DAMPING, dynamics, what, joint.element.label)
         return 0.0, 0.0
     return damping, friction

@@ -72,7 +72,7 @@ def _shapes(
     else:
         sizes = (number_in(kind, "radius", 1.0), number_in(kind, "length", 1.0), 1.0)
     if min(sizes) <= 0:
-        what = f"the {kind.tag} has the size {min(sizes):g} m; it is left out"
+        what = f"the {kind.tag} has the size {min(sizes):g} m; it is omitted"
         note(context, SHAPE, kind, what, link.element.label)
         return []
     return primitive(kind.tag, sizes, material, pose)

@@ -309,7 +309,7 @@ class _Reader:
         )
         if found is None or found.rows is None:
             types = ", ".join(end.attributes.get("geomType", "") for end in mate.all("ConstraintGeometry"))
-            what = f"the mate '{shortened(mate.tag)}' of {shortened(types) or 'nothing'} is left out"
+            what = f"the mate '{shortened(mate.tag)}' of {shortened(types) or 'nothing'} is omitted"
             note(self._context, MATE, mate, what)
         else:
             yield found

@@ -153,7 +153,7 @@ def _limits(element: Element, kind: str, context: FileContext) -> JointLimits:
     if kind != "continuous" and ("lower" in limit.attributes or "upper" in limit.attributes):
         low, high = _bound(limit, "lower"), _bound(limit, "upper")
         if low > high:
-            what = f"the lower limit {low:g} is above the upper limit {high:g}; both are left out"
+            what = f"the lower limit {low:g} is above the upper limit {high:g}; both are omitted"
             note(context, LIMIT, limit, what, element.label)
         elif math.isfinite(low) and math.isfinite(high):
             position = (low, high)
@@ -176,7 +176,7 @@ def _magnitude(limit: Element, name: str, joint: Element, context: FileContext) 
         return None
     value = _bound(limit, name)
     if value <= 0:
-        what = f"the {name} limit is {value:g}, with which the joint cannot move; it is left out"
+        what = f"the {name} limit is {value:g}, with which the joint cannot move; it is omitted"
         note(context, LIMIT, limit, what, joint.label)
         return None
     return value if math.isfinite(value) else None
@@ -194,7 +194,7 @@ def motor_of(joint: Element, transmission: Transmission | None, context: FileCon
         damping, friction = dynamics.number("damping", 0.0), dynamics.number("friction", 0.0)
         if damping < 0 or friction < 0:
             what = (
-                f"damping {damping:g} and friction {friction:g} would accelerate the joint; they are left out"
+                f"damping {damping:g} and friction {friction:g} would accelerate the joint; they are omitted"
             )
             note(context, DAMPING, dynamics, what, joint.label)
             damping = friction = 0.0

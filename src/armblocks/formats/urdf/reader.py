@@ -128,7 +128,7 @@ def _named(root: Element, tag: str, context: FileContext) -> dict[str, Element]:
                 names.add(new)
                 name = element.attributes["name"] = new
             elif _equal(element, elements[name]):
-                note(context, NAME, element, f"{place} with the same content; this one is left out")
+                note(context, NAME, element, f"{place} with the same content; this one is omitted")
                 continue
             else:
                 raise element.error(place, allowed="unique names", fix="rename one of them")

@@ -17,7 +17,7 @@ NO_LIMIT = Rule(
 LIMIT = Rule(
     code="urdf-limit",
     allowed="lower < upper, effort and velocity above zero",
-    remedy="correct the limit, or leave the attribute out where it is unknown",
+    remedy="correct the limit, or omit the attribute where it is unknown",
 )
 AXIS = Rule(
     code="urdf-axis",

@@ -55,9 +55,7 @@ def _shapes(element: Element, link: Element, context: FileContext, material: Mat
         return []
     sizes = kind.vector("size", (1.0, 1.0, 1.0)) if kind.tag == "box" else _round_sizes(kind)
     if min(sizes) <= 0:
-        note(
-            context, SHAPE, kind, f"the {kind.tag} has the size {min(sizes):g} m; it is left out", link.label
-        )
+        note(context, SHAPE, kind, f"the {kind.tag} has the size {min(sizes):g} m; it is omitted", link.label)
         return []
     return primitive(kind.tag, (sizes[0], sizes[1], sizes[2]), material, pose)
 

@@ -74,7 +74,7 @@ class Joint(ABC, metaclass=ArgumentErrors, methods=False):
                     f"coordinate {coordinate.name} of a {type(self).__name__} joint has position limits",
                     where="limits of a joint",
                     allowed="limits of speed and torque: its position is a quaternion",
-                    fix="leave out the position limits",
+                    fix="omit the position limits",
                 )
 
     @property

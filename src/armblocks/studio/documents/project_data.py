@@ -169,7 +169,7 @@ class ProjectData(DataFiles):
 def files_of(diagram: Diagram) -> Iterator[tuple[str, TimeTable | UserFunction]]:
     """The tables and functions of files in a hierarchy, with the paths of their blocks.
 
-    Commented blocks are left out, because a run does not need them.
+    Commented blocks are omitted, because a run does not need them.
     """
     for level, sheet in active_levels(levels_of(diagram)).items():
         for name, block in sheet.blocks.items():

@@ -2,7 +2,7 @@
 
 A job is JSON: ``diagram`` (a canonical document), ``folder`` (for files of the project), ``trusted`` (paths
 and digests of Python files whose code may run), ``run`` and ``document`` (keys), ``speed``
-(simulated seconds per second, ``null`` for as fast as possible), ``tuned`` (trial values of tunable
+(simulated seconds per second, ``null`` for as fast as possible), ``tuned`` (tried values of tunable
 parameters). Commands are the requests of :mod:`armblocks.studio.protocol.messages`;
 the worker executes them between two parts of the run.
 """

@@ -88,7 +88,7 @@ def _matrix(text: str, where: str) -> Any:
 
 
 def tuned_value(typed: Any, where: str) -> Any:
-    """Return the trial value of a parameter from a client, as text or as numbers."""
+    """Return the tried value of a parameter from a client, as text or as numbers."""
     return number_value(typed, where) if isinstance(typed, str) else _with_infinities(typed)
 
 

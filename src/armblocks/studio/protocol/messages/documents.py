@@ -1,7 +1,7 @@
 """Documents: requests that open, change, save, close and recover them, and events that describe them.
 
-A document is a diagram or a robot. These requests and events serve both; only edits, content and content
-changes depend on the kind: see :class:`Content`.
+A document is a diagram or a robot. These requests and events apply to both kinds. Only edits, content and
+content changes depend on the kind: see :class:`Content`.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ class Recovery(Message):
 
     ``path`` is its file, or ``None`` if it was never saved. ``began`` and ``last`` are the times of the first
     and the last edit since the save (s since 1970), ``edits`` is their number, ``parts`` the number of blocks
-    or links. ``disk`` says whether the file has changed since the edits. ``missing`` describes the edits that
-    could not be recovered.
+    or links. ``disk`` states whether the file has changed since the edits. ``missing`` describes the edits
+    that could not be recovered.
     """
 
     document: str
@@ -111,8 +111,8 @@ class Attach(Request[str]):
     """Show a document again: after a reload, after a lost connection, or in a second client.
 
     A server that was restarted and does not have the document open recovers it from its journal, or else
-    opens the file ``path`` or the shipped ``origin``, under the same key. Edits that the client sends again
-    then find their document. ``inside`` is the path of the displayed sheet of a diagram.
+    opens the file ``path`` or the shipped ``origin``, under the same key, so that edits that the client sends
+    again are applied to this document. ``inside`` is the path of the displayed sheet of a diagram.
     """
 
     kind: Literal["attach"] = "attach"

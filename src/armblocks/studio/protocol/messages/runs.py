@@ -55,7 +55,7 @@ class Tunable(Message):
 class Run(Request[str]):
     """Start a run. ``speed`` is simulated seconds per second; ``None`` runs as fast as possible.
 
-    ``tuned``: trial values of tunable parameters, by ``block.parameter``; the model keeps its own values.
+    ``tuned``: tried values of tunable parameters, by ``block.parameter``; the model keeps its own values.
     """
 
     kind: Literal["run"] = "run"
