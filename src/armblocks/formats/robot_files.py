@@ -31,11 +31,11 @@ def load_robot(
 
     A text with a path separator or with the suffix of a robot format is a path, any other text is a name.
     ``name`` selects one of several robots of a script, by the script's variable or by the robot's name.
-    ``friction_model`` replaces that of the file; scripts have none and get that of releases 9.5 to 10.
-    ``tip`` names the link that carries the tool, see :func:`armblocks.robot.with_tip`; by default that of the
-    file, in a URDF file the end of the chain with the most joints. ``packages`` maps names of ROS packages
-    to their folders; other packages are searched for in the folders above the file. ``arguments`` are the
-    values of the arguments of a xacro file. The robot's ``source`` is the shipped name or the path.
+    ``friction_model`` replaces the model of the file; scripts get the model of releases 9.5 to 10.
+    ``tip`` names the link that carries the tool, see :func:`armblocks.robot.with_tip`; by default the tip of
+    the file, in a URDF file the end of the chain with the most joints. ``packages`` maps names of ROS
+    packages to their folders; other packages are searched for in the folders above the file. ``arguments``
+    are the values of the arguments of a xacro file. The robot's ``source`` is the shipped name or the path.
 
     Raises ``UnknownNameError`` for a name that is not shipped and for a ``name`` or ``tip`` that is not in
     the file, ``FormatError`` for a file that is missing, has no known format or cannot be read. Issues

@@ -24,7 +24,7 @@ class JointFriction(NamedTuple):
 
 
 def check_joint(robot: Robot, link: Link, kinds: Collection[type[Joint]], format: str) -> None:
-    """Raise ``FormatError`` for a joint of a type that the format does not have; warn of left-out limits."""
+    """Raise ``FormatError`` for a joint of a type that the format does not have; warn of omitted limits."""
     if type(link.joint) not in kinds:
         raise FormatError(
             f"the joint of link '{link.name}' is a {type(link.joint).__name__}, which {format} does not have",

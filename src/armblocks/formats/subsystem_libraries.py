@@ -9,7 +9,7 @@ A block of a diagram or of a library refers to an entry and has its parameters::
     "hip": {"type": "Subsystem", "library": "servos.json#JointServo", "parameters": {"kp": 40}}
 
 The file is a path relative to the folder of the file that names it, or a shipped library by its name. It is
-loaded when the diagram is read, so that changes of a library affect all its users. A loaded entry has
+loaded when the diagram is read, so that changes of a library affect all files that use it. A loaded entry has
 ``Diagram.link`` and must not be changed, unless the link is broken (``link=""``).
 """
 

@@ -120,7 +120,7 @@ class _Dae:
         return self.geometries[geometry]
 
     def polygons(self, element: Element, points_of_sources: dict[Element, Floats]) -> Floats:
-        """The triangles of one list of polygons. ``points_of_sources``: those that were read before."""
+        """The triangles of one list of polygons. ``points_of_sources``: the points that were read before."""
         inputs = [*element.all("input")]
         offsets = [_offset(entry) for entry in inputs]
         vertex = next((k for k, i in enumerate(inputs) if i.attributes.get("semantic") == "VERTEX"), None)

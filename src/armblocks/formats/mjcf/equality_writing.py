@@ -69,7 +69,8 @@ def equality_lines(
 def tendon_lines(robot: Robot, frames: dict[str, NamedFrame], sites: Sites) -> list[str]:
     """The springs between two points as the elements of ``<tendon>``, with their sites.
 
-    A tendon has no preload: its rest length is that without force. Warns of forces that MJCF does not have.
+    A tendon has no preload: its rest length is the length without force. Warns of forces that MJCF does not
+    have.
     """
     lines: list[str] = []
     others: list[str] = []

@@ -73,8 +73,8 @@ def solid_of_mesh(corners: _Array, *, legacy: bool) -> Solid:
     """The solid inside a mesh, ``corners`` (F, 3, 3), m.
 
     ``legacy``: all tetrahedra between a centre and the triangles count as positive, the default of MuJoCo.
-    This rule is exact for convex bodies, and accepts triangles of any orientation. The centre is first that
-    of the surface, then the centre of mass.
+    This rule is exact for convex bodies, and accepts triangles of any orientation. At first the centre is the
+    centroid of the surface, then the centre of mass.
     """
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas = np.linalg.norm(normals, axis=1) / 2.0

@@ -51,7 +51,7 @@ class Models:
     def world(self, element: Element, source: Source) -> Scope:
         """The models in a ``<world>``, or in the root element of a file without a world.
 
-        If a model of a world cannot be read, a finding says why, and the error is added to ``errors``.
+        If a model of a world cannot be read, a finding has the reason, and the error is added to ``errors``.
         """
         scope = Scope()
         scope.frame = Frame(kind="world", name="world", element=element, source=source, scope=scope)
@@ -105,7 +105,7 @@ class Models:
     ) -> None:
         """Add a model, or the model of an included file, to a scope.
 
-        ``sources``: of the element that places the model, and of the model.
+        ``sources``: the sources of the element that places the model, and of the model.
         """
         if level >= MAX_LEVELS:
             raise model.error(

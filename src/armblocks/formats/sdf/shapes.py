@@ -81,7 +81,7 @@ def _shapes(
 def _mesh(
     kind: Element, link: Frame, context: FileContext, pose: Transform, material: Material
 ) -> list[Shape]:
-    """The mesh of a file; a finding says why it is not shown."""
+    """The mesh of a file; a finding has the reason if it is not shown."""
     file = text_in(kind, "uri") or text_in(kind, "filename") or kind.attributes.get("filename", "")
     shape: Shape | str = "a part of a mesh file cannot be selected"
     if kind.first("submesh") is None:

@@ -63,7 +63,7 @@ def _shapes(element: Element, link: Element, context: FileContext, material: Mat
 def _mesh(
     kind: Element, link: Element, context: FileContext, pose: Transform, material: Material
 ) -> list[Shape]:
-    """The mesh of a file; a finding says why it is not shown."""
+    """The mesh of a file; a finding has the reason if it is not shown."""
     file = kind.attributes.get("filename", "").strip()
     scale = kind.vector("scale", (1.0, 1.0, 1.0))
     shape = mesh_shape(file, scale, material, pose, context)

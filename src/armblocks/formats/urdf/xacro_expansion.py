@@ -16,7 +16,7 @@ from armblocks.formats.xml_elements import Element, read_elements
 SECONDS = 5.0
 """Maximum processor time of an expansion."""
 _PATIENCE = 8.0
-"""Maximum duration of an expansion, as a multiple of that time, because other programs run as well."""
+"""Maximum duration of an expansion, relative to its processor time, because other programs run as well."""
 _SIGNALS = (-9, -24)
 """Return codes of a process that the limit of processor time has ended: SIGKILL, SIGXCPU."""
 
