@@ -1030,7 +1030,7 @@ export interface WireLines {
   dots: [number, number][];
   label: string;
   name?: string;
-  inherited_name?: string;
+  propagated_name?: string;
   name_at?: [number, number, "start" | "middle"] | null;
 }
 /**

@@ -27,8 +27,8 @@ export function SignalNames({ lines }: { lines: Lines }) {
             <NameField port={port} name={net.name ?? ''} />
           ) : (
             <span
-              className={net.name ? '' : 'inherited'}
-              title={`Signal of ${port}${net.name ? '' : `, named ${net.inherited_name} elsewhere`}`}
+              className={net.name ? '' : 'propagated'}
+              title={`Signal of ${port}${net.name ? '' : `, named ${net.propagated_name} elsewhere`}`}
               onDoubleClick={() => nameSignal(port)}
             >
               {shownName(net)}
@@ -41,8 +41,8 @@ export function SignalNames({ lines }: { lines: Lines }) {
 }
 
 /** The text at the line of a signal: its name, or `<name>` with its name on another sheet or at a Goto. */
-const shownName = ({ name, inherited_name }: WireLines): string =>
-  name || (inherited_name ? `<${inherited_name}>` : '')
+const shownName = ({ name, propagated_name }: WireLines): string =>
+  name || (propagated_name ? `<${propagated_name}>` : '')
 
 /** The position of a name: on its line, or at the output of a signal without a line. */
 function transformOf(port: string, { name_at }: WireLines, blocks: Record<string, SheetBlock>): string {

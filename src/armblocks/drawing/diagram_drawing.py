@@ -19,7 +19,7 @@ from armblocks.diagram import (
     infer_shapes,
     levels_of,
 )
-from armblocks.diagram.inherited_names import inherited_names
+from armblocks.diagram.propagated_names import propagated_names
 from armblocks.diagram.signs import Outline
 from armblocks.drawing import block_faces
 from armblocks.drawing.block_boxes import (
@@ -75,7 +75,7 @@ def diagram_picture(
         raise UnknownNameError("sheet", sheet, sheet_paths, where=f"diagram '{diagram.name}'")
     level = contents.levels[sheet]
     path = f"{sheet}/" if sheet else ""
-    inherited = inherited_names(diagram, sheet)
+    propagated = propagated_names(diagram, sheet)
     placed_boxes = boxes(level)
     nets, wires = wire_nets(level.connections, drawn_bends(level), placed_boxes)
     obstacles = [obstacle(box) for box in placed_boxes.values()]
@@ -95,7 +95,7 @@ def diagram_picture(
         marks.append(Group(tuple(block), title=_block_title(name, box, own_comment)))
     for (source, _), wire_net, net in zip(wires.items(), nets, routed):
         marks += label_marks(wire_net, net, wire_label(level, source))
-        marks += name_marks(shown_name(level, source, inherited), net.paths, obstacles)
+        marks += name_marks(shown_name(level, source, propagated), net.paths, obstacles)
     comment = _outer_comment(contents.levels, sheet)
     if comment:
         marks = [grey_mark(mark) for mark in marks]
@@ -193,9 +193,9 @@ def _end(ports: tuple[BoxPort, ...], name: str) -> WireEnd:
     return WireEnd(port.x, port.y, port.dx, port.dy)
 
 
-def shown_name(diagram: Diagram, source: PortRef, inherited: Mapping[PortRef, str]) -> str:
+def shown_name(diagram: Diagram, source: PortRef, propagated: Mapping[PortRef, str]) -> str:
     """The text at the line of a signal: its name, or ``<name>`` with its name on another sheet."""
-    own, other = diagram.signal_names.get(source, ""), inherited.get(source, "")
+    own, other = diagram.signal_names.get(source, ""), propagated.get(source, "")
     return own or (f"<{other}>" if other else "")
 
 

@@ -67,11 +67,11 @@ def test_a_sheet_shows_a_name_that_is_given_on_another_sheet(tmp_path: Path) -> 
         )
         await ask("show_sheet", document=key, inside=["S"])
         lines = [event for event in events if event["kind"] == "opened"][-1]["content"]["sheet"]["lines"]
-        named = [source for source, net in lines.items() if net["inherited_name"] == "deviation"]
+        named = [source for source, net in lines.items() if net["propagated_name"] == "deviation"]
         assert len(named) == 1
         assert lines[named[0]]["name_at"] is not None
         await ask("undo", document=key)
         changed = [event for event in events if event["kind"] == "changed"][-1]
-        assert changed["change"]["sheet"]["lines"][named[0]]["inherited_name"] == ""
+        assert changed["change"]["sheet"]["lines"][named[0]]["propagated_name"] == ""
 
     run_scenario(tmp_path, scenario)

@@ -13,8 +13,8 @@ from armblocks.drawing.wires import moved_bends
 from armblocks.studio.protocol.messages.sheets import WireLines
 
 Lines = Mapping[str, WireLines]
-InheritedNames = Mapping[PortRef, str]
-NO_NAMES: InheritedNames = {}
+PropagatedNames = Mapping[PortRef, str]
+NO_NAMES: PropagatedNames = {}
 _MAX_SHEETS = 16
 
 
@@ -23,15 +23,15 @@ class SheetLines:
 
     def __init__(self) -> None:
         self._routing = Routing()
-        self._cache: list[tuple[Diagram, InheritedNames, Lines]] = []
+        self._cache: list[tuple[Diagram, PropagatedNames, Lines]] = []
 
-    def route(self, sheet: Diagram, inherited: InheritedNames = NO_NAMES) -> Lines:
+    def route(self, sheet: Diagram, propagated: PropagatedNames = NO_NAMES) -> Lines:
         """Return the lines of a sheet, by output, with the names that signals have on other sheets."""
         for cached, names, lines in self._cache:
-            if cached is sheet and names == inherited:
+            if cached is sheet and names == propagated:
                 return lines
-        lines = self.route_dragged(sheet, {}, sheet.connections, sheet.bends, None, inherited)
-        self._cache = [*self._cache[-1:], (sheet, inherited, lines)]
+        lines = self.route_dragged(sheet, {}, sheet.connections, sheet.bends, None, propagated)
+        self._cache = [*self._cache[-1:], (sheet, propagated, lines)]
         return lines
 
     def route_dragged(
@@ -41,7 +41,7 @@ class SheetLines:
         connections: Iterable[Connection],
         bends: Mapping[Connection, tuple[float, ...]],
         passed: str | None,
-        inherited: InheritedNames = NO_NAMES,
+        propagated: PropagatedNames = NO_NAMES,
     ) -> Lines:
         """Return the lines of a sheet with some blocks at other positions and with other connections."""
         placed = dict(boxes(sheet))
@@ -66,9 +66,9 @@ class SheetLines:
                 dots=list(routed[str(source)].dots),
                 label=wire_label(sheet, source),
                 name=sheet.signal_names.get(source, ""),
-                inherited_name=inherited.get(source, ""),
+                propagated_name=propagated.get(source, ""),
                 name_at=name_position(
-                    shown_name(sheet, source, inherited), routed[str(source)].paths, obstacles.values()
+                    shown_name(sheet, source, propagated), routed[str(source)].paths, obstacles.values()
                 ),
             )
             for source, targets in wires.items()

@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from typing import Protocol
 
 from armblocks.diagram import Diagram
-from armblocks.diagram.inherited_names import inherited_names
+from armblocks.diagram.propagated_names import propagated_names
 from armblocks.errors import UnknownNameError
 from armblocks.studio.documents.presenter import Opening, Place, Presenter
 from armblocks.studio.protocol.clients import Clients, StudioClient
@@ -85,7 +85,7 @@ class DiagramPresenter(Presenter[OpenDocument]):
         """Return the sheet at a path."""
         diagram = open_file.document.diagram
         shown_sheet, linked = inside(diagram, place), linked_part(diagram, place)
-        names = inherited_names(diagram, "/".join(place))
+        names = propagated_names(diagram, "/".join(place))
         drawn_sheet = sheet(
             shown_sheet, self._lines.for_sheet(open_file.key, place).route(shown_sheet, names)
         )
@@ -109,7 +109,7 @@ class DiagramPresenter(Presenter[OpenDocument]):
             self._lines.for_sheet(open_file.key, place),
         )
         old_lines, new_lines = (
-            lines.route(inside(value, place), inherited_names(value, "/".join(place)))
+            lines.route(inside(value, place), propagated_names(value, "/".join(place)))
             for value in (before, diagram)
         )
         return DiagramChange(

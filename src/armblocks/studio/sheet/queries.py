@@ -7,9 +7,9 @@ from typing import Any
 
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import Diagram, ParameterFormula
-from armblocks.diagram.inherited_names import inherited_names
 from armblocks.diagram.mask import formula_value
 from armblocks.diagram.parameter import Value
+from armblocks.diagram.propagated_names import propagated_names
 from armblocks.errors import UnknownNameError
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.documents.requests import DocumentRequests
@@ -76,7 +76,7 @@ class SheetQueries:
             wires = {connection(wire): wire.bends for wire in request.wires}
             connections, bends = tuple(wire for wire in wires if has_ports(wire, sheet)), wires
         diagram = self._diagrams[request.document].document.diagram
-        names = inherited_names(diagram, "/".join(request.inside))
+        names = propagated_names(diagram, "/".join(request.inside))
         before = lines.route(sheet, names)
         places = {name: (corner.x, corner.y) for name, corner in request.places.items()}
         after = lines.route_dragged(sheet, places, connections, bends, request.passed, names)

@@ -99,7 +99,7 @@ class WireLines(Message):
     label: str
     name: str = ""
     """The name of the signal."""
-    inherited_name: str = ""
+    propagated_name: str = ""
     """The name that the signal has before a From, In or subsystem, if it has no name here."""
     name_at: tuple[float, float, Literal["start", "middle"]] | None = None
     """Position of the displayed name on its baseline, and its anchor; ``None`` without a line or name."""

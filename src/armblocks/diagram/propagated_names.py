@@ -1,8 +1,8 @@
 """Propagated names of signals (Simulink: propagated signal labels).
 
 A From block, an In block and an output of a subsystem pass on a signal; the name of the signal is propagated
-with it. Drawings show them as ``<name>``. They are computed for drawings only: results and legends find the
-names of signals by the outputs that compute them.
+with it. Drawings show propagated names as ``<name>``. They are computed for drawings only: results and
+legends find the names of signals by the outputs that compute them.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from armblocks.diagram.structure import DiagramBlock, Inport, Outport, Subsystem
 from armblocks.diagram.virtual_wiring import From, Goto
 
 
-def inherited_names(diagram: Diagram, sheet: str = "") -> dict[PortRef, str]:
-    """The inherited names of the outputs of a sheet that have no own name.
+def propagated_names(diagram: Diagram, sheet: str = "") -> dict[PortRef, str]:
+    """The propagated names of the outputs of a sheet that have no own name.
 
     ``sheet`` is the path of the sheet's subsystem. The diagram may be incomplete: an output whose signal
-    cannot be found, or that conditions hold, has no inherited name.
+    cannot be found, or that a conditional subsystem holds, has no propagated name.
     """
     search = _NameSearch(diagram)
     level = search.levels.get(sheet) or search.level(sheet)
