@@ -1502,7 +1502,7 @@ export interface TablePreview {
   fault: Fault | null;
 }
 /**
- * A column of a file. ``fault`` says why it has no numbers; ``rows`` is then 0.
+ * A column of a file. ``fault`` is the reason why it has no numbers; ``rows`` is then 0.
  */
 export interface TableColumn {
   name: string;
@@ -1512,9 +1512,9 @@ export interface TableColumn {
   fault: string;
 }
 /**
- * The content of a Python file, which has not been run; ``fault`` says why it is not valid.
+ * The content of a Python file, which has not been run; ``fault`` is the reason why it is not valid.
  *
- * ``digest`` identifies the content; ``trusted`` says whether its code may run. Invisible characters are
+ * ``digest`` identifies the content; ``trusted`` states whether its code may run. Invisible characters are
  * written as ``\\u202e``; ``hidden`` is their number.
  */
 export interface FunctionSource {

@@ -73,7 +73,7 @@ def lint(
             "nothing is written without --fix",
             where="armblocks lint",
             allowed="--output, --in-place and --force together with --fix",
-            fix="add --fix, or leave these options out",
+            fix="add --fix, or omit these options",
         )
     else:
         findings = lint_robot(robot, name=name, packages=packages, arguments=arguments)
@@ -87,7 +87,7 @@ def _target(source: Path, output: Path | None, *, in_place: bool, force: bool) -
             "both --output and --in-place are given",
             where="armblocks lint",
             allowed="one of them",
-            fix="leave one of them out",
+            fix="omit one of them",
         )
     if in_place:
         return source

@@ -31,7 +31,7 @@ class DataFileList(Request[list[DataFile]]):
 
 
 class TableColumn(Message):
-    """A column of a file. ``fault`` says why it has no numbers; ``rows`` is then 0."""
+    """A column of a file. ``fault`` is the reason why it has no numbers; ``rows`` is then 0."""
 
     name: str
     unit: str
@@ -96,9 +96,9 @@ class SourceFunction(Message):
 
 
 class FunctionSource(Message):
-    """The content of a Python file, which has not been run; ``fault`` says why it is not valid.
+    """The content of a Python file, which has not been run; ``fault`` is the reason why it is not valid.
 
-    ``digest`` identifies the content; ``trusted`` says whether its code may run. Invisible characters are
+    ``digest`` identifies the content; ``trusted`` states whether its code may run. Invisible characters are
     written as ``\\\\u202e``; ``hidden`` is their number.
     """
 
