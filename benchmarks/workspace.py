@@ -1,10 +1,10 @@
-"""The workspace of a six-axis arm with manipulability, beside Pinocchio and NumPy.
+"""The workspace of a six-axis arm with manipulability, compared with Pinocchio and NumPy.
 
     python benchmarks/workspace.py
 
-Wall time from call to result, least of the repetitions, after the compilation. Pinocchio evaluates each
-sample in a loop of Python: pose and Jacobian of the tool, its determinant by NumPy, and the same cells by
-NumPy; it has fewer samples, and the time is scaled.
+Wall time from call to result, minimum of the repetitions, after the compilation. With Pinocchio, a Python
+loop evaluates each sample: pose and Jacobian of the tool, its determinant by NumPy, and the same cells by
+NumPy. This loop has fewer samples, and its time is scaled.
 """
 
 # pyright: basic

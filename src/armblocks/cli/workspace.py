@@ -75,7 +75,7 @@ def workspace(
         console.print(f"{title}: {text}", soft_wrap=True, highlight=False)
     shown = table(
         *(("measure", "left"), ("unit", "left"), ("least", "right")),
-        *(("median of the best", "right"), ("most", "right")),
+        *(("median of cell maxima", "right"), ("most", "right")),
     )
     for row in found.measure_rows():
         shown.add_row(*row)

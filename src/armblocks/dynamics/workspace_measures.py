@@ -3,7 +3,7 @@
 The coordinates follow from the number of a sample: those of an additive recurrence (a Kronecker sequence),
 ``u_k = frac(start + k step)``, with low discrepancy for steps that are linearly independent over the rational
 numbers. Source: Niederreiter, *Random Number Generation and Quasi-Monte Carlo Methods*, SIAM 1992, section
-3.1. So each sample is computed alone, in any thread.
+3.1. Each sample is therefore computed independently, in any thread.
 """
 
 from __future__ import annotations
@@ -177,7 +177,7 @@ def payload_capacity(robot: Robot, q: SX, loads: Sequence[SX], frame: str | None
     """The largest mass (kg) at the frame within the torque limits; ``loads``: torque, centre, qd, qdd.
 
     The torques are linear in the mass: ``tau = tau0 + m d``. The capacity is 0 where ``tau0`` alone exceeds a
-    limit, and infinite where no limited joint feels the payload.
+    limit, and infinite where the payload loads no joint with a limit.
     """
     limits, centre, qd, qdd = loads
     tree = regrouped(KinematicTree.of(robot)).with_tool_at(frame)

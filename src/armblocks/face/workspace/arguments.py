@@ -67,7 +67,7 @@ class SampledRanges:
                 "a range of a quaternion is given",
                 where=f"ranges of {where}",
                 allowed="ranges of angles and displacements; rotations of ball joints are uniform",
-                fix="leave out the coordinates of ball joints",
+                fix="omit the coordinates of ball joints",
             )
         return cls(low=np.array(low), width=np.array(width), notes=tuple(notes))
 

@@ -228,7 +228,7 @@ class WorkspaceCells(metaclass=ArgumentErrors):
     def __str__(self) -> str:
         lines = [f"workspace of {self.name}"]
         lines += [f"{title}: {text}" for title, text in self.facts()]
-        heads = ["measure", "unit", "least", "median of the best", "most"]
+        heads = ["measure", "unit", "least", "median of cell maxima", "most"]
         return "\n".join([*lines, *(text_table(heads, self.measure_rows()) if self.maps else ())])
 
     def __repr__(self) -> str:

@@ -64,7 +64,7 @@ def _page(workspace: WorkspaceCells, drawn: str) -> str:
         f'<tr><th scope="row">{escape(name)}</th>{"".join(f"<td>{escape(cell)}</td>" for cell in cells)}</tr>'
         for name, *cells in workspace.measure_rows()
     ]
-    heads = [("measure", ""), ("unit", ""), ("least", ""), ("median of the best", ""), ("most", "")]
+    heads = [("measure", ""), ("unit", ""), ("least", ""), ("median of cell maxima", ""), ("most", "")]
     table = html_table("Measures over all reached cells", heads, rows) if rows else ""
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{title}</title>'

@@ -72,7 +72,7 @@ def workspace_picture(
 def default_slices(workspace: WorkspaceCells) -> list[WorkspaceSlice]:
     """The slice through the base normal to y, and the one with the most cells normal to z.
 
-    Slices of a region that is a plane or a line are left out, unless none has an area.
+    Slices of a region that is a plane or a line are omitted, unless none has an area.
     """
     found: list[WorkspaceSlice] = []
     for normal, k in (("y", 1), ("z", 2), ("x", 0)):

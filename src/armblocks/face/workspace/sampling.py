@@ -62,10 +62,10 @@ def workspace(
     """The region that the tool reaches, with maps of ``measures``, from ``samples`` configurations.
 
     The configurations are uniform in the joint limits (quasi-random; ``seed`` selects the sequence), or in
-    ``ranges``, pairs (lowest, highest) by the name of the coordinate, rad or m. A rotation without limits
-    makes one turn, and a rotation of a ball joint is uniform. Samples beyond the limits of joints that
+    ``ranges``, pairs (lowest, highest) by the name of the coordinate, rad or m. A rotation without limits is
+    sampled over one turn, and a rotation of a ball joint is uniform. Samples beyond the limits of joints that
     couplings determine do not count. Positions of the tool, or of ``frame``, are counted in cubic cells of
-    the side ``cell`` (m). The samples are not kept; ``points`` of them are, for point clouds.
+    the side ``cell`` (m). Only the first ``points`` samples are stored, for point clouds.
 
     Measures, of which each cell has the largest, the smallest and the mean value:
 
