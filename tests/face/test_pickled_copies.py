@@ -95,6 +95,11 @@ def examples() -> Mapping[str, Any]:
         *(report, report.binding[0]),
         *(cycle, cycle.phases[0]),
         *(sizing, sizing.loads[0], sizing.loads[0].drive),
+        *(
+            ab.Measure("peak", "integrator"),
+            ab.uniform(0, 1),
+            ab.sweep(compiled, {"k": [1.0]}, stop_time=1.0),
+        ),
         *(diagram, small_builder(), compiled, ab.SimulationOptions(step=0.1), ab.formula("2*k")),
         *(result, result.final_state, system, system.point, system.margins(), system.transfer_function()),
         ab.diagram_difference(diagram, ab.load_diagram("kr180model")),
@@ -110,7 +115,8 @@ def examples() -> Mapping[str, Any]:
 def content(value: Any) -> object:
     """Return the whole content of a value, with the bytes of arrays."""
     if isinstance(value, np.ndarray):
-        return str(value.dtype), value.shape, value.tobytes()
+        texts = value.dtype.hasobject  # the bytes of such an array are addresses
+        return str(value.dtype), value.shape, value.tolist() if texts else value.tobytes()
     if isinstance(value, Mapping):
         return {key: content(entry) for key, entry in value.items()}
     if isinstance(value, tuple | list | set | frozenset):

@@ -29,7 +29,7 @@ VIOLATIONS = {
     "Only pictures imports matplotlib": ("face", "import matplotlib.pyplot", "matplotlib"),
     "Only pictures imports the encoders of films": ("face", "import PIL.Image", "PIL"),
     "Only algebra imports sympy": ("face", "import sympy", "sympy"),
-    "Only export and analysis import pandas, pyarrow and scipy": (
+    "Only export, sweeps.files and analysis import pandas, pyarrow and scipy": (
         "simulation",
         "def late():\n    from scipy.io import savemat",
         "scipy",

@@ -27,6 +27,7 @@ from armblocks.cli import (
     show,
     size,
     studio,
+    sweep,
     trim,
     workspace,
 )
@@ -66,6 +67,7 @@ app = typer.Typer(
     help="Industrial arms and block diagrams, traced once and compiled to native code.",
 )
 app.command("run")(run.run)
+app.command("sweep")(sweep.sweep)
 app.command("linearize")(linearize.linearize)
 app.command("trim")(trim.trim)
 app.command("diff")(diff.diff)

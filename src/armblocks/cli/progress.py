@@ -74,6 +74,14 @@ class FrameProgress(RunProgress):
         self._show(f"frame {frame:.0f} of {count:.0f}", frame / count)
 
 
+class SweepProgress(RunProgress):
+    """Displays the progress of a sweep: called with the number of computed runs, of all runs, the runs per
+    second and the remaining time, s."""
+
+    def __call__(self, done: float, runs: float, rate: float, remaining: float = 0.0) -> None:
+        self._show(f"run {done:,.0f} of {runs:,.0f}, {factor_text(rate)} runs/s", done / runs)
+
+
 def _duration(seconds: float) -> str:
     """A rounded duration: ``40 s``, ``3 min``, ``1.5 h``."""
     if seconds < 100.0:

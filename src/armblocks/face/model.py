@@ -57,8 +57,8 @@ class CompiledDiagram(metaclass=ArgumentErrors):
             return compile_system(self.system) if key is None else cached_system(key, lambda: self.system)
 
     @cached_property
-    def _signals_layout(self) -> Signature:
-        """The layout of the signals, with the names of joints and of signals."""
+    def signals_layout(self) -> Signature:
+        """The layout of a run's signals, with the names of joints and of signals."""
         layout = self.compiled.signals_layout
         entries = entry_names(self.diagram, {slot.name: slot.shape for slot in layout})
         return layout.with_entries(entries).with_titles(signal_titles(self.diagram))
@@ -79,7 +79,7 @@ class CompiledDiagram(metaclass=ArgumentErrors):
         tuned, values = self._tuned(parameters)
         options = with_settings(options or tuned.diagram.settings, settings)
         calls = called_functions(tuned.diagram, tuned.compiled)
-        run = Simulation(tuned.compiled, options, values, initial_state, log, calls, tuned._signals_layout)
+        run = Simulation(tuned.compiled, options, values, initial_state, log, calls, tuned.signals_layout)
         result = run_to_the_end(run, progress)
         if tuned._watch is None:
             tuned._watch = LimitWatch(tuned.diagram, result)
@@ -104,7 +104,7 @@ class CompiledDiagram(metaclass=ArgumentErrors):
         calls = called_functions(tuned.diagram, tuned.compiled)
         return DiagramRun(
             diagram,
-            Simulation(tuned.compiled, options, values, initial_state, log, calls, tuned._signals_layout),
+            Simulation(tuned.compiled, options, values, initial_state, log, calls, tuned.signals_layout),
         )
 
     def _tuned(

@@ -155,6 +155,11 @@ class NativeIntegrator:
         new.update_addresses()
         return new
 
+    @property
+    def address(self) -> int:
+        """The address of the native loop, for native code that runs it."""
+        return self._code.address("advance")
+
     def advance(self, addresses: tuple[int, ...], max_steps: int) -> Status:
         """Call the native loop. The call releases the interpreter lock."""
         return Status(self._advance(*addresses, max_steps))

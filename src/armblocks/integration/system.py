@@ -7,7 +7,7 @@ import dataclasses
 import json
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -205,6 +205,21 @@ class CompiledSystem:
         _ = self._signals, self._start_functions
         if tableau is not None:
             self.integrator(tableau)
+
+    @property
+    def addresses(self) -> Mapping[str, int]:
+        """The addresses of the functions of a run by name, for native code that calls them: ``signals``, and
+        those of the parameters: ``initial_states``, ``breakpoints`` …"""
+        functions = {**self._start_functions, "signals": self._signals}
+        return {
+            name: ctypes.cast(cast("Any", call), ctypes.c_void_p).value or 0
+            for name, call in functions.items()
+        }
+
+    @property
+    def breakpoint_count(self) -> int:
+        """The number of times at which sources jump."""
+        return self._breakpoint_count
 
     def initial_states(self, p: Vector) -> Vector:
         """``x(0)``, ``(nx,)``, for parameters ``p`` ``(np,)``."""

@@ -1,0 +1,208 @@
+"""``armblocks sweep``: runs a diagram with many combinations of parameters, and writes a table."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+
+from armblocks.cli.assignments import chosen_parameters, parse_value
+from armblocks.cli.completion import ModelName, ParameterSetName
+from armblocks.cli.progress import SweepProgress
+from armblocks.cli.terminal import STRONG, messages_console, results_console, table
+from armblocks.errors import InputError, counted
+
+if TYPE_CHECKING:
+    from armblocks import SweepResult
+
+_CALL = re.compile(r"(\w+)(?:\(([^()]*)\))?")
+_DISTRIBUTIONS = ("uniform", "loguniform", "normal", "seeds", "geomspace", "linspace")
+_ALLOWED = (
+    "first:last:count, a list 1,2,5, uniform(a,b), loguniform(a,b), normal(mean,deviation), seeds, or "
+    "geomspace(a,b,count)"
+)
+
+
+def sweep(
+    model: ModelName,
+    vary: Annotated[
+        list[str],
+        typer.Option(
+            metavar="BLOCK.PARAMETER=VALUES",
+            help="Vary a parameter; may be repeated. VALUES: first:last:count, a list 1,2,5, uniform(a,b), "
+            "loguniform(a,b), normal(mean,deviation) or seeds.",
+        ),
+    ],
+    measure: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[NAME=]MEASURE",
+            help="A measure of each run, such as overshoot(motor/speed, final=1); may be repeated.",
+        ),
+    ] = None,
+    keep: Annotated[
+        list[str] | None,
+        typer.Option(metavar="SIGNAL", help="Write the samples of this signal, too; may be repeated."),
+    ] = None,
+    runs: Annotated[int | None, typer.Option(help="Number of runs, with random parameters.")] = None,
+    design: Annotated[str | None, typer.Option(help="grid, paired, random, sobol, halton or latin.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the design.")] = 0,
+    stop_time: Annotated[
+        float | None, typer.Option(help="Simulated time, s.", show_default="the model's")
+    ] = None,
+    solver: Annotated[str | None, typer.Option(help="auto, or a solver of the documentation.")] = None,
+    step: Annotated[float | None, typer.Option(help="Step of a fixed-step solver, s.")] = None,
+    sample_time: Annotated[float | None, typer.Option(help="Interval of the samples, s.")] = None,
+    rtol: Annotated[float | None, typer.Option(help="Relative tolerance of an adaptive solver.")] = None,
+    atol: Annotated[float | None, typer.Option(help="Absolute tolerance of an adaptive solver.")] = None,
+    max_steps: Annotated[int | None, typer.Option(help="Maximum number of steps of a run.")] = None,
+    threads: Annotated[int | None, typer.Option(help="Number of threads.", show_default="all cores")] = None,
+    assignments: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="BLOCK.PARAMETER=VALUE", help="Change a parameter of all runs."),
+    ] = None,
+    parameter_set: ParameterSetName = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Write the table to this .parquet or .csv file; continues an interrupted sweep."),
+    ] = None,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Run the Python files that the diagram names.")
+    ] = False,
+) -> None:
+    """Run a diagram with many combinations of parameters, and print the measures of the runs."""
+    import armblocks as ab
+
+    diagram = ab.load_diagram(model, trust=trust)
+    settings = {"stop_time": stop_time, "solver": solver, "step": step, "sample_time": sample_time}
+    settings |= {"rtol": rtol, "atol": atol}
+    given: dict[str, Any] = {name: value for name, value in settings.items() if value is not None}
+    with SweepProgress(diagram.name, messages_console()) as progress:
+        result = ab.sweep(
+            diagram,
+            dict(_varied(text) for text in vary),
+            measures=dict(_named(text) for text in measure or ()),
+            keep=keep or (),
+            runs=runs,
+            design=design,
+            seed=seed,
+            parameters=chosen_parameters(diagram, parameter_set, assignments) or None,
+            max_steps=max_steps,
+            threads=threads,
+            out=out,
+            progress=progress,
+            **given,
+        )
+    print_sweep(result, results_console())
+    if not result.complete:
+        raise KeyboardInterrupt
+
+
+def _varied(text: str) -> tuple[str, Any]:
+    """The parameter and the values of one ``--vary``."""
+    path, equals, values = (part.strip() for part in text.partition("="))
+    if not (equals and path and values):
+        raise InputError(
+            f"'{text}' is not of the form block.parameter=values",
+            where="--vary",
+            allowed=_ALLOWED,
+            fix="write for example --vary load.mass=0:180:1000",
+        )
+    return path, _values(values, f"--vary {path}")
+
+
+def _values(text: str, where: str) -> Any:
+    import armblocks as ab
+
+    call = _CALL.fullmatch(text)
+    if call is not None and call[1] in _DISTRIBUTIONS:
+        arguments = [_number(part, where) for part in (call[2] or "").split(",") if part.strip()]
+        if call[1] in ("geomspace", "linspace") and len(arguments) == 3:
+            return getattr(ab, call[1])(*arguments[:2], int(arguments[2]))
+        if call[1] == "seeds":
+            return ab.seeds(*map(int, arguments))
+        return getattr(ab, call[1])(*arguments)
+    parts = text.split(":")
+    if len(parts) == 3:
+        first, last, count = (_number(part, where) for part in parts)
+        if count != int(count) or not 1 <= count <= 1e9:
+            raise InputError(
+                f"the number of values is {parts[2]}",
+                where=where,
+                allowed="first:last:count with an integer count of 1 or more",
+                fix="write for example 0:180:1000",
+            )
+        return ab.linspace(first, last, int(count))
+    return [parse_value(part.strip(), where) for part in _entries(text)]
+
+
+def _entries(text: str) -> list[str]:
+    """The parts of a list between commas outside of brackets."""
+    parts, depth = [""], 0
+    for character in text:
+        depth += (character in "([") - (character in ")]")
+        if character == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += character
+    return parts
+
+
+def _number(text: str, where: str) -> float:
+    value = parse_value(text.strip(), where)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(
+            f"'{text.strip()}' is not a number", where=where, allowed=_ALLOWED, fix="give a number"
+        )
+    return float(value)
+
+
+def _named(text: str) -> tuple[str, str]:
+    """The name and the text of a measure; without a name, the text is the name."""
+    name, equals, rest = text.partition("=")
+    if equals and "(" not in name:
+        return name.strip(), rest.strip()
+    return text.strip(), text.strip()
+
+
+def print_sweep(result: SweepResult, console: Console) -> None:
+    """Print the number of runs by status, and the range of each measure."""
+    import numpy as np
+
+    status = result["status"]
+    console.print(
+        f"{result.name}: {counted(len(status), 'run')}"
+        + ("" if result.complete else f" of {result.planned}"),
+        style=STRONG,
+    )
+    rows = table(("measure", "left"), ("least", "right"), ("median", "right"), ("mean", "right"))
+    rows.add_column("largest", justify="right")
+    rows.add_column("run", justify="right")
+    for name in result.measures:
+        values = result[name]
+        finite = values[np.isfinite(values)]
+        if finite.size:
+            numbers = (finite.min(), np.median(finite), finite.mean(), finite.max())
+            worst = str(result.largest(name)[0])
+            rows.add_row(name, *(f"{number:.6g}" for number in numbers), worst)
+    if rows.row_count:
+        console.print(rows)
+    _print_exceptions(result, console)
+    if result.remark:
+        console.print(result.remark, soft_wrap=True)
+    if result.path is not None:
+        place = result.path if result.complete else f"{result.path}.parts"
+        console.print(f"table: {place}", highlight=False, soft_wrap=True)
+
+
+def _print_exceptions(result: SweepResult, console: Console) -> None:
+    """Print the number of runs with each status other than completed, and the message of the first."""
+    status, numbers = result["status"], result["run"]
+    for kind in dict.fromkeys(status[status != "completed"].tolist()):
+        chosen: Sequence[int] = (status == kind).nonzero()[0].tolist()
+        message = result["message"][chosen[0]]
+        console.print(f"{kind}: {counted(len(chosen), 'run')}; run {numbers[chosen[0]]}: {message}")

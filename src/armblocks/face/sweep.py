@@ -1,0 +1,368 @@
+"""``sweep``: many runs of a diagram with different parameters, as one table."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+from time import perf_counter
+from typing import Any, Unpack, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks import interrupts
+from armblocks.diagram import Diagram, content_key, with_parameters
+from armblocks.diagram.function_content import UnknownContentError, function_parts
+from armblocks.equations import SimulationOptions
+from armblocks.errors import InputError
+from armblocks.face.model import CompiledDiagram, compile_diagram
+from armblocks.face.python_calls import called_functions
+from armblocks.face.settings import RunSettings, check_settings, takes_settings, with_settings
+from armblocks.face.sweep_parameters import RunParameters, Variant
+from armblocks.face.sweep_result import SweepResult, SweepSource
+from armblocks.simulation import SimulationResult
+from armblocks.sweeps.batch import RunProgram, RunRows
+from armblocks.sweeps.designs import make_design
+from armblocks.sweeps.files import SweepFile
+from armblocks.sweeps.measures import Measure, observe, signal_entries
+from armblocks.sweeps.scheduling import GroupsOf, RunGroup, Scheduler, default_threads
+from armblocks.sweeps.tables import Layout, concatenated
+
+SweepProgress = Callable[[int, int, float, float], None]
+"""Called with the number of computed runs, of all runs, the runs per second and the remaining time, s."""
+
+PART_SECONDS, PART_RUNS = 5.0, 100_000
+"""A part of the results is written after this time (s) or this number of runs."""
+PROGRESS_SECONDS = 0.1
+VERSION = "1"
+"""Version of the computation of the table, part of its identity."""
+
+
+@takes_settings
+@interrupts.kept()
+def sweep(
+    diagram: Diagram | CompiledDiagram | str | PathLike[str],
+    vary: object,
+    *,
+    measures: Mapping[str, Measure | str | Callable[[SimulationResult], float]] | None = None,
+    keep: Sequence[str] = (),
+    runs: int | None = None,
+    design: str | None = None,
+    seed: int = 0,
+    parameters: Mapping[str, object] | None = None,
+    max_steps: int | None = None,
+    threads: int | None = None,
+    out: str | PathLike[str] | None = None,
+    progress: SweepProgress | None = None,
+    **settings: Unpack[RunSettings],
+) -> SweepResult:
+    """Run a diagram with many combinations of parameters, and return a table with a row for each run.
+
+    ``vary``: ``{"block.parameter": values}``. Values are a list, an array, or a distribution:
+    :func:`uniform`, :func:`loguniform`, :func:`normal`, :func:`seeds`. Lists form a grid of all
+    combinations. With distributions ``runs`` is the number of runs, a multiple of the size of the grid, and
+    ``design`` is ``random``, ``sobol``, ``halton`` or ``latin``; ``seed`` determines the points. With
+    ``design="paired"``, or with a table or a list of mappings as ``vary``, each row is a run. Entries of
+    arrays are ``block.parameter[k]``. Parameters that are constants of the equations, such as robots and
+    sample times, are compiled for each combination.
+
+    ``measures``: by name, a :class:`Measure`, its text such as ``"overshoot(motor/speed, final=1)"``, or a
+    Python function of the result that returns a number. ``keep``: signals whose samples are kept in memory
+    or in the file. ``parameters``: values that all runs have. ``max_steps``: the maximum number of steps of
+    a run. ``threads``: by default the number of cores. The settings are those of :func:`simulate`.
+
+    ``out``: a ``.parquet`` or ``.csv`` file. The results are written during the sweep, and memory does not
+    grow with their number. If the sweep is interrupted, another call with the same arguments continues it.
+    ``progress(done, runs, rate, remaining)`` is called about ten times a second. Ctrl-C returns the runs that
+    are done.
+
+    A run has the same bits as the same run alone with :func:`simulate`, for any number of threads. Runs that
+    fail are rows with their messages. Raises ``UnknownNameError``, ``DiagramError`` and ``InputError`` for
+    invalid arguments, also where ``out`` has the results of another sweep.
+    """
+    check_settings(settings, sweep)
+    model = diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)
+    if parameters:
+        model = CompiledDiagram(with_parameters(model.diagram, parameters))
+    _check_numbers(max_steps, threads)
+    options = with_settings(model.diagram.settings, settings)
+    functions, named = _split(measures or {})
+    all_parameters = RunParameters(model, make_design(vary, runs, design, seed))
+    programs = _Programs(options, list(named.values()), list(functions.values()), keep, max_steps)
+    layout, time = programs.layout(all_parameters, (*named, *functions), text_file=_is_csv(out))
+    file = None
+    if out is not None:
+        content = all_parameters.digest
+        identity = _identity(model.diagram, options, content, named, functions, layout.kept, max_steps)
+        file = SweepFile(Path(out), identity, layout.texts)
+    called = functions or any(variant.model.compiled.called for variant in all_parameters.variants)
+    groups = programs.groups_of(all_parameters)
+    collected = _Collected(layout, file, progress)
+    complete = collected.collect(Scheduler(groups, 1 if called else threads or default_threads()))
+    return SweepResult(
+        name=model.diagram.name,
+        names=layout.names,
+        measures=layout.measures,
+        kept=layout.kept,
+        time=time,
+        planned=layout.design.count,
+        complete=complete,
+        remark=_remark(programs, all_parameters, collected.general, functions),
+        columns={} if file is not None else concatenated(collected.parts, layout),
+        file=file,
+        source=SweepSource(model=model, options=options, design=layout.design),
+    )
+
+
+class _Programs:
+    """The program of each model of a sweep."""
+
+    def __init__(
+        self,
+        options: SimulationOptions,
+        measures: Sequence[Measure],
+        functions: Sequence[Callable[[SimulationResult], float]],
+        keep: Sequence[str],
+        max_steps: int | None,
+    ) -> None:
+        self._options = options
+        self._measures = measures
+        self._functions = functions
+        self._keep = (keep,) if isinstance(keep, str) else tuple(keep)
+        self._max_steps = max_steps
+        self._known: dict[int, tuple[CompiledDiagram, RunProgram]] = {}
+
+    def layout(
+        self, parameters: RunParameters, names: tuple[str, ...], *, text_file: bool
+    ) -> tuple[Layout, NDArray[np.float64]]:
+        """The layout of the table, and the sample times ``(N,)``, s."""
+        first = parameters.variants[0]
+        times = self.of(first).plan.sample_times
+        layout = Layout(
+            design=parameters.design,
+            measures=names,
+            kept=self.kept(first),
+            samples=times.count,
+            text_file=text_file,
+        )
+        return layout, times.part(0, times.count)
+
+    def groups_of(self, parameters: RunParameters) -> GroupsOf:
+        """The function that returns the groups of a range of runs."""
+
+        def groups(begin: int, end: int) -> list[RunGroup]:
+            return [
+                RunGroup(program=self.of(variant), places=places, parameters=p)
+                for variant, places, p in parameters.groups(begin, end)
+            ]
+
+        return groups
+
+    def kept(self, variant: Variant) -> tuple[str, ...]:
+        """The names of all kept scalars."""
+        model = variant.model
+        layout, aliases = model.signals_layout, model.compiled.aliases
+        return tuple(entry for name in self._keep for entry in signal_entries(name, layout, aliases))
+
+    def of(self, variant: Variant) -> RunProgram:
+        """The program of a variant's model."""
+        model = variant.model
+        entry = self._known.get(id(model))
+        if entry is None:
+            compiled, layout = model.compiled, model.signals_layout
+            observation = observe(self._measures, self.kept(variant), layout, compiled.aliases)
+            calls = called_functions(model.diagram, compiled)
+            program = RunProgram(
+                compiled,
+                self._options,
+                observation,
+                self._functions,
+                calls=calls,
+                max_steps=self._max_steps,
+                layout=layout,
+            )
+            # The reference keeps the model alive, so that its id stays unique.
+            entry = self._known[id(model)] = (model, program)
+        return entry[1]
+
+    @property
+    def general_reason(self) -> str:
+        """Why no run is computed by the native loop over runs; empty if it is used."""
+        programs = [program for _, program in self._known.values()]
+        if any(program.calls for program in programs):
+            return "the model calls Python functions"
+        return "" if all(program.native for program in programs) else "the runs have no duration"
+
+
+class _Collected:
+    """Collects the rows of a sweep in memory, or writes them to its files."""
+
+    def __init__(self, layout: Layout, file: SweepFile | None, progress: SweepProgress | None) -> None:
+        self._layout = layout
+        self._file = file
+        self._progress = progress
+        self._count = layout.design.count
+        self._done = self._before = 0
+        self._started = self._reported = perf_counter()
+        self._pending: list[dict[str, Any]] = []
+        self._pending_runs, self._written = 0, perf_counter()
+        self.parts: list[dict[str, Any]] = []
+        self.general = 0
+
+    def collect(self, scheduler: Scheduler) -> bool:
+        """Compute all missing runs; returns whether all are done. Ctrl-C ends early."""
+        file = self._file
+        if file is not None and file.complete:
+            return True
+        if file is None:
+            ranges: Iterator[tuple[int, int]] = iter([(0, self._count)])
+        else:
+            self._done = self._before = sum(end - begin for begin, end in file.done)
+            ranges = file.missing(self._count)
+        try:
+            expected = -1
+            for begin, rows in scheduler.rows(ranges):
+                if begin != expected:
+                    self._write()
+                self._add(begin, rows)
+                expected = begin + rows.status.size
+        except KeyboardInterrupt:
+            interrupts.answered()
+            self._write()
+            return False
+        self._write()
+        if file is not None:
+            file.finish()
+        self._report()
+        return True
+
+    def _add(self, begin: int, rows: RunRows) -> None:
+        columns = self._layout.columns(begin, rows)
+        self.general += rows.general
+        count = rows.status.size
+        self._done += count
+        now = perf_counter()
+        if self._file is None:
+            self.parts.append(columns)
+        else:
+            self._pending.append(columns)
+            self._pending_runs += count
+            if self._pending_runs >= PART_RUNS or now - self._written >= PART_SECONDS:
+                self._write()
+        if now - self._reported >= PROGRESS_SECONDS and self._done < self._count:
+            self._report()
+
+    def _write(self) -> None:
+        """Write the pending rows as one part."""
+        if self._file is not None and self._pending:
+            columns = concatenated(self._pending, self._layout)
+            self._file.append(int(columns["run"][0]), columns)
+        self._pending, self._pending_runs, self._written = [], 0, perf_counter()
+
+    def _report(self) -> None:
+        self._reported = perf_counter()
+        if self._progress is None:
+            return
+        rate = (self._done - self._before) / max(1e-9, self._reported - self._started)
+        remaining = (self._count - self._done) / rate if rate > 0.0 else 0.0
+        self._progress(self._done, self._count, rate, remaining)
+
+
+def _is_csv(out: str | PathLike[str] | None) -> bool:
+    return out is not None and Path(out).suffix.lower() == ".csv"
+
+
+def _split(
+    measures: Mapping[str, Measure | str | Callable[[SimulationResult], float]],
+) -> tuple[dict[str, Callable[[SimulationResult], float]], dict[str, Measure]]:
+    """The Python functions, and the other measures."""
+    functions: dict[str, Callable[[SimulationResult], float]] = {}
+    named: dict[str, Measure] = {}
+    for name, measure in measures.items():
+        if isinstance(measure, str):
+            named[name] = Measure.parse(measure)
+        elif isinstance(measure, Measure):
+            named[name] = measure
+        elif callable(measure):
+            functions[name] = measure
+        else:
+            raise InputError(
+                f"the measure '{name}' is a {type(cast('object', measure)).__name__}",
+                allowed="a Measure, its text, or a function of the result",
+                where="sweep",
+                fix="write for example measures={'peak': 'peak(plant/y)'}",
+            )
+    return functions, named
+
+
+def _check_numbers(max_steps: int | None, threads: int | None) -> None:
+    for name, number in (("max_steps", max_steps), ("threads", threads)):
+        if number is not None and (isinstance(number, bool) or number < 1):
+            raise InputError(
+                f"{name} is {number!r}, not an integer above 0",
+                allowed="1, 2, 3 …",
+                where="sweep",
+                fix=f"omit {name}",
+            )
+
+
+def _identity(
+    diagram: Diagram,
+    options: SimulationOptions,
+    design: str,
+    named: Mapping[str, Measure],
+    functions: Mapping[str, Callable[[SimulationResult], float]],
+    kept: Sequence[str],
+    max_steps: int | None,
+) -> dict[str, str]:
+    """Digests of everything that the table depends on."""
+    key = content_key(diagram)
+    if key is None or not design:
+        raise InputError(
+            "the model has Python code of unknown content, such as an imported module",
+            allowed="models whose content has a digest",
+            where=diagram.name,
+            fix="omit out=, and save the result",
+        )
+    try:
+        code = {name: _digest(function_parts(function)) for name, function in functions.items()}
+    except UnknownContentError as error:
+        raise InputError(
+            f"a measure uses Python code of unknown content ({error})",
+            allowed="functions of their arguments, NumPy and constants",
+            where="sweep",
+            fix="omit out=, and save the result",
+        ) from None
+    return {
+        "model": key,
+        "settings": _digest([dataclasses.asdict(options), max_steps]),
+        "design": design,
+        "measures": _digest([(name, str(measure)) for name, measure in named.items()], code, kept),
+        "version": VERSION,
+    }
+
+
+def _digest(*values: object) -> str:
+    return hashlib.sha256(repr(values).encode()).hexdigest()
+
+
+def _remark(
+    programs: _Programs,
+    parameters: RunParameters,
+    general: int,
+    functions: Mapping[str, object],
+) -> str:
+    """What was not computed by the native loop over runs, and why."""
+    parts: list[str] = []
+    reason = f"the measure '{next(iter(functions))}' is a Python function" if functions else ""
+    reason = reason or programs.general_reason
+    if reason:
+        parts.append(f"all runs one after the other, because {reason}")
+    elif general:
+        parts.append(f"{general} runs one after the other, because they failed, were stiff or long")
+    if parameters.recompiled:
+        parts.append(f"{parameters.recompiled} models compiled, because constants of the equations vary")
+    return "; ".join(parts)

@@ -1,0 +1,162 @@
+"""The result of a sweep: a table with a row for each run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.argument_errors import ArgumentErrors
+from armblocks.equations import SimulationOptions
+from armblocks.errors import InputError, UnknownNameError, counted
+from armblocks.face.model import CompiledDiagram
+from armblocks.face.sweep_parameters import values_of_run
+from armblocks.simulation import SimulationResult
+from armblocks.sweeps.batch import COMPLETED, STATUSES
+from armblocks.sweeps.designs import Design
+from armblocks.sweeps.files import SweepFile, to_dataframe, write_table
+from armblocks.sweeps.tables import STATUS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SweepSource:
+    """The model, the settings and the design of a sweep, which compute a run again."""
+
+    model: CompiledDiagram
+    options: SimulationOptions
+    design: Design
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class SweepResult(metaclass=ArgumentErrors):
+    """The table of a sweep, from :func:`armblocks.sweep`. ``result["name"]`` is a column, ``(runs,)``.
+
+    Columns: ``run`` (the number from 0), the varied parameters, ``status`` (``completed``, ``stopped`` by a
+    block, ``failed``, ``step limit``), ``message`` (for a run that was not completed), the measures (NaN for
+    runs that failed or reached the limit), ``steps``, ``events`` and ``end_time`` (s). ``kept`` names the
+    signals whose samples are kept: ``result[name]`` is ``(runs, N)`` at ``time (N,)`` s, NaN after the end of
+    a run.
+
+    ``complete``: whether all runs were computed; Ctrl-C ends a sweep early. ``planned``: their number.
+    ``remark``: what the sweep did not compute in the fast way, and why.
+    """
+
+    name: str
+    names: tuple[str, ...]
+    measures: tuple[str, ...]
+    kept: tuple[str, ...]
+    time: NDArray[np.float64]
+    planned: int
+    complete: bool
+    remark: str = ""
+    columns: Mapping[str, Array] = field(default_factory=dict[str, Array])
+    file: SweepFile | None = None
+    source: SweepSource
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self.names and name not in self.kept:
+            raise UnknownNameError("column", name, (*self.names, *self.kept), where=self.name)
+        if name not in self.columns and self.file is not None:
+            return self.file.read((name,))[name]
+        return self.columns[name]
+
+    def __len__(self) -> int:
+        """The number of computed runs."""
+        return len(self["run"])
+
+    @property
+    def path(self) -> Path | None:
+        """The path of the table's file, if any."""
+        return None if self.file is None else self.file.path
+
+    @property
+    def failed(self) -> NDArray[np.int64]:
+        """The numbers of the runs that failed or reached the limit of steps."""
+        status = self[STATUS]
+        return self["run"][(status == STATUSES[2]) | (status == STATUSES[3])]
+
+    def parameters(self, run: int) -> Mapping[str, Any]:
+        """The parameters of one run, ``{"block.parameter": value}``, for :func:`armblocks.simulate`."""
+        self._check_run(run)
+        return values_of_run(self.source.model.diagram, self.source.design, run)
+
+    def run(self, run: int) -> SimulationResult:
+        """Compute one run again with all signals: the same bits as in the sweep.
+
+        Raises ``InputError`` for a number that does not exist, ``SimulationError`` for a run that fails.
+        """
+        self._check_run(run)
+        return self.source.model.simulate(self.source.options, parameters=self.parameters(run))
+
+    def _check_run(self, run: int) -> None:
+        if not 0 <= run < self.planned:
+            raise InputError(
+                f"run {run} does not exist",
+                where=self.name,
+                allowed=f"0 to {self.planned - 1}",
+                fix="choose a number of the column 'run'",
+            )
+
+    def largest(self, name: str, count: int = 1) -> NDArray[np.int64]:
+        """The numbers of the runs with the largest values of a column, the largest first; without NaN."""
+        return self._extreme(name, count, -1.0)
+
+    def smallest(self, name: str, count: int = 1) -> NDArray[np.int64]:
+        """The numbers of the runs with the smallest values of a column, the smallest first; without NaN."""
+        return self._extreme(name, count, 1.0)
+
+    def _extreme(self, name: str, count: int, sign: float) -> NDArray[np.int64]:
+        values = self[name]
+        if values.dtype == object or values.ndim != 1:
+            raise InputError(
+                f"the column '{name}' has no numbers",
+                where=self.name,
+                allowed=", ".join(self.measures) or "the parameters",
+                fix="choose a measure",
+            )
+        order = np.argsort(sign * values, kind="stable")
+        order = order[~np.isnan(values[order].astype(np.float64))]
+        return self["run"][order[:count]]
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """The table as a pandas data frame with the index ``run``; without kept samples."""
+        return to_dataframe(self._all())
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the table to a ``.parquet`` or ``.csv`` file, atomically; without kept samples.
+
+        Raises ``UnknownNameError`` for another suffix, ``FormatError``.
+        """
+        write_table(Path(path), self._all())
+
+    def _all(self) -> Mapping[str, Array]:
+        return {name: self[name] for name in self.names} if self.file is None else self.file.read(self.names)
+
+    def __repr__(self) -> str:
+        status = self[STATUS]
+        counts = {name: int((status == name).sum()) for name in STATUSES}
+        parts = [f"{count} {name}" for name, count in counts.items() if count and name != COMPLETED]
+        head = f"{self.name}: {counted(len(status), 'run')}"
+        if not self.complete:
+            head += f" of {self.planned}, INCOMPLETE"
+        lines = [f"<SweepResult {', '.join([head, *parts])}>"]
+        lines += [f"  {self.remark}"] if self.remark else []
+        width = max((len(name) for name in self.measures), default=0)
+        for name in self.measures:
+            values = self[name]
+            finite = values[np.isfinite(values)]
+            text = "no finite values"
+            if finite.size:
+                text = f"{finite.min():.6g} to {finite.max():.6g}, median {np.median(finite):.6g}"
+            lines.append(f"  {name:<{width}}  {text}")
+        return "\n".join(lines)
