@@ -1,4 +1,4 @@
-"""The operations of the compiled equations of two arms, which general joints must not increase.
+"""The operations of the compiled equations of three arms, which general joints must not increase.
 
 They are those of the table in ``benchmarks/RESULTS.md``. A change of the numbers is a change of the speed: a
 lower number may replace a higher one here, with the table.
@@ -25,6 +25,9 @@ COUNTS = {
     ("kr180", "gravload"): (6, 1, 4, 0, 4),
     ("kr180", "coriolis"): (102, 34, 79, 0, 6),
     ("kr180", "accel"): (80, 49, 78, 3, 6),
+    ("kr180_2_pa", "rne"): (62, 21, 62, 0, 8),
+    ("kr180_2_pa", "inertia"): (23, 29, 19, 0, 6),
+    ("kr180_2_pa", "gravload"): (7, 5, 6, 0, 6),
 }
 """Multiplies, adds, fused multiply-adds, divisions, elementary functions, of the robots without friction."""
 

@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
+from armblocks.dynamics.coupled_parameters import regrouped_by_couplings
+from armblocks.robot.robot import Robot
 from armblocks.robot.tree import BASE, Body, KinematicTree
 from armblocks.spatial import Transform, transl
 from armblocks.spatial.inertia import NO_INERTIA, RigidInertia
 from armblocks.spatial.vectors import ZERO, Symmetric
+
+
+@lru_cache(maxsize=64)
+def base_parameter_tree(robot: Robot) -> KinematicTree:
+    """The tree of a robot with regrouped parameters, for functions of its independent coordinates."""
+    tree = regrouped(KinematicTree.of(robot))
+    return regrouped_by_couplings(tree, robot) if robot.couplings else tree
 
 
 def regrouped(tree: KinematicTree) -> KinematicTree:

@@ -14,7 +14,7 @@ import numpy as np
 from casadi import SX
 
 from armblocks.dynamics.actuation import of_motors
-from armblocks.dynamics.base_parameters import regrouped
+from armblocks.dynamics.base_parameters import base_parameter_tree
 from armblocks.dynamics.constrained import constrained_motion
 from armblocks.dynamics.crba import crba
 from armblocks.dynamics.energy import kinetic_energy, potential_energy
@@ -63,8 +63,8 @@ class _Links:
         self.robot = robot
         index = {link.name: k for k, link in enumerate(robot.links)}
         self._indices = [index[name] for name in names]
-        self._whole = KinematicTree.of(replace(robot, links=rest))
-        self._tree = regrouped(self._whole)
+        without = replace(robot, links=rest)
+        self._whole, self._tree = KinematicTree.of(without), base_parameter_tree(without)
         self.slots = (Slot("parameters", (len(names), 10), "kg, m, kg m2"),)
 
     def tree(self, parameters: SX, *, whole: bool = False) -> KinematicTree:

@@ -13,7 +13,7 @@ import numpy as np
 from casadi import SX, dot, if_else, logic_and, logic_or, mtimes, sign, vertcat
 from numpy.typing import NDArray
 
-from armblocks.dynamics.base_parameters import regrouped
+from armblocks.dynamics.base_parameters import base_parameter_tree
 from armblocks.dynamics.crba import FactoredInertia, SquareMatrix, crba
 from armblocks.dynamics.forward import check_accelerations_exist
 from armblocks.dynamics.joint_motion import entries, joint_motions
@@ -25,7 +25,6 @@ from armblocks.dynamics.springs import spring_torques
 from armblocks.errors import RobotError, counted
 from armblocks.robot.link import Motor
 from armblocks.robot.robot import Robot
-from armblocks.robot.tree import KinematicTree
 
 TORQUE_TOLERANCE = 1e-9
 """A torque against the sliding direction is significant if it exceeds this fraction of the friction."""
@@ -114,7 +113,7 @@ class JointEquations:
     def __init__(
         self, robot: Robot, q: SX, qd: SX, wrench: SX | None = None, payload: SX | None = None
     ) -> None:
-        tree = regrouped(KinematicTree.of(robot))
+        tree = base_parameter_tree(robot)
         check_accelerations_exist(tree if payload is None else with_payload(tree, _GENERIC_PAYLOAD))
         on_bodies = None if wrench is None else tip_wrench(tree, wrench)
         if payload is not None:

@@ -19,7 +19,7 @@ import numpy as np
 from casadi import SX, Function, fabs, fmax, if_else, jtimes, mtimes, vertcat
 
 from armblocks.dynamics.ball_joints import integrated, position_rates
-from armblocks.dynamics.base_parameters import regrouped
+from armblocks.dynamics.base_parameters import base_parameter_tree
 from armblocks.dynamics.constrained import (
     MAX_RESIDUAL,
     POSITION_STEPS,
@@ -56,7 +56,7 @@ class MechanismEquations:
     def __init__(
         self, robot: Robot, q: SX, qd: SX, wrench: SX | None, payload: SX | None, near: Array | None
     ) -> None:
-        tree = regrouped(KinematicTree.of(robot))
+        tree = base_parameter_tree(robot)
         on_bodies = None if wrench is None else tip_wrench(tree, wrench)
         if payload is not None:
             tree = with_payload(tree, payload)

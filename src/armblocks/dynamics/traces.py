@@ -29,7 +29,7 @@ from armblocks.dynamics.ball_joints import (
     position_rates,
     structure_matrix,
 )
-from armblocks.dynamics.base_parameters import regrouped
+from armblocks.dynamics.base_parameters import base_parameter_tree, regrouped
 from armblocks.dynamics.closed_form.trace import trace_branches
 from armblocks.dynamics.constrained import constrained_motion, restoring_rates
 from armblocks.dynamics.crba import crba
@@ -135,7 +135,7 @@ def trace_manipulability(robot: Robot) -> TracedFunction:
 @of_motors
 def trace_rne(robot: Robot) -> TracedFunction:
     """``tau (n,)`` of a motion, with rigid bodies, rotors, friction, springs and the robot's gravity."""
-    tree = regrouped(KinematicTree.of(robot))
+    tree = base_parameter_tree(robot)
 
     def equations(q: SX, qd: SX, qdd: SX) -> SX:
         rates, accelerations = entries(qd), entries(qdd)
@@ -149,7 +149,7 @@ def trace_rne(robot: Robot) -> TracedFunction:
 @of_motors
 def trace_rne_loaded(robot: Robot) -> TracedFunction:
     """``tau (n,)`` as ``rne``, with a wrench at the tip and a payload at the tool."""
-    tree = regrouped(KinematicTree.of(robot))
+    tree = base_parameter_tree(robot)
 
     def equations(q: SX, qd: SX, qdd: SX, wrench: SX, payload: SX) -> SX:
         rates, accelerations = entries(qd), entries(qdd)
@@ -167,7 +167,7 @@ def trace_rne_loaded(robot: Robot) -> TracedFunction:
 @of_motors
 def trace_gravload(robot: Robot) -> TracedFunction:
     """``tau (n,)`` that holds the arm at rest against gravity and its springs."""
-    tree = regrouped(KinematicTree.of(robot))
+    tree = base_parameter_tree(robot)
 
     def equations(q: SX) -> SX:
         no_motion = [0.0] * tree.n
@@ -218,7 +218,7 @@ def _joint_wrenches(robot: Robot, inputs: Sequence[str], near: Array | None) -> 
 
 def trace_inertia(robot: Robot) -> TracedFunction:
     """``M (n, n)``: joint-space inertia, rotors included; kg m2, kg m or kg."""
-    tree = regrouped(KinematicTree.of(robot))
+    tree = base_parameter_tree(robot)
     bodies = body_of_speed(tree)
 
     def equations(q: SX) -> SX:
@@ -236,7 +236,7 @@ def trace_coriolis(robot: Robot) -> TracedFunction:
     With ball joints, whose speeds are not rates of coordinates, the symbols are those of the same connection
     in these speeds: ``C = (dc/dqd + M W) / 2`` with W of :func:`structure_matrix`.
     """
-    tree = regrouped(KinematicTree.of(robot))
+    tree = base_parameter_tree(robot)
     bodies = body_of_speed(tree)
 
     def equations(q: SX, qd: SX) -> SX:
@@ -274,8 +274,8 @@ def trace_accel(robot: Robot, near: Array | None = None) -> TracedFunction:
     ``near``: coordinates near which closures are assembled to find their independent relations. Raises
     RobotError that names the joint if the inertia at a joint is zero.
     """
-    tree = regrouped(KinematicTree.of(robot))
-    check_accelerations_exist(tree)
+    tree = base_parameter_tree(robot)
+    check_accelerations_exist(regrouped(KinematicTree.of(robot)))
 
     def equations(q: SX, qd: SX, tau: SX) -> SX:
         if robot.constraints:
@@ -294,9 +294,9 @@ def trace_accel_loaded(robot: Robot, near: Array | None = None) -> TracedFunctio
 
     Raises RobotError that names the joint if the inertia at a joint is zero for every payload.
     """
-    tree = regrouped(KinematicTree.of(robot))
+    tree = base_parameter_tree(robot)
     generic_payload = SX([1.0, 0.1, 0.2, 0.3, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
-    check_accelerations_exist(with_payload(tree, generic_payload))
+    check_accelerations_exist(with_payload(regrouped(KinematicTree.of(robot)), generic_payload))
 
     def equations(q: SX, qd: SX, tau: SX, wrench: SX, payload: SX) -> SX:
         loaded, wrenches = with_payload(tree, payload), tip_wrench(tree, wrench)
@@ -336,7 +336,7 @@ def trace_constrained_motion(robot: Robot, near: Array | None = None) -> TracedF
 
 def trace_kinetic_energy(robot: Robot) -> TracedFunction:
     """``energy ()``, J, kinetic energy of bodies and rotors."""
-    tree = regrouped(KinematicTree.of(robot))
+    tree = base_parameter_tree(robot)
 
     def equations(q: SX, qd: SX) -> SX:
         return SX(kinetic_energy(tree, joint_motions(tree, q), entries(qd)))
