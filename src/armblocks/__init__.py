@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from armblocks.face.arm import Arm
     from armblocks.face.assembly import Assembly
     from armblocks.face.block_examples import block_example
+    from armblocks.face.collisions.check import collisions
+    from armblocks.face.collisions.obstacles import Box, Cylinder, Plane, Sphere
+    from armblocks.face.collisions.report import CollisionPair, CollisionReport
     from armblocks.face.diagram_run import DiagramRun
     from armblocks.face.diagrams import (
         list_blocks,
@@ -115,9 +118,13 @@ else:
             "Assembly": "armblocks.face.assembly",
             "Attachment": "armblocks.robot",
             "BindingInterval": "armblocks.face.trajectory_report",
+            "Box": "armblocks.face.collisions.obstacles",
+            "CollisionPair": "armblocks.face.collisions.report",
+            "CollisionReport": "armblocks.face.collisions.report",
             "CompiledDiagram": "armblocks.face.model",
             "Coupling": "armblocks.robot",
             "CyclePhase": "armblocks.face.pick_and_place",
+            "Cylinder": "armblocks.face.collisions.obstacles",
             "Cylindrical": "armblocks.robot",
             "CylindricalClosure": "armblocks.robot",
             "DhRow": "armblocks.robot",
@@ -149,6 +156,7 @@ else:
             "PickAndPlaceCycle": "armblocks.face.pick_and_place",
             "Planar": "armblocks.robot",
             "PlanarClosure": "armblocks.robot",
+            "Plane": "armblocks.face.collisions.obstacles",
             "PointOnLine": "armblocks.robot",
             "PointOnPlane": "armblocks.robot",
             "Prismatic": "armblocks.robot",
@@ -162,6 +170,7 @@ else:
             "SimulationOptions": "armblocks.equations",
             "SimulationResult": "armblocks.simulation",
             "SizingReport": "armblocks.face.sizing",
+            "Sphere": "armblocks.face.collisions.obstacles",
             "Spherical": "armblocks.robot",
             "SphericalClosure": "armblocks.robot",
             "SweepResult": "armblocks.face.sweep_result",
@@ -177,6 +186,7 @@ else:
             "begin": "armblocks.face.model",
             "block_example": "armblocks.face.block_examples",
             "blocks": "armblocks.blocks",
+            "collisions": "armblocks.face.collisions.check",
             "compile_diagram": "armblocks.face.model",
             "ctraj": "armblocks.face.toolbox_trajectories",
             "dexterity": "armblocks.face.workspace.dexterity",
@@ -242,9 +252,13 @@ __all__ = [
     "Assembly",
     "Attachment",
     "BindingInterval",
+    "Box",
+    "CollisionPair",
+    "CollisionReport",
     "CompiledDiagram",
     "Coupling",
     "CyclePhase",
+    "Cylinder",
     "Cylindrical",
     "CylindricalClosure",
     "DhRow",
@@ -276,6 +290,7 @@ __all__ = [
     "PickAndPlaceCycle",
     "Planar",
     "PlanarClosure",
+    "Plane",
     "PointOnLine",
     "PointOnPlane",
     "Prismatic",
@@ -289,6 +304,7 @@ __all__ = [
     "SimulationOptions",
     "SimulationResult",
     "SizingReport",
+    "Sphere",
     "Spherical",
     "SphericalClosure",
     "SweepResult",
@@ -304,6 +320,7 @@ __all__ = [
     "begin",
     "block_example",
     "blocks",
+    "collisions",
     "compile_diagram",
     "ctraj",
     "dexterity",

@@ -65,7 +65,15 @@ def examples() -> Mapping[str, Any]:
     phase = ab.CyclePhase(name="grip", start=0.0, end=1.0, loaded=True)
     cycle = ab.PickAndPlaceCycle(trajectory=ab.jtraj([0, 0], [1, 1], 5), phases=(phase,))
     region = ab.workspace(arm, 50)
+    obstacles = (
+        ab.Box(size=(1, 1, 1)),
+        ab.Sphere(radius=1),
+        ab.Cylinder(radius=1, length=1),
+        ab.Plane(point=(0, 0, -9)),
+    )
+    contacts = ab.collisions(arm, [0.0, 0.0], obstacles)
     values = [
+        *(contacts, contacts.pairs[0], *obstacles),
         *(region, region.maps["manipulability"], region.slice("y")),
         *(arm, robot, robot.links[0], ab.Motor(inertia=1.0), ab.Revolute(), ab.Prismatic(), ab.Fixed()),
         *(

@@ -1,0 +1,1 @@
+"""Collisions of an arm with itself and with obstacles along a motion."""
