@@ -53,6 +53,33 @@ def test_a_cycle_reaches_its_poses_on_vertical_lines_within_the_limits() -> None
     assert "transfer, loaded" in str(cycle) and "cycle time" in str(cycle)
 
 
+def test_reports_of_a_cycle_have_the_payload_in_its_loaded_phases_only() -> None:
+    arm = ab.load_robot("puma560")
+    cycle = ab.pick_and_place(arm, Q0, pose(0.5, -0.3, 0.4), pose(0.5, 0.3, 0.5), payload=6.0, **LIMITS)
+    report = ab.trajectory_report(arm, cycle, payload=6.0, **LIMITS)
+    moving = np.abs(report.qd).max(axis=1) > 1e-9  # at rest, rounding errors decide the sign of friction
+    assert report.ratios[moving].max() < 1.005
+    always = ab.trajectory_report(arm, cycle.trajectory, payload=6.0, **LIMITS)
+    assert always.ratios[np.abs(always.qd).max(axis=1) > 1e-9].max() > 1.05
+    retract = cycle.phases[-1]
+    empty = (report.time > retract.start + 1e-6) & (report.time < retract.end)
+    motion = report.q[empty], report.qd[empty], report.qdd[empty]
+    assert_allclose(report.tau[empty], arm.rne(*motion), rtol=1e-12, atol=1e-9)
+    loaded = (report.time > cycle.phases[1].start) & (report.time < cycle.phases[2].end)
+    motion = report.q[loaded], report.qd[loaded], report.qdd[loaded]
+    assert_allclose(report.tau[loaded], arm.rne(*motion, payload=6.0), rtol=1e-12)
+    none = ab.trajectory_report(arm, cycle, **LIMITS)
+    assert_allclose(none.tau, arm.rne(none.q, none.qd, none.qdd), rtol=1e-12)
+    drive = ab.Drive(name="a", gear_ratio=100.0, stall_torque=5.0, max_speed=500.0)
+    phases, whole = (
+        ab.size_drives(arm, motion, [drive], payload=6.0) for motion in (cycle, cycle.trajectory)
+    )
+    assert phases.cycle_time == whole.cycle_time
+    pairs = list(zip(phases.loads, whole.loads))
+    assert all(one.holding_torque <= two.holding_torque * (1 + 1e-12) for one, two in pairs)
+    assert all(one.rms_torque < two.rms_torque for one, two in pairs[1:3])
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -15,6 +15,7 @@ from armblocks.argument_errors import ArgumentErrors
 from armblocks.errors import InputError, RobotError, UnknownNameError, counted
 from armblocks.face.arm import Arm
 from armblocks.face.payload import Payload
+from armblocks.face.pick_and_place import PickAndPlaceCycle
 from armblocks.face.trajectory import JointTrajectory
 from armblocks.face.trajectory_report import motion_with_torques, save_picture, text_table
 from armblocks.files import write_atomically
@@ -125,7 +126,7 @@ class SizingReport(metaclass=ArgumentErrors):
 
 def size_drives(
     arm: Arm,
-    trajectory: JointTrajectory,
+    trajectory: JointTrajectory | PickAndPlaceCycle,
     drives: Sequence[Drive],
     *,
     payload: Payload | float | None = None,
@@ -133,6 +134,8 @@ def size_drives(
     brakes_in_pause: bool = False,
 ) -> SizingReport:
     """Compare candidate motors and gears for a cycle: the trajectory and a ``pause`` (s) at its end.
+
+    In a cycle of :func:`~armblocks.pick_and_place` the payload is at the tool only in the loaded phases.
 
     The torque of a motor is the torque of gravity and of the rigid bodies with the ``payload`` (a
     :class:`Payload`, or kg at the tool), converted by the ratio and efficiency of the gear, plus the torques
@@ -154,7 +157,7 @@ def size_drives(
     joints = [entry.name for entry in arm.robot.speeds]
     _check_joints(arm.robot, joints, drives, where)
     rigid = Arm(without_motors(arm.robot))
-    time, q, qd, qdd, tau = motion_with_torques(rigid, trajectory, payload, where)
+    time, q, qd, qdd, tau, payloads = motion_with_torques(rigid, trajectory, payload, where)
     if not time[-1] > time[0]:
         raise InputError(
             "the trajectory has no duration",
@@ -163,8 +166,8 @@ def size_drives(
             fix="use a trajectory of more than one point",
         )
     zero = np.zeros_like(q)
-    gravity = rigid.rne(q, zero, zero, payload=payload)
-    inertia = _largest_inertia(rigid, q, payload)
+    gravity = rigid.rne(q, zero, zero, payload=payloads)
+    inertia = _largest_inertia(rigid, q, payloads)
     loads: list[DriveLoad] = []
     for j, joint in enumerate(joints):
         direction = _directions(qd[:, j])
@@ -240,9 +243,10 @@ def _directions(speed: Array) -> Array:
     return signs[moving[nearest]]
 
 
-def _largest_inertia(rigid: Arm, q: Array, payload: Payload | float | None) -> Array:
-    """The largest diagonal entries (n,) of the mass matrix along the motion, with the payload."""
-    rows = q[np.linspace(0, len(q) - 1, _INERTIA_SAMPLES).astype(int)]
+def _largest_inertia(rigid: Arm, q: Array, payloads: Array | None) -> Array:
+    """The largest diagonal entries (n,) of the mass matrix along the motion, with the payloads (N, 10)."""
+    samples = np.linspace(0, len(q) - 1, _INERTIA_SAMPLES).astype(int)
+    rows, payload = q[samples], None if payloads is None else payloads[samples]
     zero = np.zeros_like(rows)
     at_rest = rigid.rne(rows, zero, zero, payload=payload)
     entries = np.empty(rigid.n)

@@ -13,7 +13,8 @@ from armblocks.argument_errors import ArgumentErrors
 from armblocks.errors import InputError, counted
 from armblocks.face.arm import Arm
 from armblocks.face.least_time import MotionLimits, check_joint_space, motion_limits
-from armblocks.face.payload import Payload
+from armblocks.face.payload import Payload, payload_numbers
+from armblocks.face.pick_and_place import PickAndPlaceCycle
 from armblocks.face.trajectory import JointTrajectory
 from armblocks.files import write_atomically
 from armblocks.pictures.numbers import table_number
@@ -32,6 +33,8 @@ _SHORT = 0.01
 _ROUNDING = 1e-14
 """Positions that are smaller, relative to the largest one of the joint, are rounding errors of 0."""
 _SAMPLES = 1000
+_INSTANT = 1e-9
+"""Times that differ by less (s) are the two sides of a jump."""
 _MAX_TEXT_INTERVALS = 12
 _QUANTITIES = ("speed", "acceleration", "torque")
 
@@ -209,7 +212,7 @@ class TrajectoryReport(metaclass=ArgumentErrors):
 
 def trajectory_report(
     arm: Arm,
-    trajectory: JointTrajectory,
+    trajectory: JointTrajectory | PickAndPlaceCycle,
     *,
     speed: ArrayLike | None = None,
     acceleration: ArrayLike | None = None,
@@ -219,11 +222,12 @@ def trajectory_report(
     """The report of a trajectory of ``arm``: cycle time, peaks and limits, the binding limit at each time.
 
     The limits are those of :func:`~armblocks.least_time`; torques are those of ``arm.rne`` with the
-    ``payload``. Raises InputError for a trajectory with another number of joints.
+    ``payload``. In a cycle of :func:`~armblocks.pick_and_place` the payload is at the tool only in the loaded
+    phases. Raises InputError for a trajectory with another number of joints.
     """
     where = "trajectory_report"
     limits = motion_limits(arm, where, speed, acceleration, torque)
-    time, q, qd, qdd, tau = motion_with_torques(arm, trajectory, payload, where)
+    time, q, qd, qdd, tau, _ = motion_with_torques(arm, trajectory, payload, where)
     return TrajectoryReport(
         name=arm.name,
         joints=tuple(entry.name for entry in arm.robot.speeds),
@@ -239,10 +243,15 @@ def trajectory_report(
 
 
 def motion_with_torques(
-    arm: Arm, trajectory: JointTrajectory, payload: Payload | float | None, where: str
-) -> tuple[Array, Array, Array, Array, Array]:
-    """Times (N,) with both sides of each jump, positions, speeds, accelerations and torques (N, n)."""
+    arm: Arm, motion: JointTrajectory | PickAndPlaceCycle, payload: Payload | float | None, where: str
+) -> tuple[Array, Array, Array, Array, Array, Array | None]:
+    """Times (N,) with both sides of each jump, positions, speeds, accelerations and torques (N, n), and the
+    payloads (N, 10) in the order of :attr:`Payload.numbers`, or None without a payload.
+
+    The payload is at the tool of a cycle in its loaded phases.
+    """
     check_joint_space(arm, where)
+    trajectory = motion.trajectory if isinstance(motion, PickAndPlaceCycle) else motion
     if trajectory.n != arm.n:
         raise InputError(
             f"the trajectory has {counted(trajectory.n, 'joint')}",
@@ -255,12 +264,28 @@ def motion_with_torques(
     samples = np.linspace(float(knots[0]), float(knots[-1]), _SAMPLES)
     gaps = np.abs(samples[:, None] - knots).min(axis=1)
     between: Array = samples[gaps > 1e-9 * max(trajectory.duration, 1e-9)]
-    motion = trajectory(between)
-    rows = np.vstack([rows, np.column_stack([between, *motion])])
+    rows = np.vstack([rows, np.column_stack([between, *trajectory(between)])])
     rows = rows[np.argsort(rows[:, 0], kind="stable")]
     q, qd, qdd = (np.ascontiguousarray(part) for part in np.split(rows[:, 1:], 3, axis=1))
-    tau = arm.rne(q, qd, qdd) if payload is None else arm.rne(q, qd, qdd, payload=payload)
-    return rows[:, 0], q, qd, qdd, tau
+    time = rows[:, 0]
+    if payload is None:
+        return time, q, qd, qdd, arm.rne(q, qd, qdd), None
+    numbers = payload.numbers if isinstance(payload, Payload) else payload_numbers(payload)
+    loads = np.tile(np.asarray(numbers, dtype=np.float64), (len(q), 1))
+    if isinstance(motion, PickAndPlaceCycle):
+        loads *= _loaded(motion, time)[:, None]
+    return time, q, qd, qdd, arm.rne(q, qd, qdd, payload=loads), loads
+
+
+def _loaded(cycle: PickAndPlaceCycle, time: Array) -> Array:
+    """1 where the payload is at the tool, else 0. The first of two equal times is the end of a phase."""
+    before = np.append(np.diff(time) <= _INSTANT, False)
+    inside = time + np.where(before, -_INSTANT, _INSTANT)
+    loaded = np.zeros(len(time))
+    for phase in cycle.phases:
+        if phase.loaded:
+            loaded[(inside > phase.start) & (inside < phase.end)] = 1.0
+    return loaded
 
 
 def save_picture(picture: Picture, path: str | PathLike[str], where: str) -> None:

@@ -55,7 +55,7 @@ def payload_capacity(
                 allowed="a trajectory alone, which has speeds and accelerations",
                 fix="omit qd and qdd",
             )
-        _, *motion, _ = motion_with_torques(arm, q, None, where)
+        _, *motion, _, _ = motion_with_torques(arm, q, None, where)
     else:
         motion = [
             as_array(q),
