@@ -274,6 +274,20 @@ def test_messages_of_invalid_sweeps(vary: Any, more: dict[str, Any], message: st
         ab.sweep(VDP, vary, **more, **SHORT)
 
 
+def test_values_of_a_block_are_checked_together() -> None:
+    builder = ab.DiagramBuilder("limits")
+    sine = builder.add("sine", blocks.SineWave())
+    builder.add("scope", blocks.Scope(), builder.add("limit", blocks.Saturation(lower=-1.0, upper=1.0), sine))
+    diagram = builder.build()
+    with pytest.raises(DiagramError, match=r"block 'limit'.*run 2"):
+        ab.sweep(diagram, {"limit.lower": [-2.0, 0.0, 2.0]}, **SHORT)
+    both = [{"limit.lower": 2.0, "limit.upper": 3.0}, {"limit.lower": 2.0, "limit.upper": 1.0}]
+    with pytest.raises(DiagramError, match=r"block 'limit'.*run 1"):
+        ab.sweep(diagram, both, **SHORT)
+    result = ab.sweep(diagram, both[:1], measures={"least": "minimum(limit/y)"}, **SHORT)
+    assert result["least"].tolist() == [2.0]
+
+
 def test_messages_of_invalid_distributions_and_entries() -> None:
     with pytest.raises(InputError, match="uniform has the bounds 2 and 1"):
         ab.uniform(2, 1)

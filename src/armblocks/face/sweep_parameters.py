@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -152,14 +153,32 @@ class RunParameters:
                     self._changed({_whole(name): self.values(run)[_whole(name)]}, run)
             if not _checks_together(block):
                 continue
-            wholes = list(dict.fromkeys(map(_whole, names)))
-            for run in combinations([self.design.columns[name] for name in names])[0]:
+            self._check_block(block, path, names)
+
+    def _check_block(self, block: Block, path: str, names: Sequence[str]) -> None:
+        """Check the values of one block together. The rules of single parameters are checked already, so
+        that a copy of the block with other values is enough."""
+        fields = {entry.name: getattr(block, entry.name) for entry in dataclasses.fields(block)}
+        if not _reads_any(block, fields, {_whole(name).rpartition(".")[2] for name in names}):
+            return
+        columns = [self.design.columns[name] for name in names]
+        parameters = [name.rpartition(".")[2] for name in names]
+        entries = any(name.endswith("]") for name in names)
+        wholes = list(dict.fromkeys(map(_whole, names)))
+        changed: Any = object.__new__(cast("Any", type(block)))
+        for run in _different_runs(columns):
+            if entries:
                 row = self.values(run)
                 values = {whole.rpartition(".")[2]: row[whole] for whole in wholes}
-                try:
-                    block.with_parameters(**values)
-                except InputError as error:
-                    raise _of_run(error, run, f"block '{path}'") from None
+            else:
+                values = {name: column[run].tolist() for name, column in zip(parameters, columns)}
+            changed.__dict__.clear()
+            changed.__dict__.update(fields)
+            changed.__dict__.update({name: _canonical(value) for name, value in values.items()})
+            try:
+                changed.check()
+            except InputError as error:
+                raise _of_run(error, run, f"block '{path}'") from None
 
     def _make_variants(self, slow: Sequence[str]) -> tuple[list[Variant], NDArray[np.intp]]:
         """The variants for all combinations of the slow columns, and the number of each run's variant."""
@@ -228,6 +247,37 @@ def _of_run(error: ArmblocksError, run: int, where: str = "") -> DiagramError:
     """The error of a value with the number of its run."""
     place = ", ".join(filter(None, (where, error.where, f"run {run}")))
     return DiagramError(error.what, where=place, allowed=error.allowed, fix=error.fix)
+
+
+def _reads_any(block: Block, fields: Mapping[str, Any], parameters: Collection[str]) -> bool:
+    """Whether the check of a block reads one of these parameters. If it does not, the valid values of the
+    block show that it is valid for all values of these parameters."""
+    read: set[str] = set()
+
+    def recorded(self: Any, name: str) -> Any:
+        read.add(name)
+        return object.__getattribute__(self, name)
+
+    kind: Any = type(block)
+    members = {"__getattribute__": recorded, "__module__": kind.__module__}
+    recorder: Any = type(kind)(kind.__name__, (kind,), members)
+    copy: Any = object.__new__(recorder)
+    object.__getattribute__(copy, "__dict__").update(fields)
+    copy.check()
+    return "__dict__" in read or not read.isdisjoint(parameters)
+
+
+def _different_runs(columns: Sequence[Column]) -> Iterable[int]:
+    """The first run with each value of a single column of numbers; all runs for several columns."""
+    first = columns[0]
+    if len(columns) > 1 or first.ndim > 1:
+        return range(len(first))
+    return np.sort(np.unique(first.astype(np.float64).view(np.int64), return_index=True)[1]).tolist()
+
+
+def _canonical(value: Any) -> Any:
+    """A number as float, an array as nested tuples, as blocks have them."""
+    return tuple(map(_canonical, cast("list[Any]", value))) if isinstance(value, list) else float(value)
 
 
 def _whole(name: str) -> str:

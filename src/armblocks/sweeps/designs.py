@@ -275,7 +275,10 @@ def _plain(value: Any) -> Any:
 
 
 def combinations(columns: Sequence[Column]) -> tuple[list[int], NDArray[np.intp]]:
-    """The first run with each combination of values, and the number of the combination of each run."""
+    """The first run with each combination of values, and the number of the combination of each run.
+
+    Numbers are equal if all bits are; objects if they are the same object.
+    """
     known: dict[tuple[object, ...], int] = {}
     first: list[int] = []
     numbers = np.empty(len(columns[0]), dtype=np.intp)
