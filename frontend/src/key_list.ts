@@ -136,6 +136,22 @@ export const KEYS: KeyGroup[] = [
     ],
   },
   {
+    title: 'Arm of the robot editor, and its panel Teach',
+    sources: [
+      'robot/editor/arm_panel.tsx',
+      'robot/teach/tool_section.tsx',
+      'robot/teach/pose_list.tsx',
+      'robot/teach/motion_section.tsx',
+    ],
+    keys: [
+      ['arrows', 'With Shift: move the tool by one step along x or y; with Alt as well: turn it'],
+      ['PageUp, PageDown', 'With Shift: move the tool by one step along z; with Alt as well: turn it'],
+      ['Enter', 'Move the tool to the typed pose; rename the pose; run the motion'],
+      ['Esc', 'Discard the typed pose or name'],
+      ['Alt+↑, Alt+↓', 'Move the recorded pose up or down'],
+    ],
+  },
+  {
     title: 'Robot editor',
     sources: ['robot/editor/robot_editor.tsx', 'robot/editor/table.tsx'],
     keys: [

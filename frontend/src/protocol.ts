@@ -26,6 +26,8 @@ export interface Envelope {
     | Files
     | Find
     | IgnoreFileChange
+    | AskMotion
+    | AskMotionRows
     | New
     | Open
     | OpenShipped
@@ -35,6 +37,7 @@ export interface Envelope {
     | Ping
     | AskPose
     | PreviewTable
+    | AskReach
     | ReadSource
     | AskReadings
     | Recover
@@ -46,6 +49,7 @@ export interface Envelope {
     | RouteWires
     | Run
     | Save
+    | SaveMotion
     | AskScene
     | ShowSheet
     | SetSpeed
@@ -54,7 +58,8 @@ export interface Envelope {
     | Tune
     | TypedValue
     | TypedSettings
-    | Undo;
+    | Undo
+    | AskWorkspace;
 }
 /**
  * Return the mask of a subsystem or of the sheet, as the :class:`SetMask` that declares it.
@@ -123,21 +128,26 @@ export interface Change {
     | SetMask
     | MoveBlocks
     | MoveJoint
+    | MovePose
     | NameSignal
     | SetNotes
     | SetParameters
     | PasteBlocks
+    | RecordPose
     | RemoveBlocks
     | RemoveBookmark
     | RemoveJoint
     | RemoveParameterSet
+    | RemovePose
     | RemoveSetParameter
     | Rename
     | RenameBookmark
     | RenameLink
     | RenameParameterSet
+    | RenamePose
     | SaveParameterSet
-    | SetSettings;
+    | SetSettings
+    | UpdatePose;
 }
 /**
  * Add blocks and connect them: insert, paste and duplicate.
@@ -387,6 +397,14 @@ export interface MoveJoint {
   by: -1 | 1;
 }
 /**
+ * Move a pose by a number of places in the list, toward the end if ``by`` is positive.
+ */
+export interface MovePose {
+  kind: "move_pose";
+  name: string;
+  by: number;
+}
+/**
  * Name the signal at an output ``block/port``; an empty name removes the name.
  */
 export interface NameSignal {
@@ -428,6 +446,18 @@ export interface PasteBlocks {
   shift?: number | [number, number];
 }
 /**
+ * Append a pose, or insert it after another one. Without a name it is called P1, P2 …
+ */
+export interface RecordPose {
+  kind: "record_pose";
+  /**
+   * @maxItems 1000
+   */
+  q: number[];
+  name?: string;
+  after?: string;
+}
+/**
  * Remove blocks, wires and notes; the wires of the removed blocks are removed with them.
  */
 export interface RemoveBlocks {
@@ -455,6 +485,13 @@ export interface RemoveJoint {
  */
 export interface RemoveParameterSet {
   kind: "remove_parameter_set";
+  name: string;
+}
+/**
+ * Remove a pose.
+ */
+export interface RemovePose {
+  kind: "remove_pose";
   name: string;
 }
 /**
@@ -497,6 +534,14 @@ export interface RenameParameterSet {
   to: string;
 }
 /**
+ * Give a pose the name ``to``.
+ */
+export interface RenamePose {
+  kind: "rename_pose";
+  name: string;
+  to: string;
+}
+/**
  * Store values of parameters, by ``block.parameter``, under a name.
  *
  * ``all_parameters``: the model's values of the parameters that only other sets have are stored, too.
@@ -519,6 +564,17 @@ export interface SetSettings {
   values: {
     [k: string]: boolean | number | string | null;
   };
+}
+/**
+ * Replace the coordinates of a pose.
+ */
+export interface UpdatePose {
+  kind: "update_pose";
+  name: string;
+  /**
+   * @maxItems 1000
+   */
+  q: number[];
 }
 /**
  * Close a document on this client; ``discard`` is required if it has unsaved edits.
@@ -583,6 +639,24 @@ export interface Find {
 export interface IgnoreFileChange {
   kind: "ignore_file_change";
   document: string;
+}
+/**
+ * Plan the motion, for its display.
+ */
+export interface AskMotion {
+  document: string;
+  course: "joint" | "line" | "spline";
+  duration?: number | null;
+  kind: "motion";
+}
+/**
+ * Return the motion as the parameter of a Trajectory block: rows of t, q, qd, qdd.
+ */
+export interface AskMotionRows {
+  document: string;
+  course: "joint" | "line" | "spline";
+  duration?: number | null;
+  kind: "motion_rows";
 }
 /**
  * Create a new document.
@@ -672,6 +746,23 @@ export interface PreviewTable {
    * @maxItems 10000
    */
   columns?: string[];
+}
+/**
+ * Move the tool from its pose at ``q`` to ``target``, in the same configuration of the arm.
+ *
+ * ``target``: 16 numbers, the pose in the world row by row, m.
+ */
+export interface AskReach {
+  document: string;
+  kind: "reach";
+  /**
+   * @maxItems 1000
+   */
+  q: number[];
+  /**
+   * @maxItems 1000
+   */
+  target: number[];
 }
 /**
  * Return the content of a Python file.
@@ -801,6 +892,17 @@ export interface Save {
   overwrite?: boolean;
 }
 /**
+ * Write the motion as a CSV file of the project folder. The reply is its path.
+ */
+export interface SaveMotion {
+  document: string;
+  course: "joint" | "line" | "spline";
+  duration?: number | null;
+  kind: "save_motion";
+  path: string;
+  overwrite?: boolean;
+}
+/**
  * Return the bodies of a robot.
  */
 export interface AskScene {
@@ -886,6 +988,13 @@ export interface Undo {
   base?: number | null;
   author?: string;
   kind: "undo";
+}
+/**
+ * Return positions of the tool (N, 3) m at random configurations within the limits.
+ */
+export interface AskWorkspace {
+  document: string;
+  kind: "workspace";
 }
 /**
  * All text messages of the server, for the generated types of the front end.
@@ -1056,6 +1165,9 @@ export interface RobotContent {
   convention: "standard" | "modified" | "";
   chain: boolean;
   links: LinkRow[];
+  coordinates: Coordinate[];
+  speeds: Speed[];
+  poses: Pose[];
   fields: {
     [k: string]: number | string | null;
   };
@@ -1076,6 +1188,33 @@ export interface LinkRow {
   locked: {
     [k: string]: string;
   };
+}
+/**
+ * An entry of q: its name, its unit (rad, m or 1), and its limits if it has them.
+ *
+ * ``rest`` is its value in the pose that is shown without motion.
+ */
+export interface Coordinate {
+  name: string;
+  unit: string;
+  low: number | null;
+  high: number | null;
+  rest: number;
+}
+/**
+ * An entry of qd: its name, the unit of its coordinate (rad or m), and its limit if it has one.
+ */
+export interface Speed {
+  name: string;
+  unit: string;
+  limit: number | null;
+}
+/**
+ * A recorded pose: its name and coordinates.
+ */
+export interface Pose {
+  name: string;
+  q: number[];
 }
 /**
  * A physically impossible value, and the columns of the link that contain it.
@@ -1374,6 +1513,8 @@ export interface Replies {
   files: FileList;
   find: FoundBlock[];
   ignore_file_change: null;
+  motion: PlannedMotion;
+  motion_rows: number[][];
   new: string;
   open: string[];
   open_shipped: string;
@@ -1383,6 +1524,7 @@ export interface Replies {
   ping: null;
   pose: number[][][];
   preview_table: TablePreview;
+  reach: Reached;
   read_source: FunctionSource;
   readings: Readings;
   recover: string | null;
@@ -1396,6 +1538,7 @@ export interface Replies {
   };
   run: string;
   save: string;
+  save_motion: string;
   scene: RobotScene;
   show_sheet: null;
   speed: null;
@@ -1407,6 +1550,7 @@ export interface Replies {
     [k: string]: string;
   };
   undo: number;
+  workspace: string;
 }
 /**
  * A bookmark of the sheet at a path. ``linked``: it belongs to a library block and cannot be edited.
@@ -1443,6 +1587,40 @@ export interface FoundBlock {
   title: string;
   match: string;
   part?: SheetPart | null;
+}
+/**
+ * A motion through poses.
+ *
+ * ``time`` (N,) s, ``q``, ``qd``, ``qdd`` (N, n) in rad or m and s. ``poses`` (N, L+2, 12): the first three
+ * rows of the poses of base, links and tool. ``via``: the times of the recorded poses, s. ``tool_speed``:
+ * largest speed of the tool, m/s. ``exceeded``: the exceeded limits, in words.
+ */
+export interface PlannedMotion {
+  time: number[];
+  q: number[][];
+  qd: number[][];
+  qdd: number[][];
+  rows: number;
+  poses: string;
+  via: number[];
+  tool_speed: number;
+  peaks: JointPeaks[];
+  exceeded: string[];
+}
+/**
+ * Extremes of one joint in a motion, in rad or m, s, N m or N; ``None`` without a limit.
+ */
+export interface JointPeaks {
+  name: string;
+  unit: string;
+  lowest: number;
+  highest: number;
+  low: number | null;
+  high: number | null;
+  speed: number;
+  speed_limit: number | null;
+  torque: number;
+  torque_limit: number | null;
 }
 /**
  * The sheets of a model as a tree.
@@ -1510,6 +1688,22 @@ export interface TableColumn {
   kind: string;
   rows: number;
   fault: string;
+}
+/**
+ * The configuration of an arm whose tool was dragged.
+ *
+ * ``q`` (nq,) and the ``poses`` (L+2, 4, 4) of base, links and tool. ``reached``: whether the tool has the
+ * target; otherwise ``why`` says what stopped it. ``at_limit``: the coordinates at a limit. ``missing``: the
+ * directions that the joints cannot follow. ``tool``: the pose of the tool (16,).
+ */
+export interface Reached {
+  q: number[];
+  poses: number[][][];
+  reached: boolean;
+  why: string;
+  at_limit: string[];
+  missing: string[];
+  tool: number[];
 }
 /**
  * The content of a Python file, which has not been run; ``fault`` is the reason why it is not valid.

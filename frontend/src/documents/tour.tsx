@@ -60,7 +60,9 @@ const STOPS: Stop[] = [
   {
     at: '.robot',
     title: 'The arm',
-    text: 'Turn the view with the mouse. The pose follows the signals at the time cursor.',
+    text:
+      'Turn the view with the mouse. The pose follows the signals at the time cursor. Edit this robot ' +
+      'opens its tables; there, Teach lets you drag the tool, record poses and run a motion.',
   },
   {
     at: '[aria-label="Menu"]',

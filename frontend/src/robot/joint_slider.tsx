@@ -1,4 +1,5 @@
 import { Slider } from '@mantine/core'
+import { IconAlertTriangle } from '@tabler/icons-react'
 import { useState } from 'react'
 
 interface JointSliderProps {
@@ -12,6 +13,8 @@ interface JointSliderProps {
   text: string
   unit: string
   disabled?: boolean
+  /** Whether the value is at a limit, which is marked. */
+  limited?: boolean
   /** Called with a value of the slider. */
   onValue: (value: number) => void
   /** Called with a number that was typed, in the unit of the field. */
@@ -20,11 +23,26 @@ interface JointSliderProps {
 
 /** A slider for one coordinate, and a field with its number. */
 export function JointSlider(props: JointSliderProps) {
-  const { name, label, low, high, value, text, unit, disabled = false, onValue, onNumber } = props
+  const {
+    name,
+    label,
+    low,
+    high,
+    value,
+    text,
+    unit,
+    disabled = false,
+    limited = false,
+    onValue,
+    onNumber,
+  } = props
   return (
-    <div className="joint-slider">
-      <span className="name" title={name}>
+    <div className={limited ? 'joint-slider limited' : 'joint-slider'}>
+      <span className="name" title={limited ? `${name} is at its limit` : name}>
         {name}
+        {limited && (
+          <IconAlertTriangle size={12} role="img" aria-label={`${name} is at its limit`} className="warn" />
+        )}
       </span>
       <Slider
         size="sm"

@@ -1,4 +1,5 @@
 import { BufferAttribute, BufferGeometry, Matrix4 } from 'three'
+import { unpackedFloats } from '../model/packed'
 import type { RobotScene, SceneJoint } from '../protocol'
 
 export type { RobotScene, SceneJoint }
@@ -47,16 +48,9 @@ export function matrixOf(numbers: number[]): Matrix4 {
   return new Matrix4().fromArray(numbers).transpose()
 }
 
-function numbers(packed: string): Float32Array {
-  const text = atob(packed)
-  const bytes = new Uint8Array(text.length)
-  for (let k = 0; k < text.length; k++) bytes[k] = text.charCodeAt(k)
-  return new Float32Array(bytes.buffer)
-}
-
 export function geometry(body: RobotScene['bodies'][number]): BufferGeometry {
   const geometry = new BufferGeometry()
-  geometry.setAttribute('position', new BufferAttribute(numbers(body.corners), 3))
-  geometry.setAttribute('normal', new BufferAttribute(numbers(body.normals), 3))
+  geometry.setAttribute('position', new BufferAttribute(unpackedFloats(body.corners), 3))
+  geometry.setAttribute('normal', new BufferAttribute(unpackedFloats(body.normals), 3))
   return geometry
 }

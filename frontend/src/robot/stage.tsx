@@ -66,6 +66,10 @@ interface StageProps {
   playForVideo?: () => Promise<void>
   /** Additional entries of the context menu, before the others. */
   entries?: () => Entries
+  /** Objects in the scene in addition to the arm, such as a handle of its tool. */
+  contents?: React.ReactNode
+  /** A handler of keys before those of the view; returns whether it has handled the key. */
+  onKey?: (event: React.KeyboardEvent) => boolean
   /** Additional buttons, before the others. */
   children?: React.ReactNode
 }
@@ -96,25 +100,6 @@ export function Stage(props: StageProps) {
         {children}
       </StaticArm>
     )
-  const onKeyDown = (event: React.KeyboardEvent) => {
-    const view = camera.current
-    if (!view || event.ctrlKey || event.metaKey || event.altKey) return
-    const turns: Record<string, [number, number]> = {
-      ArrowLeft: [-TURN, 0],
-      ArrowRight: [TURN, 0],
-      ArrowUp: [0, -TURN],
-      ArrowDown: [0, TURN],
-    }
-    const turn = turns[event.key]
-    if (turn) view.turn(...turn)
-    else if (event.key === '+' || event.key === '=') view.zoom(0.85)
-    else if (event.key === '-') view.zoom(1 / 0.85)
-    else if (event.key === 'Home') view.look('iso')
-    else if (event.key === ' ') view.fit()
-    else return
-    event.preventDefault()
-    event.stopPropagation()
-  }
   return (
     <div className="robot">
       <div
@@ -122,7 +107,7 @@ export function Stage(props: StageProps) {
         role="application"
         aria-label={`The robot ${scene.name}. ${KEY_HELP}`}
         tabIndex={0}
-        onKeyDown={onKeyDown}
+        onKeyDown={(event) => handleKey(event, camera.current, props.onKey)}
         {...menus}
       >
         <Canvas
@@ -155,6 +140,32 @@ export function Stage(props: StageProps) {
   )
 }
 
+/** Keys of the view: those of the caller first, then those of the camera. */
+function handleKey(event: React.KeyboardEvent, view: CameraHandle | null, onKey: StageProps['onKey']): void {
+  if (!onKey?.(event) && !moveCamera(event, view)) return
+  event.preventDefault()
+  event.stopPropagation()
+}
+
+/** Move the camera by a key; returns whether it is a key of the camera. */
+function moveCamera(event: React.KeyboardEvent, view: CameraHandle | null): boolean {
+  if (!view || event.ctrlKey || event.metaKey || event.altKey) return false
+  const turns: Record<string, [number, number]> = {
+    ArrowLeft: [-TURN, 0],
+    ArrowRight: [TURN, 0],
+    ArrowUp: [0, -TURN],
+    ArrowDown: [0, TURN],
+  }
+  const turn = turns[event.key]
+  if (turn) view.turn(...turn)
+  else if (event.key === '+' || event.key === '=') view.zoom(0.85)
+  else if (event.key === '-') view.zoom(1 / 0.85)
+  else if (event.key === 'Home') view.look('iso')
+  else if (event.key === ' ') view.fit()
+  else return false
+  return true
+}
+
 interface StageContentsProps extends StageProps {
   scheme: 'light' | 'dark'
   camera: React.RefObject<CameraHandle | null>
@@ -169,6 +180,7 @@ function StageContents({
   ghosts,
   extent,
   extentKey,
+  contents,
   scheme,
   camera,
   rendering,
@@ -182,7 +194,7 @@ function StageContents({
   const floor = useFloor(scene, poses, footHeight, extent, extentKey)
   useRenderOnChange(state)
   const invalidate = useThree((s) => s.invalidate)
-  useEffect(() => invalidate(), [options, bodies, scheme, invalidate])
+  useEffect(() => invalidate(), [options, bodies, scheme, contents, invalidate])
   const gl = useThree((s) => s.gl)
   const world = useThree((s) => s.scene)
   const eye = useThree((s) => s.camera)
@@ -225,6 +237,7 @@ function StageContents({
       {options.axes && <JointAxes {...overlay} />}
       {options.limits && <Limits {...overlay} />}
       {options.path && path && <ToolPath path={path} dark={dark} background={colours.background} />}
+      {contents}
       <Pedestal from={floor} to={footHeight} reach={reach} poses={poses} />
       <Ground height={floor} reach={reach} colours={colours} />
       <ViewCamera

@@ -4,7 +4,8 @@ Angles may be texts such as ``"90 deg"``, and angular speeds such as ``"105 deg/
 where they have few digits and read back exactly. A link with a ``dh`` row takes its joint and transforms from
 it. Unknown keys are errors that suggest the nearest known key, because ignoring a misspelt key would give a
 wrong robot. ``notes`` is a comment, and ``facts`` are those of :mod:`armblocks.formats.robot_facts`. Neither
-is preserved.
+is preserved. ``poses`` are the taught poses of the studio (:mod:`armblocks.formats.robot_poses`), which are
+checked here and are not part of the ``Robot``.
 
 The JSON Schema is ``formats/schema/robot.schema.json``.
 """
@@ -23,6 +24,7 @@ from armblocks.formats.canonical_json import canonical_bytes
 from armblocks.formats.constraint_json import constraint_from_json, part_to_json, spring_from_json
 from armblocks.formats.json_document import Node, closed_members, read_document
 from armblocks.formats.robot_facts import facts_from_json
+from armblocks.formats.robot_poses import MAX_BYTES, TaughtPose, poses_from_json, poses_to_json
 from armblocks.formats.shapes_json import shape_from_json, shape_to_json
 from armblocks.robot import (
     JOINT_TYPES,
@@ -42,7 +44,6 @@ from armblocks.robot.robot import STANDARD_GRAVITY
 from armblocks.spatial import Matrix3, Transform, Vector3
 
 FORMAT_VERSION = 1
-MAX_BYTES = 16 * 2**20
 
 _ROBOT_KEYS = (
     "format",
@@ -59,6 +60,7 @@ _ROBOT_KEYS = (
     "constraints",
     "frames",
     "springs",
+    "poses",
 )
 _MASS_KEYS = ("mass", "centre_of_mass", "inertia")
 _LINK_KEYS = ("name", "parent", "dh", "joint", "before", "after", "limits", *_MASS_KEYS, "motor", "geometry")
@@ -103,7 +105,7 @@ def robot_from_json(node: Node) -> Robot:
         for member in (members["springs"].elements() if "springs" in members else ())
     )
     try:
-        return Robot(
+        robot = Robot(
             name=texts["name"],
             manufacturer=texts["manufacturer"],
             comment=texts["comment"],
@@ -120,11 +122,17 @@ def robot_from_json(node: Node) -> Robot:
         raise FormatError(
             f"{error.where}: {error.what}", where=node.where, allowed=error.allowed, fix=error.fix
         ) from error
+    if "poses" in members:
+        poses_from_json(members["poses"], robot.nq)
+    return robot
 
 
-def write_robot(robot: Robot) -> bytes:
-    """The canonical document of a robot. Reading it gives an equal robot."""
-    return canonical_bytes(robot_to_json(robot), one_line=lambda path: path[-1:] == ("position",))
+def write_robot(robot: Robot, poses: tuple[TaughtPose, ...] = ()) -> bytes:
+    """The canonical document of a robot and its taught poses. Reading it gives an equal robot."""
+    document = robot_to_json(robot)
+    if poses:
+        document["poses"] = poses_to_json(poses)
+    return canonical_bytes(document, one_line=lambda path: path[-1:] == ("position",))
 
 
 def robot_to_json(robot: Robot) -> dict[str, object]:

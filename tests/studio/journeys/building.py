@@ -249,3 +249,13 @@ def run(page: Page) -> None:
     """Run the model to its end."""
     page.keyboard.press("Control+Enter")
     expect(page.locator(".run-state")).to_contain_text("done", ignore_case=True)
+
+
+def open_shipped_robot(page: Page, name: str) -> Locator:
+    """Open a copy of a shipped robot; returns its editor."""
+    page.get_by_role("button", name="Menu").click()
+    page.get_by_role("menuitem", name=name, exact=True).click()
+    editor = page.locator(".robot-editor")
+    if not IN_FIREFOX:  # which has no WebGL without a graphics card
+        expect(editor.locator("canvas")).to_be_visible()
+    return editor

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 from accessibility import axe
-from browsers import IN_FIREFOX, needs_webgl
+from browsers import needs_webgl
+from building import open_shipped_robot
 from playwright.sync_api import Locator, Page, expect
 
 import armblocks as ab
@@ -48,17 +49,8 @@ def tool_x(editor: Locator) -> Locator:
     return editor.get_by_role("region", name="Pose of the tool").locator("dd").first
 
 
-def open_shipped(page: Page, name: str) -> Locator:
-    page.get_by_role("button", name="Menu").click()
-    page.get_by_role("menuitem", name=name, exact=True).click()
-    editor = page.locator(".robot-editor")
-    if not IN_FIREFOX:  # which has no WebGL without a graphics card
-        expect(editor.locator("canvas")).to_be_visible()
-    return editor
-
-
 def test_a_robot_is_edited_marked_undone_saved_and_reopened(page: Page, folder: Path) -> None:
-    editor = open_shipped(page, "puma560")
+    editor = open_shipped_robot(page, "puma560")
     expect(tool_x(editor)).to_have_text("0.4521 m")
     cell = editor.get_by_role("textbox", name="a of link2", exact=True)
     cell.fill("0.5318")

@@ -108,6 +108,7 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
     to_block = {"document": document, "inside": [], "block": "PID"}
     q = {"q": [0.0] * 6, "qd": [0.0] * 6, "qdd": [0.0] * 6}
     content = base64.b64encode(write_robot(load_robot("kr180"))).decode()
+    motion = {"document": robot, "course": "joint", "duration": 1.0}
     cell = {"kind": "cell", "link": "link1", "column": "a", "text": "1", "angles": "deg"}
     return [
         {"kind": "open", "path": "arm.json"},
@@ -135,6 +136,17 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
         },
         *({"kind": "change", **common, "inside": [], "edit": edit} for edit in edits),
         {"kind": "change", **of_robot, "edit": cell},
+        {"kind": "change", **of_robot, "edit": {"kind": "record_pose", "q": [0.0] * 6, "name": "P1"}},
+        {"kind": "change", **of_robot, "edit": {"kind": "record_pose", "q": [0.5] * 6, "after": "P1"}},
+        {"kind": "change", **of_robot, "edit": {"kind": "update_pose", "name": "P1", "q": [0.1] * 6}},
+        {"kind": "change", **of_robot, "edit": {"kind": "rename_pose", "name": "P1", "to": "P1"}},
+        {"kind": "change", **of_robot, "edit": {"kind": "move_pose", "name": "P1", "by": 0}},
+        {"kind": "reach", "document": robot, "q": [0.0] * 6, "target": [0.0] * 16},
+        {"kind": "motion", **motion},
+        {"kind": "motion_rows", **motion},
+        {"kind": "save_motion", **motion, "path": "motion.csv", "overwrite": True},
+        {"kind": "workspace", "document": robot},
+        {"kind": "change", **of_robot, "edit": {"kind": "remove_pose", "name": "P1"}},
         {"kind": "undo", **common},
         {"kind": "redo", **common},
         {"kind": "save", "document": document, "path": "saved.json", "overwrite": True},

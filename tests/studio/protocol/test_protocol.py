@@ -9,9 +9,11 @@ import pytest
 
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol.message import Request, messages_of, reply_type
+from armblocks.studio.protocol.messages.pose_edits import PoseEdit
 from armblocks.studio.protocol.messages.robot_edits import RobotEdit
 from armblocks.studio.protocol.messages.sheet_edits import DiagramEdit
 from armblocks.studio.robots.edits import ROBOT_EDITS
+from armblocks.studio.robots.pose_edits import POSE_EDITS
 from armblocks.studio.server.hub import Hub
 from armblocks.studio.sheet.edits import EDITS
 
@@ -30,8 +32,10 @@ def expected(request: type[Request[Any]]) -> Any:
 
 
 def test_every_edit_has_a_function_and_a_title() -> None:
-    for table, edits in ((EDITS, DiagramEdit), (ROBOT_EDITS, RobotEdit)):
-        assert set(table.entries) == set(messages_of(edits).values())
+    of_robots = {**ROBOT_EDITS.entries, **POSE_EDITS.entries}
+    for entries, edits in ((EDITS.entries, DiagramEdit), (of_robots, RobotEdit)):
+        assert set(entries) == set(messages_of(edits).values())
+    assert set(POSE_EDITS.entries) == set(messages_of(PoseEdit).values())
 
 
 def test_a_request_without_a_reply_type_is_refused() -> None:

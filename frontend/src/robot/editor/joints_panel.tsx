@@ -1,12 +1,11 @@
 import { Button, SegmentedControl } from '@mantine/core'
 import { useState } from 'react'
-import type { LinkRow } from '../../protocol'
+import { isAtLimit } from '../../model/motion'
 import { JointSlider } from '../joint_slider'
-import { atRest, cellText, setJoints, useRobotEditor, type Joints } from './state'
+import { atRest, cellText, setJoints, useRobotEditor, type Joints, type OpenRobot } from './state'
 
-const HALF_TURN = Math.PI
-/** Range of a prismatic joint without limits, m. */
-const DEFAULT_RANGE = 1
+/** Range of an angle without limits, and of a length without limits. */
+const DEFAULT_RANGE: Record<string, number> = { rad: Math.PI, m: 1 }
 
 /** The displayed quantity of the joints: position, speed, acceleration. */
 const QUANTITIES = [
@@ -21,7 +20,6 @@ export function JointsPanel() {
   const joints = useRobotEditor((s) => (s.current ? s.joints[s.current] : undefined))
   const [quantity, setQuantity] = useState<keyof Joints>('q')
   if (!robot || !joints) return null
-  const moving = robot.links.filter(({ moves }) => moves)
   return (
     <div className="joints-panel">
       <div className="panel-bar">
@@ -36,10 +34,10 @@ export function JointsPanel() {
           Home
         </Button>
       </div>
-      {moving.map((link, k) => (
-        <LinkSlider
-          key={link.name}
-          link={link}
+      {rangesOf(robot, quantity).map((range, k) => (
+        <RangeSlider
+          key={range.name}
+          range={range}
           quantity={quantity}
           value={joints[quantity][k] ?? 0}
           onValue={(value) =>
@@ -51,28 +49,38 @@ export function JointsPanel() {
   )
 }
 
-interface LinkSliderProps {
-  link: LinkRow
+interface Range {
+  name: string
+  unit: string
+  low: number
+  high: number
+  isLimited: (value: number) => boolean
+}
+
+interface RangeSliderProps {
+  range: Range
   quantity: keyof Joints
   value: number
   onValue: (value: number) => void
 }
 
-function LinkSlider({ link, quantity, value, onValue }: LinkSliderProps) {
+function RangeSlider({ range, quantity, value, onValue }: RangeSliderProps) {
   const angles = useRobotEditor((s) => s.angles)
-  const [low, high] = range(link, quantity)
-  const unit = link.turns ? (angles === 'deg' ? '°' : 'rad') : 'm'
+  const { name, low, high, isLimited } = range
+  const turns = range.unit === 'rad'
+  const unit = turns ? (angles === 'deg' ? '°' : 'rad') : range.unit === 'm' ? 'm' : ''
   const per = { q: '', qd: '/s', qdd: '/s²' }[quantity]
-  const factor = link.turns && angles === 'deg' ? 180 / Math.PI : 1
+  const factor = turns && angles === 'deg' ? 180 / Math.PI : 1
   return (
     <JointSlider
-      name={link.name}
-      label={`${quantity} of ${link.name}`}
+      name={name}
+      label={`${quantity} of ${name}`}
       low={low}
       high={high}
       value={value}
       text={cellText(Number((value * factor).toFixed(4)), false, angles)}
       unit={`${unit}${per}`}
+      limited={isLimited(value)}
       onValue={onValue}
       onNumber={(typed) => onValue(typed / factor)}
     />
@@ -80,14 +88,23 @@ function LinkSlider({ link, quantity, value, onValue }: LinkSliderProps) {
 }
 
 /**
- * The range of a slider: that of the joint, otherwise ±π rad or ±1 m. The range of speeds is the speed limit;
- * that of accelerations is twice this number.
+ * The ranges of the sliders. Positions: the limits of the coordinates, otherwise ±π rad or ±1 m. Speeds: the
+ * speed limits; accelerations: twice these numbers.
  */
-function range(link: LinkRow, quantity: keyof Joints): [number, number] {
-  const { lowest, highest, speed } = link.cells
-  const limit = typeof speed === 'number' ? speed : link.turns ? HALF_TURN : DEFAULT_RANGE
-  if (quantity === 'qd') return [-limit, limit]
-  if (quantity === 'qdd') return [-2 * limit, 2 * limit]
-  if (typeof lowest === 'number' && typeof highest === 'number' && lowest < highest) return [lowest, highest]
-  return link.turns ? [-HALF_TURN, HALF_TURN] : [-DEFAULT_RANGE, DEFAULT_RANGE]
+function rangesOf(robot: OpenRobot, quantity: keyof Joints): Range[] {
+  if (quantity === 'q')
+    return robot.coordinates.map(({ name, unit, low, high }) => {
+      const most = DEFAULT_RANGE[unit] ?? 1
+      return {
+        name,
+        unit,
+        low: low ?? Math.min(-most, (high ?? most) - most),
+        high: high ?? Math.max(most, (low ?? -most) + most),
+        isLimited: (value) => isAtLimit(value, low, high),
+      }
+    })
+  return robot.speeds.map(({ name, unit, limit }) => {
+    const most = (quantity === 'qd' ? 1 : 2) * (limit ?? DEFAULT_RANGE[unit] ?? 1)
+    return { name, unit, low: -most, high: most, isLimited: () => false }
+  })
 }

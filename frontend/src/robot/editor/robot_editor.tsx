@@ -29,6 +29,7 @@ import { JointsPanel } from './joints_panel'
 import { ReadingsPanel } from './readings_panel'
 import { RobotFields } from './robot_fields'
 import { LinkTable } from './table'
+import { TeachPanel } from '../teach/teach_panel'
 import { saveRobot, SaveDialog } from './save_dialog'
 
 const ArmPanel = lazy(() => import('./arm_panel'))
@@ -43,6 +44,7 @@ const panels: Record<string, React.FunctionComponent> = {
     </Suspense>
   ),
   joints: JointsPanel,
+  teach: TeachPanel,
   readings: ReadingsPanel,
   kinematics: () => <Table which="kinematics" />,
   dynamics: () => <Table which="dynamics" />,
@@ -53,7 +55,7 @@ function Tab({ api }: IDockviewPanelHeaderProps) {
   return <span className="tab">{api.title}</span>
 }
 
-/** The default layout: arm, joints and read-outs above, the tables below. */
+/** The default layout: arm, joints, and read-outs or the panel Teach above, the tables below. */
 function arrange({ api }: DockviewReadyEvent): void {
   const isTall = innerHeight > TALL_PX
   api.addPanel({ id: 'arm', component: 'arm', title: 'Arm' })
@@ -62,6 +64,13 @@ function arrange({ api }: DockviewReadyEvent): void {
     component: 'readings',
     title: 'Read-outs',
     position: { referencePanel: 'arm', direction: 'right' },
+  })
+  api.addPanel({
+    id: 'teach',
+    component: 'teach',
+    title: 'Teach',
+    inactive: true,
+    position: { referencePanel: 'readings' },
   })
   api.addPanel({
     id: 'joints',

@@ -48,9 +48,9 @@ export const useRobotEditor = create<RobotEditorState>(() => ({
 function storeRobot(state: DocumentState, content: RobotContent): void {
   const { robots, joints } = useRobotEditor.getState()
   const robot = { ...content, state }
-  const moving = content.links.filter(({ moves }) => moves)
   const before = joints[state.document]
-  const isCompatible = before && before.q.length === moving.length
+  const isCompatible =
+    before && before.q.length === content.coordinates.length && before.qd.length === content.speeds.length
   useRobotEditor.setState({
     robots: { ...robots, [state.document]: robot },
     joints: isCompatible ? joints : { ...joints, [state.document]: atRest(content) },
@@ -117,15 +117,23 @@ export async function reattachRobots(): Promise<string | undefined> {
   return last ? attach(last) : undefined
 }
 
-/** All joint positions at zero, or at the limit nearest to zero. */
-export function atRest({ links }: RobotContent): Joints {
-  const moving = links.filter(({ moves }) => moves)
-  const zero = moving.map(() => 0)
-  const q = moving.map(({ cells }) => {
-    const [low, high] = [cells['lowest'], cells['highest']]
-    return typeof low === 'number' && typeof high === 'number' ? Math.min(Math.max(0, low), high) : 0
-  })
-  return { q, qd: zero, qdd: zero }
+/** All joint positions at rest: zero, or the limit nearest to zero. */
+export function atRest({ coordinates, speeds }: RobotContent): Joints {
+  const zero = speeds.map(() => 0)
+  return { q: coordinates.map(({ rest }) => rest), qd: zero, qdd: zero }
+}
+
+const knownPoses = new WeakMap<number[], number[][][]>()
+
+/** The poses of base, links and tool at these coordinates, if the server has sent them together. */
+export function posesOf(q: number[]): number[][][] | undefined {
+  return knownPoses.get(q)
+}
+
+/** Show joint coordinates whose poses are known, so that they are not requested again. */
+export function setJointsWithPoses(change: Partial<Joints> & { q: number[] }, poses: number[][][]): void {
+  knownPoses.set(change.q, poses)
+  setJoints(change)
 }
 
 export function setJoints(change: Partial<Joints>): void {

@@ -9,41 +9,62 @@ from armblocks.robot import Link, Robot
 from armblocks.studio.documents.aspects import Aspect
 from armblocks.studio.documents.edited import Edited, Outcome
 from armblocks.studio.protocol.messages.documents import Change
+from armblocks.studio.protocol.messages.pose_edits import PoseEdit
 from armblocks.studio.protocol.messages.robot_edits import RobotEdit
 from armblocks.studio.robots.columns import ROBOT_COLUMNS
 from armblocks.studio.robots.edits import ROBOT_EDITS
 from armblocks.studio.robots.link_columns import LINK_COLUMNS
+from armblocks.studio.robots.pose_edits import POSE_EDITS
+from armblocks.studio.robots.taught_robot import TaughtRobot
 
 
-class RobotDocument(Edited[Robot]):
+class RobotDocument(Edited[TaughtRobot]):
     """One open robot; see :class:`~armblocks.studio.documents.edited.Edited`."""
 
     kind = "robot"
     edits = RobotEdit
     noun = "robot"
 
-    def outcome(self, request: Change) -> Outcome[Robot]:
+    def outcome(self, request: Change) -> Outcome[TaughtRobot]:
         """Return title, new robot and edited cell of a change."""
+        if isinstance(request.edit, PoseEdit):
+            taught = POSE_EDITS.applied(request.edit, self.value)
+            return Outcome(POSE_EDITS.title(request.edit), taught, request.gesture)
         with warnings.catch_warnings():  # the tables show these warnings as findings
             warnings.simplefilter("ignore", ArmblocksWarning)
-            after = ROBOT_EDITS.applied(request.edit, self.value)
-        return Outcome(ROBOT_EDITS.title(request.edit), after, request.gesture)
+            after = ROBOT_EDITS.applied(request.edit, self.value.robot)
+        return Outcome(ROBOT_EDITS.title(request.edit), self.value.with_robot(after), request.gesture)
 
-    def aspects(self, before: Robot, after: Robot) -> set[Aspect]:
-        """Return the cells that differ, links that were added or removed, and changes of the link order."""
-        cells = {
-            ("/", name) for name, column in ROBOT_COLUMNS.items() if column.read(before) != column.read(after)
-        }
-        old, new = ({link.name: link for link in robot.links} for robot in (before, after))
-        if list(old) != list(new):
-            cells.add(("/", "links"))
-        for name in old.keys() | new.keys():
-            cells |= _link_aspects(name, old.get(name), new.get(name))
-        return cells
+    def aspects(self, before: TaughtRobot, after: TaughtRobot) -> set[Aspect]:
+        """Return the cells that differ, links and poses that were added, removed or changed, and changes of
+        the order of links or poses."""
+        return _pose_aspects(before, after) | _robot_aspects(before.robot, after.robot)
 
-    def mark_saved(self, value: Robot, name: str) -> None:
+    def mark_saved(self, value: TaughtRobot, name: str) -> None:
         """Mark ``value`` as saved; the name of a robot does not depend on its file name."""
         self.saved = value
+
+
+def _pose_aspects(before: TaughtRobot, after: TaughtRobot) -> set[Aspect]:
+    old, new = ({pose.name: pose for pose in taught.poses} for taught in (before, after))
+    changed: set[Aspect] = {
+        ("/", "pose", name) for name in old.keys() | new.keys() if old.get(name) != new.get(name)
+    }
+    if [name for name in old if name in new] != [name for name in new if name in old]:
+        changed.add(("/", "poses"))
+    return changed
+
+
+def _robot_aspects(before: Robot, after: Robot) -> set[Aspect]:
+    cells = {
+        ("/", name) for name, column in ROBOT_COLUMNS.items() if column.read(before) != column.read(after)
+    }
+    old, new = ({link.name: link for link in robot.links} for robot in (before, after))
+    if list(old) != list(new):
+        cells.add(("/", "links"))
+    for name in old.keys() | new.keys():
+        cells |= _link_aspects(name, old.get(name), new.get(name))
+    return cells
 
 
 def _link_aspects(name: str, old: Link | None, new: Link | None) -> set[Aspect]:

@@ -26,7 +26,7 @@ class OpenRobot(OpenFile[RobotDocument]):
     @property
     def robot(self) -> Robot:
         """The present robot."""
-        return self.document.value
+        return self.document.value.robot
 
     @property
     def arm(self) -> Arm:

@@ -53,11 +53,11 @@ def scene_of(robot: Robot) -> RobotScene:
             for link in robot.moving_links
             if link.joint.nv == 1
         ],
-        rest=_rest(robot),
+        rest=rest_of(robot),
     )
 
 
-def _rest(robot: Robot) -> list[float]:
+def rest_of(robot: Robot) -> list[float]:
     """The neutral coordinates, moved into the joint limits."""
     low, high = robot.qlim.T
     return np.clip(robot.neutral, low, high).tolist()

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Literal
 
+from armblocks.formats.robot_poses import TaughtPose
 from armblocks.robot import DhConvention, Link, Robot, inertia_findings, plausibility_findings, serial_chain
 from armblocks.studio.protocol.messages import robots as robot_messages
 from armblocks.studio.robots.columns import ROBOT, ROBOT_COLUMNS, Column, Owner
@@ -14,6 +17,7 @@ from armblocks.studio.robots.link_columns import (
     LINK_COLUMNS,
     variable_of,
 )
+from armblocks.studio.robots.scene import rest_of
 
 
 def robot_tables() -> robot_messages.RobotTables:
@@ -25,13 +29,16 @@ def robot_tables() -> robot_messages.RobotTables:
     )
 
 
-def robot_content(robot: Robot) -> robot_messages.RobotContent:
-    """Return the data of a robot that a client displays."""
+def robot_content(robot: Robot, poses: Sequence[TaughtPose] = ()) -> robot_messages.RobotContent:
+    """Return the data of a robot and its recorded poses that a client displays."""
     return robot_messages.RobotContent(
         name=robot.name,
         convention=_convention(robot),
         chain=robot.links == serial_chain(robot.links),
         links=[_row(link) for link in robot.links],
+        coordinates=_coordinates(robot),
+        speeds=_speeds(robot),
+        poses=[robot_messages.Pose(name=pose.name, q=list(pose.q)) for pose in poses],
         fields={name: column.read(robot) for name, column in ROBOT_COLUMNS.items()},
         findings=[
             *_inertia_findings(robot),
@@ -40,6 +47,26 @@ def robot_content(robot: Robot) -> robot_messages.RobotContent:
             *_plausibility_findings(robot),
         ],
     )
+
+
+def _coordinates(robot: Robot) -> list[robot_messages.Coordinate]:
+    return [
+        robot_messages.Coordinate(
+            name=entry.name, unit=entry.unit, low=_finite(low), high=_finite(high), rest=value
+        )
+        for entry, (low, high), value in zip(robot.positions, robot.qlim.tolist(), rest_of(robot))
+    ]
+
+
+def _speeds(robot: Robot) -> list[robot_messages.Speed]:
+    return [
+        robot_messages.Speed(name=entry.name, unit=entry.unit, limit=_finite(limit))
+        for entry, limit in zip(robot.speeds, robot.speed_limits.tolist())
+    ]
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def _column(column: Column[Owner]) -> robot_messages.CellColumn:

@@ -31,6 +31,7 @@ from armblocks.studio.protocol.messages.studio import FileList, Files, Ping, Wel
 from armblocks.studio.robots.open_robots import OpenRobots
 from armblocks.studio.robots.presenter import RobotPresenter
 from armblocks.studio.robots.requests import RobotRequests
+from armblocks.studio.robots.teaching_requests import TeachingRequests
 from armblocks.studio.runs.checks import Checks
 from armblocks.studio.runs.diagram_runs import DiagramRuns
 from armblocks.studio.runs.settings import setting_rules, solver_choices
@@ -70,7 +71,8 @@ class Hub:
         self._diagrams = OpenDocuments(folder, self._state, self._resolve_robot, data)
         self.runs = DiagramRuns(self._clients, self._diagrams, checks.job)
         lines = LinesOfSheets()
-        robots = RobotPresenter(OpenRobots(folder, self._state), folder, self._robot_saved)
+        open_robots = OpenRobots(folder, self._state)
+        robots = RobotPresenter(open_robots, folder, self._robot_saved)
         self._diagram_presenter = DiagramPresenter(
             self._diagrams, self._clients, self.runs, lines, checks.check
         )
@@ -85,6 +87,7 @@ class Hub:
             SheetQueries(folder, self.documents, self._diagrams, self._resolve_robot, lines),
             DataRequests(data, self._files_changed),
             RobotRequests(folder, self.documents, robots, self._diagrams),
+            TeachingRequests(folder, open_robots),
             self.runs,
         ):
             handlers.register(self.answers)

@@ -63,6 +63,34 @@ class RobotFinding(Message):
     fix: str
 
 
+class Coordinate(Message):
+    """An entry of q: its name, its unit (rad, m or 1), and its limits if it has them.
+
+    ``rest`` is its value in the pose that is shown without motion.
+    """
+
+    name: str
+    unit: str
+    low: float | None
+    high: float | None
+    rest: float
+
+
+class Speed(Message):
+    """An entry of qd: its name, the unit of its coordinate (rad or m), and its limit if it has one."""
+
+    name: str
+    unit: str
+    limit: float | None
+
+
+class Pose(Message):
+    """A recorded pose: its name and coordinates."""
+
+    name: str
+    q: list[float]
+
+
 class RobotContent(Content):
     """A robot as the tables of its editor show it."""
 
@@ -72,6 +100,9 @@ class RobotContent(Content):
     """Convention of the D-H rows; ``""`` if there are none or both conventions occur."""
     chain: bool
     links: list[LinkRow]
+    coordinates: list[Coordinate]
+    speeds: list[Speed]
+    poses: list[Pose]
     fields: dict[str, float | str | None]
     findings: list[RobotFinding]
 

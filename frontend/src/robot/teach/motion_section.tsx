@@ -1,0 +1,188 @@
+import { ActionIcon, Button, SegmentedControl, Slider, TextInput } from '@mantine/core'
+import { IconAlertTriangle, IconPlayerPauseFilled, IconPlayerPlayFilled } from '@tabler/icons-react'
+import { shareOf } from '../../model/motion'
+import { useStudio } from '../../store'
+import { shortNumber, useRobotEditor } from '../editor/state'
+import { insertMotion } from './insert_motion'
+import { SaveMotionDialog } from './save_motion_dialog'
+import {
+  chooseMotion,
+  pausePlayback,
+  playMotion,
+  runMotion,
+  showTime,
+  useTeaching,
+  type Course,
+  type ShownMotion,
+} from './state'
+
+const COURSES = [
+  { value: 'joint', label: 'Joint' },
+  { value: 'line', label: 'Line' },
+  { value: 'spline', label: 'Spline' },
+]
+
+/** The motion through the recorded poses: its kind and duration, playback, peaks, file and block. */
+export function MotionSection() {
+  const count = useRobotEditor((s) => (s.current ? (s.robots[s.current]?.poses.length ?? 0) : 0))
+  const { course, duration, fault, motion } = useTeaching()
+  return (
+    <section aria-label="Motion">
+      <h3>Motion</h3>
+      <div className="row">
+        <SegmentedControl
+          size="xs"
+          aria-label="Kind of motion"
+          data={COURSES}
+          value={course}
+          onChange={(value) => chooseMotion({ course: value as Course })}
+        />
+        <TextInput
+          size="xs"
+          w={118}
+          aria-label="Duration in s"
+          placeholder="least time"
+          rightSection={<span className="unit">s</span>}
+          value={duration}
+          onChange={(event) => chooseMotion({ duration: event.currentTarget.value })}
+          onKeyDown={(event) => event.key === 'Enter' && void runMotion()}
+        />
+        <Button size="compact-xs" disabled={count < 2} onClick={() => void runMotion()}>
+          Run
+        </Button>
+      </div>
+      {count < 2 && <p className="hint">A motion needs two recorded poses.</p>}
+      {fault && (
+        <p className="warnings" role="alert">
+          <IconAlertTriangle size={14} aria-hidden /> {fault}
+        </p>
+      )}
+      {motion && <Planned motion={motion} />}
+      <SaveMotionDialog />
+    </section>
+  )
+}
+
+function Planned({ motion }: { motion: ShownMotion }) {
+  const diagram = useStudio((s) => s.document)
+  return (
+    <>
+      <Playback motion={motion} />
+      <Peaks motion={motion} />
+      {motion.exceeded.length > 0 && (
+        <ul className="warnings" aria-label="Exceeded limits">
+          {motion.exceeded.map((text) => (
+            <li key={text}>
+              <IconAlertTriangle size={14} aria-hidden /> {text}
+            </li>
+          ))}
+        </ul>
+      )}
+      <div className="row">
+        <Button
+          size="compact-xs"
+          variant="default"
+          onClick={() => useTeaching.setState({ saving: 'motion.csv', refusal: '' })}
+        >
+          Save the trajectory …
+        </Button>
+        <Button
+          size="compact-xs"
+          variant="default"
+          disabled={!diagram}
+          title={diagram ? `A Trajectory block in ${diagram.name}` : 'No diagram is open'}
+          onClick={() => void insertMotion()}
+        >
+          Insert into the diagram
+        </Button>
+      </div>
+    </>
+  )
+}
+
+function Playback({ motion }: { motion: ShownMotion }) {
+  const { time, playing } = useTeaching()
+  const end = motion.time.at(-1)!
+  const label = playing ? 'Pause the motion' : 'Play the motion'
+  return (
+    <div className="playback">
+      <ActionIcon
+        variant="subtle"
+        color="gray"
+        aria-label={label}
+        title={label}
+        onClick={playing ? pausePlayback : playMotion}
+      >
+        {playing ? <IconPlayerPauseFilled size={15} /> : <IconPlayerPlayFilled size={15} />}
+      </ActionIcon>
+      <Slider
+        size="sm"
+        thumbLabel="Time of the motion"
+        min={0}
+        max={end}
+        step={end / 1000}
+        label={null}
+        value={Math.min(time, end)}
+        marks={motion.via.map((value) => ({ value }))}
+        onChange={(value) => {
+          pausePlayback()
+          showTime(value)
+        }}
+      />
+      <output className="numbers" aria-label="Duration of the motion">
+        {time.toFixed(2)} / {end.toFixed(2)} s
+      </output>
+    </div>
+  )
+}
+
+/** The largest speed and torque of each joint, with bars relative to the limits. */
+function Peaks({ motion }: { motion: ShownMotion }) {
+  const angles = useRobotEditor((s) => s.angles)
+  return (
+    <table className="peaks numbers" aria-label="Peaks of the motion">
+      <thead>
+        <tr>
+          <th scope="col">joint</th>
+          <th scope="col">speed</th>
+          <th scope="col">torque</th>
+        </tr>
+      </thead>
+      <tbody>
+        {motion.peaks.map(({ name, unit, speed, speed_limit, torque, torque_limit }) => {
+          const degrees = unit === 'rad' && angles === 'deg'
+          const shownSpeed = shortNumber(degrees ? (speed * 180) / Math.PI : speed, 2)
+          return (
+            <tr key={name}>
+              <th scope="row">{name}</th>
+              <Peak text={`${shownSpeed} ${degrees ? '°' : unit}/s`} share={shareOf(speed, speed_limit)} />
+              <Peak
+                text={`${shortNumber(torque, 2)} ${unit === 'rad' ? 'N m' : 'N'}`}
+                share={shareOf(torque, torque_limit)}
+              />
+            </tr>
+          )
+        })}
+      </tbody>
+      <tfoot>
+        <tr>
+          <td colSpan={3}>tool speed at most {shortNumber(motion.tool_speed, 3)} m/s</td>
+        </tr>
+      </tfoot>
+    </table>
+  )
+}
+
+/** Excess over a limit by rounding and by interpolation, which is no warning, in percent. */
+const TOLERANCE = 0.1
+
+function Peak({ text, share }: { text: string; share: number | undefined }) {
+  const isOver = share !== undefined && share > 100 + TOLERANCE
+  return (
+    <td className={isOver ? 'over' : undefined}>
+      {text}
+      <span className="share">{share === undefined ? '' : `${Math.round(share)} %`}</span>
+      {share !== undefined && <meter aria-hidden min={0} max={100} value={Math.min(share, 100)} />}
+    </td>
+  )
+}

@@ -1,0 +1,81 @@
+"""Requests that teach an arm: dragging of its tool, motions through its recorded poses, the workspace."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import TypeVar
+
+from armblocks.errors import FormatError
+from armblocks.face.arm import Arm
+from armblocks.studio.documents.project_folder import ProjectFolder, check_file_name
+from armblocks.studio.protocol.answers import Answers
+from armblocks.studio.protocol.clients import StudioClient
+from armblocks.studio.protocol.messages import teaching as teaching_messages
+from armblocks.studio.robots.motions import plan, planned_motion, workspace
+from armblocks.studio.robots.open_robots import OpenRobots
+from armblocks.studio.robots.reaching import reached
+
+Result = TypeVar("Result")
+SUFFIXES = (".csv",)
+
+
+class TeachingRequests:
+    """Handles the requests that teach an arm."""
+
+    def __init__(self, folder: ProjectFolder, robots: OpenRobots) -> None:
+        self._folder = folder
+        self._robots = robots
+
+    def register(self, answers: Answers) -> None:
+        """Register the handlers of these requests."""
+        answers.on(teaching_messages.AskReach, self._reach)
+        answers.on(teaching_messages.AskMotion, self._motion)
+        answers.on(teaching_messages.AskMotionRows, self._rows)
+        answers.on(teaching_messages.SaveMotion, self._save)
+        answers.on(teaching_messages.AskWorkspace, self._workspace)
+
+    async def _reach(self, _: StudioClient, request: teaching_messages.AskReach) -> teaching_messages.Reached:
+        return await self._computed(request.document, lambda arm: reached(arm, request.q, request.target))
+
+    async def _motion(
+        self, _: StudioClient, request: teaching_messages.AskMotion
+    ) -> teaching_messages.PlannedMotion:
+        poses = self._robots[request.document].document.value.poses
+        return await self._computed(
+            request.document,
+            lambda arm: planned_motion(arm, plan(arm, poses, request.course, request.duration)),
+        )
+
+    async def _rows(self, _: StudioClient, request: teaching_messages.AskMotionRows) -> list[list[float]]:
+        poses = self._robots[request.document].document.value.poses
+        return await self._computed(
+            request.document,
+            lambda arm: plan(arm, poses, request.course, request.duration).trajectory.rows().tolist(),
+        )
+
+    async def _save(self, _: StudioClient, request: teaching_messages.SaveMotion) -> str:
+        path = self._folder.path(request.path, SUFFIXES)
+        check_file_name(request.path)
+        if path.exists() and not request.overwrite:
+            raise FormatError(
+                f"the file '{request.path}' exists",
+                where="project folder",
+                allowed="a new file, or overwriting",
+                fix="choose another name, or overwrite the file",
+            )
+        poses = self._robots[request.document].document.value.poses
+        await self._computed(
+            request.document,
+            lambda arm: plan(arm, poses, request.course, request.duration).trajectory.save(path),
+        )
+        return request.path
+
+    async def _workspace(self, _: StudioClient, request: teaching_messages.AskWorkspace) -> str:
+        return await self._computed(request.document, workspace)
+
+    async def _computed(self, document: str, compute: Callable[[Arm], Result]) -> Result:
+        """The result of a computation with the compiled arm, in a thread."""
+        open_file = self._robots[document]
+        async with open_file.reading:  # concurrent requests compile the arm only once
+            return await asyncio.to_thread(compute, open_file.arm)
