@@ -278,9 +278,3 @@ def test_robots_without_inverse_kinematics_are_refused() -> None:
     fixed = ab.Robot(name="post", links=(ab.Link(name="post", joint=ab.Fixed()),))
     with pytest.raises(RobotError, match="no joint moves, so there is no inverse kinematics"):
         ab.Arm(fixed).ikine(np.eye(4))
-    robot = arm_of("planar3r").robot
-    pin = ab.RevoluteClosure(
-        name="pin", first=ab.Attachment(), second=ab.Attachment(link=robot.links[-1].name)
-    )
-    with pytest.raises(RobotError, match="inverse kinematics does not support closed loops"):
-        ab.Arm(replace(robot, constraints=(pin,))).ikine(np.eye(4))

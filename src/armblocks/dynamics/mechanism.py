@@ -107,6 +107,11 @@ class Mechanism:
         """The residuals (m,) at ``q`` (nq,)."""
         return np.asarray(self._evaluate(q)[0].full())[:, 0]
 
+    def equations(self, q: Array) -> tuple[Array, Array]:
+        """The residuals (m,) and their Jacobian J (m, n) at ``q`` (nq,)."""
+        residuals, J = self._evaluate(q)
+        return np.asarray(residuals.full())[:, 0], np.asarray(J.full())
+
     def jacobian(self, q: Array) -> Array:
         """J (m, n) at ``q`` (nq,)."""
         return np.asarray(self._evaluate(q)[1].full())
@@ -114,6 +119,10 @@ class Mechanism:
     def moved(self, q: Array, step: Array) -> Array:
         """The coordinates after a motion with the speeds ``step`` (n,) for unit time."""
         return np.asarray(self._move(q, step).full())[:, 0]
+
+    def descended(self, q: Array) -> Array:
+        """The coordinates at which the Levenberg-Marquardt method ends if it starts at ``q``."""
+        return self._descend(q, list(range(self.robot.nv)))
 
     def assembled(self, guess: Array, locked: Sequence[str] = ()) -> Array:
         """Coordinates near ``guess`` that satisfy the constraints; the ``locked`` joints do not move.
@@ -133,7 +142,7 @@ class Mechanism:
                 step[free] = random.normal(scale=0.1 * attempt, size=len(free))
                 start = self.moved(guess, step)
             q = self._descend(start, free)
-            size = self._distance(q)
+            size = self.distance(q)
             if size < smallest:
                 best, smallest = q, size
             if size <= RESIDUAL_TOLERANCE:
@@ -160,7 +169,7 @@ class Mechanism:
             for _ in range(WIDE_STARTS):
                 step = random.uniform(ranges[:, 0], ranges[:, 1])
                 q = self._descend(self.moved(neutral, step), free)
-                if self._distance(q) <= RESIDUAL_TOLERANCE:
+                if self.distance(q) <= RESIDUAL_TOLERANCE:
                     return q
             raise error
 
@@ -258,7 +267,7 @@ class Mechanism:
             angle.append(math.pi)
         return math.hypot(*position), max(map(abs, angle))
 
-    def _distance(self, q: Array) -> float:
+    def distance(self, q: Array) -> float:
         """The largest residual; infinite if a closure is assembled with a reversed axis."""
         if any(self._reversed_axes(closure, q) for closure in self._closures):
             return math.inf

@@ -37,9 +37,10 @@ def trace_pose_error(
     velocity of the tool in the same axes, so ``J qd = error`` moves the tool towards the target. ``frame``:
     the name of another frame of the robot that takes the place of the tool.
 
-    Raises RobotError for a robot without moving joints and for a robot with closed loops.
+    With closed loops, q are the coordinates of all joints, and the constraints are additional equations.
+    Raises RobotError for a robot without moving joints.
     """
-    check_open_chain(robot)
+    check_joints(robot)
     tree, coordinates = KinematicTree.of(robot).with_tool_at(frame), robot.coordinate_map
 
     def equations(q: SX, T: SX) -> tuple[SX, SX]:
@@ -74,8 +75,8 @@ def trace_pose_error_in_tool(robot: Robot, frame: str | None = None) -> TracedFu
     return trace_pose_error(robot, frame, ErrorAxes.TARGET)
 
 
-def check_open_chain(robot: Robot) -> None:
-    """Raise RobotError for a robot whose inverse kinematics are not defined by its joints alone."""
+def check_joints(robot: Robot) -> None:
+    """Raise RobotError for a robot without moving joints."""
     if robot.n == 0:
         raise RobotError(
             "no joint moves, so there is no inverse kinematics",
@@ -83,12 +84,17 @@ def check_open_chain(robot: Robot) -> None:
             allowed="at least one joint that is not fixed",
             fix="give the robot a joint that moves",
         )
+
+
+def check_open_chain(robot: Robot) -> None:
+    """Raise RobotError for a robot whose inverse kinematics are not defined by its joints alone."""
+    check_joints(robot)
     closures: Sequence[str] = [closure.name for closure in robot.closures]
     if closures:
         raise RobotError(
-            f"inverse kinematics does not support closed loops, and the robot has {', '.join(closures)}",
+            "closed forms and rates of inverse kinematics do not support closed loops, and the robot has "
+            + ", ".join(closures),
             where=f"robot '{robot.name}'",
             allowed="chains and trees of joints, with couplings",
-            fix="remove the closures with dataclasses.replace(robot, constraints=robot.couplings), "
-            "solve for the open chain, and find the other joints with arm.assemble(q, locked=…)",
+            fix="use arm.ikine(T), which also solves for the joints of closed loops",
         )

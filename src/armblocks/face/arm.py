@@ -28,6 +28,7 @@ from armblocks.face.arm_kernels import ArmKernels, traces
 from armblocks.face.arm_measures import (
     Ellipsoid,
     force_ellipsoid,
+    friction_model_of,
     has_spherical_wrist,
     manipulability_of,
     operational_inertia,
@@ -127,12 +128,7 @@ class Arm(metaclass=ArgumentErrors):
 
     def with_friction_model(self, model: FrictionModel | str) -> Arm:
         """The arm with the friction formula of another toolbox release, see :class:`FrictionModel`."""
-        if isinstance(model, str):
-            names = {known.value: known for known in FrictionModel}
-            if model not in names:
-                raise UnknownNameError("friction model", model, names, where=self.name)
-            model = names[model]
-        return Arm(self.robot.with_friction_model(model), self._near)
+        return Arm(self.robot.with_friction_model(friction_model_of(model, self.name)), self._near)
 
     # ---- kinematics --------------------------------------------------------------------------------------
     @cached_property
@@ -217,7 +213,6 @@ class Arm(metaclass=ArgumentErrors):
     @cached_property
     def integrate(self) -> IntegrateFunction:
         """``integrate(q, qd, dt)`` → q (nq,) after ``dt`` s at constant speeds; quaternions have length 1.
-
         A ball rotates about a fixed axis by the angle ``|w| dt``; all other coordinates are ``q + qd dt``.
         """
         return self._code.entry("integrate")
@@ -278,23 +273,29 @@ class Arm(metaclass=ArgumentErrors):
         ``frame``: as for ``fkine``. ``tolerance``: the largest error of a solution in m and in rad.
 
         The result has the reason if there is no solution: :class:`IkineResult`. Method: damped least squares
-        with an active set of joint limits (Chan and Lawrence 1988; Sugihara, IEEE T-RO 27, 2011). Raises
-        InputError for targets that are not poses, RobotError for robots with closed loops.
+        with an active set of joint limits (Chan and Lawrence 1988; Sugihara, IEEE T-RO 27, 2011). For closed
+        loops, pose and constraints are solved together. Raises InputError for targets that are no poses.
         """
         return self._inverse.call(mask, limits, frame, axes, tolerance, restarts, seed)(T, q0, threads)
 
     def ikine_all(
-        self, T: Target, *, limits: bool = True, tolerance: float = 1e-9, threads: int = 1
+        self,
+        T: Target,
+        *,
+        limits: bool = True,
+        frame: str | None = None,
+        tolerance: float = 1e-9,
+        threads: int = 1,
     ) -> IkineBranches:
         """Find all coordinates q (nq,) with ``fkine(q) = T`` in closed form, for one pose or for N.
 
         It supports arms with six joints and a spherical wrist or three parallel axes, arms with only parallel
-        axes (SCARA, planar), palletisers, and arms with three to five joints of these types. The geometry is
-        detected. Every branch is checked by forward kinematics to ``tolerance`` (m and rad). ``T`` and
-        ``limits`` as for :meth:`ikine`; angles are shifted by full turns into the limits if possible, else to
-        the value nearest to zero. Raises RobotError that names the reason for other arms.
+        axes (SCARA, planar), palletisers, and arms with three to five joints of these types. Every branch is
+        checked by forward kinematics to ``tolerance`` (m and rad, of the tool). ``T`` and ``limits`` as for
+        :meth:`ikine`; angles are shifted by full turns into the limits if possible, else to the value nearest
+        to zero. ``frame``: fixed to the link of the tool. Raises RobotError with the reason for other arms.
         """
-        return self._inverse.closed_form.branches(T, limits, tolerance, threads)
+        return self._inverse.branches(T, limits, frame, tolerance, threads)
 
     def ikine6s(
         self, T: Target, configuration: str = "lun", *, limits: bool = False, threads: int = 1
@@ -313,10 +314,8 @@ class Arm(metaclass=ArgumentErrors):
     def rne(self) -> MotionFunction:
         """``rne(q, qd, qdd)`` → tau (n,) N m or N: joint torques of a motion, with motors and friction.
 
-        The torques of a motion that violates the constraints of the robot are NaN.
-
-        ``wrench=`` [fx fy fz mx my mz] in the last link's frame, ``payload=`` a :class:`Payload` at the tool,
-        or the mass (kg) of a point mass at the tool.
+        The torques of a motion that violates the constraints of the robot are NaN. ``wrench=`` [fx fy fz mx
+        my mz] in the last link's frame, ``payload=`` a :class:`Payload` at the tool, or a point mass (kg).
         """
         return self._code.loaded("rne")
 

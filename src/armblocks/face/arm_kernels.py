@@ -41,7 +41,7 @@ class ArmKernels:
         self, robot: Robot, near: Array | None, maker: tuple[Callable[..., object], tuple[object, ...]]
     ) -> None:
         self.robot = robot
-        self._near = near
+        self.near = near
         self._maker = maker
         self._kernels: dict[str, Kernel] = {}
         self._searches: dict[tuple[str | None, str], ArmSearch] = {}
@@ -64,8 +64,8 @@ class ArmKernels:
         kernel = self._kernels.get(method)
         if kernel is None:
             key, options = f"robot/{method}/{self.description_key}", {}
-            if self._near is not None and method in _assembled():
-                key, options = f"{key}/near {self._near.tolist()}", {"near": self._near}
+            if self.near is not None and method in _assembled():
+                key, options = f"{key}/near {self.near.tolist()}", {"near": self.near}
             kernel = cached_kernel(key, lambda: traces()[method](self.robot, **options))
             self._kernels[method] = kernel
         return kernel

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armblocks.argument_errors import ArgumentErrors
 from armblocks.errors import InputError, RobotError, UnknownNameError, counted
-from armblocks.robot import Robot
+from armblocks.robot import FrictionModel, Robot
 from armblocks.robot.fields import numbers
 
 Array = NDArray[np.float64]
@@ -160,3 +160,13 @@ def has_spherical_wrist(robot: Robot) -> bool:
     if any(axis.prismatic for axis in wrist) or first.parallel(second) or second.parallel(third):
         return False
     return chain.common_point(*wrist) is not None
+
+
+def friction_model_of(model: FrictionModel | str, where: str) -> FrictionModel:
+    """The friction model, also from its name. Raises UnknownNameError."""
+    if not isinstance(model, str):
+        return model
+    names = {known.value: known for known in FrictionModel}
+    if model not in names:
+        raise UnknownNameError("friction model", model, names, where=where)
+    return names[model]
