@@ -40,6 +40,12 @@ if TYPE_CHECKING:
         save_library,
         to_python,
     )
+    from armblocks.face.excitation import Excitation, excitation
+    from armblocks.face.fit import fit
+    from armblocks.face.fit_data import Experiment
+    from armblocks.face.fit_result import FitResult, FittedSignal
+    from armblocks.face.identification_result import IdentificationResult
+    from armblocks.face.identify import identify
     from armblocks.face.ikine_branches import IkineBranches
     from armblocks.face.ikine_result import IkineResult
     from armblocks.face.least_time import least_time
@@ -135,9 +141,14 @@ else:
             "Distribution": "armblocks.sweeps.designs",
             "Drive": "armblocks.report.drive_load",
             "DriveLoad": "armblocks.report.drive_load",
+            "Excitation": "armblocks.face.excitation",
+            "Experiment": "armblocks.face.fit_data",
+            "FitResult": "armblocks.face.fit_result",
+            "FittedSignal": "armblocks.face.fit_result",
             "Fixed": "armblocks.robot",
             "Free": "armblocks.robot",
             "FrictionModel": "armblocks.robot",
+            "IdentificationResult": "armblocks.face.identification_result",
             "IkineBranches": "armblocks.face.ikine_branches",
             "IkineResult": "armblocks.face.ikine_result",
             "JointLimits": "armblocks.robot",
@@ -193,9 +204,12 @@ else:
             "diagram_difference": "armblocks.diagram",
             "draw_diagram": "armblocks.face.reporting",
             "errors": "armblocks.errors",
+            "excitation": "armblocks.face.excitation",
+            "fit": "armblocks.face.fit",
             "formula": "armblocks.diagram",
             "frequency_response": "armblocks.face.linearizing",
             "geomspace": "armblocks.sweeps.designs",
+            "identify": "armblocks.face.identify",
             "jtraj": "armblocks.face.toolbox_trajectories",
             "least_time": "armblocks.face.least_time",
             "linearize": "armblocks.face.linearizing",
@@ -269,9 +283,14 @@ __all__ = [
     "Distribution",
     "Drive",
     "DriveLoad",
+    "Excitation",
+    "Experiment",
+    "FitResult",
+    "FittedSignal",
     "Fixed",
     "Free",
     "FrictionModel",
+    "IdentificationResult",
     "IkineBranches",
     "IkineResult",
     "JointLimits",
@@ -327,9 +346,12 @@ __all__ = [
     "diagram_difference",
     "draw_diagram",
     "errors",
+    "excitation",
+    "fit",
     "formula",
     "frequency_response",
     "geomspace",
+    "identify",
     "jtraj",
     "least_time",
     "linearize",

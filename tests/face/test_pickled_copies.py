@@ -52,6 +52,12 @@ def small_builder() -> ab.DiagramBuilder:
     return builder
 
 
+def random_log(arm: ab.Arm) -> dict[str, np.ndarray]:
+    """Return 50 samples of a motion with the torques of the arm."""
+    q, qd, qdd = np.random.default_rng(1).normal(size=(3, 50, arm.n))
+    return {"t": np.arange(50.0), "q": q, "qd": qd, "qdd": qdd, "tau": arm.rne(q, qd, qdd)}
+
+
 @cache
 def examples() -> Mapping[str, Any]:
     """Return one value of every public type, and of some other types, by the name of the type."""
@@ -62,6 +68,7 @@ def examples() -> Mapping[str, Any]:
     drive = ab.Drive(name="a", gear_ratio=20.0, stall_torque=1.0, max_speed=300.0)
     report = ab.trajectory_report(arm, ab.jtraj([0, 0], [1, 1], 5), speed=1.0)
     sizing = ab.size_drives(arm, ab.jtraj([0, 0], [1, 1], 5), [drive])
+    fitted = ab.fit(diagram, "k", {"t": [0.0, 0.5, 1.0], "gain": [0.0, 1.0, 1.5]})
     phase = ab.CyclePhase(name="grip", start=0.0, end=1.0, loaded=True)
     cycle = ab.PickAndPlaceCycle(trajectory=ab.jtraj([0, 0], [1, 1], 5), phases=(phase,))
     region = ab.workspace(arm, 50)
@@ -112,6 +119,9 @@ def examples() -> Mapping[str, Any]:
         *(result, result.final_state, system, system.point, system.margins(), system.transfer_function()),
         ab.diagram_difference(diagram, ab.load_diagram("kr180model")),
         ab.sensitivity(diagram, "gain.gain", "integrator", stop_time=1.0),
+        ab.identify(arm, random_log(arm)),
+        ab.excitation(arm, evaluations=2),
+        *(fitted, fitted.signals[0], ab.Experiment(data={"t": [0.0, 1.0]})),
         ab.trim("van_der_pol_pid"),
         FromFile(data=[[0.0, 1.0], [1.0, 2.0]]),
         FromFile(data=[[0.0, 1.0], [1.0, 2.0]]).data,

@@ -85,6 +85,30 @@ class SampleTimes:
         return number
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ListedTimes(SampleTimes):
+    """Sample times at any distances: ``times`` (N,) s, ascending, the first one is the start of the run."""
+
+    times: Array
+
+    @staticmethod
+    def of(times: Array) -> ListedTimes:
+        """The sample times of a run that ends at the last one."""
+        start, stop = float(times[0]), float(times[-1])
+        step = (stop - start) / DEFAULT_INTERVALS if stop > start else 1.0
+        return ListedTimes(
+            start=start, stop=stop, sample_time=step, first=1, count=len(times), times=np.array(times)
+        )
+
+    def part(self, begin: int, end: int) -> Array:
+        """Sample times number ``begin`` to ``end - 1``, s."""
+        return self.times[begin:end].copy()
+
+    def up_to(self, time: float) -> int:
+        """Number of sample times up to and including a time (s)."""
+        return int(np.searchsorted(self.times, time, side="right"))
+
+
 @dataclass(frozen=True, kw_only=True)
 class Plan:
     """The settings of one run, with all choices made. ``tableau`` is the method, ``None`` for a system

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from time import perf_counter
 from typing import NoReturn
@@ -23,7 +24,13 @@ from armblocks.simulation.diagnosis import (
     warnings_of_blocks,
 )
 from armblocks.simulation.loop_conditions import warnings_of_loops
-from armblocks.simulation.plan import LogRequest, changed_parameters, make_plan, parameter_vector
+from armblocks.simulation.plan import (
+    ListedTimes,
+    LogRequest,
+    changed_parameters,
+    make_plan,
+    parameter_vector,
+)
 from armblocks.simulation.recording import Recording, Samples
 from armblocks.simulation.result import SimulationResult
 from armblocks.simulation.run_data import ParameterChange, RunReport
@@ -57,7 +64,9 @@ class Simulation:
         log: LogRequest | None = None,
         calls: Sequence[CalledFunction] = (),
         signals_layout: Signature | None = None,
+        times: Array | None = None,
     ) -> None:
+        """``times`` (N,) s: the samples, instead of those of ``options``; from 0 to the stop time."""
         if {function.block for function in calls} != set(compiled.called):
             raise InputError(
                 f"no function is given for the blocks {', '.join(map(repr, compiled.called))}",
@@ -72,7 +81,8 @@ class Simulation:
         if initial_state is not None:
             check_state(compiled, initial_state)
         start = 0.0 if initial_state is None else initial_state.time
-        self._plan = make_plan(compiled, options, start, logged=log is not None)
+        plan = make_plan(compiled, options, start, logged=log is not None)
+        self._plan = plan if times is None else dataclasses.replace(plan, sample_times=ListedTimes.of(times))
         self._method = RunMethod(compiled, options, self._plan, initial_state)
         self.signals_layout = signals_layout or compiled.signals_layout
         """The layout of the compiled system, possibly with names of the entries of signals in addition."""
