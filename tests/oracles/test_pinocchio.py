@@ -11,6 +11,7 @@ import pinocchio as pin
 import pytest
 from numpy.testing import assert_allclose
 
+from armblocks.dynamics.torque_regressor import trace_torque_regressor
 from armblocks.robot import (
     Cylindrical,
     Free,
@@ -209,3 +210,26 @@ def test_centre_of_mass_and_energies_agree_for_a_robot_without_fixed_base_links(
         rotors = sum(motor.reflected_inertia * rate**2 / 2 for motor, rate in zip(puma560.motors, qd))
         kinetic = pin.computeKineticEnergy(model, data, q, qd) + rotors
         assert evaluate(puma560, "kinetic_energy", q, qd) == pytest.approx(kinetic, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["KR180", "Puma 560", "random1tree", "random3chain"])
+def test_torques_span_the_space_of_the_regressor_of_pinocchio(name: str):
+    robot = LAW_ROBOTS[name]
+    other = pinocchio_robot(robot)
+    links = [link.name for link in robot.links]
+    regressor = trace_torque_regressor(robot, links).casadi_function()
+    ours: list[np.ndarray] = []
+    theirs: list[np.ndarray] = []
+    for q, qd, qdd in random_states(robot, 40, seed=3):
+        matrix = np.asarray(regressor(q, qd, qdd)).reshape(robot.n, -1)
+        ours.append(matrix[:, : 10 * len(links)])
+        states = other.state(q, qd, qdd)
+        theirs.append(states[3].T @ pin.computeJointTorqueRegressor(other.model, other.data, *states[:3]))
+    A, B = (np.concatenate(parts) for parts in (ours, theirs))
+
+    def rank(matrix: np.ndarray) -> int:
+        lengths = np.linalg.norm(matrix, axis=0)
+        s = np.linalg.svd(matrix[:, lengths > 1e-9] / lengths[lengths > 1e-9], compute_uv=False)
+        return int(np.sum(s > 1e-8 * s[0]))
+
+    assert (rank(A), rank(B), rank(np.hstack([A, B]))) == (rank(A),) * 3
