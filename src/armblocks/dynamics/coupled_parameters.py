@@ -28,11 +28,12 @@ from armblocks import rounded_functions
 from armblocks.dynamics.joint_motion import entries, joint_motions
 from armblocks.dynamics.reduction import generalised_forces, tree_coordinates, tree_speeds
 from armblocks.dynamics.rnea import rnea
+from armblocks.dynamics.robot_trace import column_sum
 from armblocks.equations.constant_folding import operation_value, results_of_operations
 from armblocks.robot.robot import Robot
-from armblocks.robot.tree import BASE, KinematicTree
+from armblocks.robot.tree import BASE, Body, KinematicTree
 from armblocks.spatial.inertia import RigidInertia
-from armblocks.spatial.vectors import Symmetric
+from armblocks.spatial.vectors import Scalar, Symmetric
 
 Array = NDArray[np.float64]
 PARAMETERS = 10
@@ -67,17 +68,22 @@ def regrouped_by_couplings(tree: KinematicTree, robot: Robot) -> KinematicTree:
         size += abs(check[:, k] * given[k])
     if np.any(abs(error) > ROUNDING * size):
         return tree
-    bodies = (
-        replace(body, inertia=RigidInertia(m, (x, y, z), Symmetric(*second)))
-        for body, (m, x, y, z, *second) in zip(tree.bodies, found.reshape(-1, PARAMETERS).tolist())
-    )
-    return replace(tree, bodies=tuple(bodies))
+    return _with_parameters(tree, found.tolist())
 
 
 def _parameters(tree: KinematicTree) -> Array:
     """The parameters of all bodies in one column (10 n,)."""
     rows = [(body.inertia.mass, *body.inertia.first, *body.inertia.second) for body in tree.bodies]
     return np.array(rows, dtype=np.float64).ravel()
+
+
+def _with_parameters(tree: KinematicTree, parameters: Sequence[Scalar]) -> KinematicTree:
+    """The tree with ``parameters`` (10 n,) of all bodies; numbers or symbols."""
+    bodies: list[Body] = []
+    for k, body in enumerate(tree.bodies):
+        m, x, y, z, *second = parameters[PARAMETERS * k : PARAMETERS * (k + 1)]
+        bodies.append(replace(body, inertia=RigidInertia(m, (x, y, z), Symmetric(*second))))
+    return replace(tree, bodies=tuple(bodies))
 
 
 def _preferred(tree: KinematicTree) -> list[int]:
@@ -102,16 +108,12 @@ class _Effects:
         self._robot = robot
         self._random = np.random.default_rng(0)
         parameters = SX.sym("parameters", PARAMETERS * tree.n)
-        bodies = tuple(
-            replace(body, inertia=RigidInertia(m, (x, y, z), Symmetric(*second)))
-            for body, (m, x, y, z, *second) in zip(tree.bodies, _groups(entries(parameters)))
-        )
-        unit = replace(tree, bodies=bodies)
+        unit = _with_parameters(tree, entries(parameters))
         coordinates = robot.coordinate_map
         q, qd, qdd = SX.sym("q", robot.nq), SX.sym("qd", robot.nv), SX.sym("qdd", robot.nv)
         joints = joint_motions(unit, tree_coordinates(coordinates, q))
-        motion = [entries(tree_speeds(coordinates, rates)) for rates in (qd, qdd)]
-        of_tree = vertcat(*(SX(torque) for torque in rnea(unit, joints, *motion, tree.gravity)))
+        rates, accelerations = (entries(tree_speeds(coordinates, motion)) for motion in (qd, qdd))
+        of_tree = column_sum(rnea(unit, joints, rates, accelerations, tree.gravity))
         effects = jacobian(generalised_forces(coordinates, of_tree), parameters)
         # The C library's sines and cosines differ in the last place from one machine to the next.
         angles: list[SX] = []
@@ -147,10 +149,6 @@ class _Effects:
         return np.array(self._effects(q, qd, qdd, values).full())
 
 
-def _groups(values: Sequence) -> list[Sequence]:
-    return [values[k : k + PARAMETERS] for k in range(0, len(values), PARAMETERS)]
-
-
 def _regrouped(effects: Array, given: Array, order: Sequence[int]) -> Array | None:
     """The parameters with the same torques as ``given``, those of dependent columns replaced by others.
 
@@ -181,10 +179,10 @@ def _regrouped(effects: Array, given: Array, order: Sequence[int]) -> Array | No
         free[row] = False
     result, largest = np.zeros_like(given), np.zeros_like(given)
     for k, row in zip(kept, rows):
-        shares = [given[k]]
+        shares = [float(given[k])]
         for j in dependent:
-            share = work[row, j]
+            share = float(work[row, j])
             if abs(share) * sizes[k] > ROUNDING * sizes[j]:
-                shares.append(given[j] * share)
+                shares.append(float(given[j] * share))
         result[k], largest[k] = math.fsum(shares), max(map(abs, shares))
     return np.where(abs(result) > ROUNDING * largest, result, 0.0)
