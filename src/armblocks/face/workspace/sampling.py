@@ -35,6 +35,8 @@ Array = NDArray[np.float64]
 
 CHUNK = 65_536
 """Samples that are evaluated at once."""
+SAMPLES_PER_CELL = 8
+"""Least number of samples for each cell of the box, by default; few samples leave gaps in the region."""
 CELLS_ACROSS = 60
 """Cells along the longest side of the region, by default at least half of this number."""
 MAX_POINTS = 1_000_000
@@ -94,7 +96,7 @@ def workspace(
     if frame is not None:
         arm.robot.frame(frame)
     sampler = _Sampler.of(arm, names, chosen, frame, limits, loads, seed)
-    grid = _Collector(names, side, arm.robot.base.translation, kept, where)
+    grid = _Collector(names, side, arm.robot.base.translation, kept, count, where)
     for first in range(0, count, CHUNK):
         grid.add(*sampler(np.arange(first, min(first + CHUNK, count), dtype=np.float64), threads))
     notes = (*limits.notes, *notes)
@@ -168,9 +170,16 @@ class _Collector:
     """The cells, bounds and kept points of the samples so far."""
 
     def __init__(
-        self, names: Sequence[str], cell: float | None, base: Sequence[float], kept: int, where: str
+        self,
+        names: Sequence[str],
+        cell: float | None,
+        base: Sequence[float],
+        kept: int,
+        samples: int,
+        where: str,
     ) -> None:
         self._names, self._cell, self._kept, self._where = names, cell, kept, where
+        self._samples = samples
         self._base = np.array(base)[:, None]
         self._grid: CellGrid | None = None
         self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
@@ -192,8 +201,7 @@ class _Collector:
         self.reach = max(self.reach, float(np.sqrt(((points - self._base) ** 2).sum(axis=0).max())))
         if self._grid is None:
             extent = self._high - self._low
-            longest = float(extent.max())
-            cell = self._cell or (nice_step(longest / CELLS_ACROSS) if longest > 0.0 else 0.01)
+            cell = self._cell or self._default_cell(extent)
             # Centres are at multiples of the side. Where the region is a plane, they are in this plane.
             anchor = np.where(extent > cell, 0.0, points[:, 0])
             self._grid = CellGrid(cell, anchor, len(self._names), self._where)
@@ -202,6 +210,12 @@ class _Collector:
         if wanted > 0:
             self._cloud.append((numbers[:wanted].copy(), points[:, :wanted].copy(), table[:, :wanted].copy()))
         self.accepted += len(numbers)
+
+    def _default_cell(self, extent: Array) -> float:
+        """A round side (m) of the cells of a region with these extents (3,)."""
+        longest = float(extent.max())
+        spacious = float(extent.prod() * SAMPLES_PER_CELL / self._samples) ** (1.0 / 3.0)
+        return nice_step(max(longest / CELLS_ACROSS, spacious)) if longest > 0.0 else 0.01
 
     def finished(self) -> tuple[CellGrid, Array]:
         """The cells with samples, and the lowest and highest coordinates (2, 3) of the points."""
