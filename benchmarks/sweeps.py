@@ -48,7 +48,7 @@ def short_run() -> ab.Diagram:
 def least_seconds(functions: dict) -> dict[str, float]:
     """The least processor time per run of each function, which returns its number of runs."""
     least = dict.fromkeys(functions, np.inf)
-    for name, function in functions.items():
+    for function in functions.values():
         function()
     for _ in range(REPEATS):
         for name, function in functions.items():

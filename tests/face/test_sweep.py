@@ -239,6 +239,26 @@ def test_tables_are_saved_shown_and_copied(tmp_path: Path) -> None:
         result.largest("status")
 
 
+def test_probabilities_and_correlations_of_a_table() -> None:
+    builder = ab.DiagramBuilder("product")
+    one, two = (builder.add(name, blocks.Constant(value=1.0)) for name in ("one", "two"))
+    builder.add("scope", blocks.Scope(), builder.add("product", blocks.Product(operators="**"), one, two))
+    vary = {"one.value": ab.linspace(1, 10, 10), "two.value": [-1.0, -2.0]}
+    result = ab.sweep(builder.build(), vary, measures={"y": "final(product/y)"}, **SHORT)
+    share, low, high = result.probability("one.value", high=8.0)
+    assert share == 0.8
+    assert (low, high) == pytest.approx((0.5840, 0.9193), abs=1e-4)  # 16 of 20, E. B. Wilson
+    assert result.probability("y", high=0.0)[::2] == (1.0, 1.0)
+    assert result.probability("y", low=0.0)[:2] == (0.0, 0.0)
+    correlations = result.correlations("y")
+    assert list(correlations) == ["one.value", "two.value"]
+    stats = pytest.importorskip("scipy.stats")
+    for name, value in correlations.items():
+        assert value == pytest.approx(stats.spearmanr(result[name], result["y"]).statistic, abs=1e-12)
+    with pytest.raises(InputError, match="the confidence is 2"):
+        result.probability("y", confidence=2.0)
+
+
 def test_a_table_of_pandas_is_a_paired_design() -> None:
     pandas = pytest.importorskip("pandas")
     table = pandas.DataFrame({"PID.P": [1.0, 2.0], "x1.initial": [0.5, 0.25]})

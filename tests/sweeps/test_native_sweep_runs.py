@@ -11,6 +11,7 @@ import pytest
 import armblocks as ab
 from armblocks.blocks import BLOCKS
 from armblocks.face.python_calls import called_functions
+from armblocks.integration import jump_record
 from armblocks.sweeps.batch import RunProgram, RunRows, Worker
 from armblocks.sweeps.measures import KINDS, Measure, observe
 
@@ -77,3 +78,19 @@ def test_runs_of_examples_are_those_of_runs_alone(model: str, settings: dict[str
     native, alone = rows_of(ab.load_diagram(model), 3, **settings)
     assert native.general == 0
     assert_same(native, alone)
+
+
+def test_memory_for_jumps_grows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs with too many jumps are computed alone until the memory of the native loop is large enough."""
+    monkeypatch.setattr(jump_record, "INITIAL_SIZE", 64)
+    diagram = ab.load_diagram("dc_motor_sampled_pid")
+    compiled = ab.compile_diagram(diagram).compiled
+    name = next(slot.elements[0] for slot in compiled.signals_layout)
+    observation = observe([Measure("rms", name)], (), compiled.signals_layout, compiled.aliases)
+    program = RunProgram(compiled, diagram.settings, observation)
+    worker = Worker(program)
+    p = compiled.parameter_values[np.newaxis]
+    rows = [worker.compute(p) for _ in range(16)]
+    assert rows[0].general == 1 and rows[-1].general == 0
+    for later in rows[1:]:
+        assert_same(later, rows[0])

@@ -20,6 +20,7 @@ from armblocks.simulation import SimulationResult
 from armblocks.sweeps.batch import COMPLETED, STATUSES
 from armblocks.sweeps.designs import Design
 from armblocks.sweeps.files import SweepFile, to_dataframe, write_table
+from armblocks.sweeps.statistics import rank_correlation, wilson_interval
 from armblocks.sweeps.tables import STATUS
 
 if TYPE_CHECKING:
@@ -116,17 +117,57 @@ class SweepResult(metaclass=ArgumentErrors):
         return self._extreme(name, count, 1.0)
 
     def _extreme(self, name: str, count: int, sign: float) -> NDArray[np.int64]:
+        values = self._numbers(name)
+        order = np.argsort(sign * values, kind="stable")
+        order = order[~np.isnan(values[order])]
+        return self["run"][order[:count]]
+
+    def probability(
+        self, name: str, *, low: float = -np.inf, high: float = np.inf, confidence: float = 0.95
+    ) -> tuple[float, float, float]:
+        """The share of the runs whose column is from ``low`` to ``high``, and the limits of its confidence
+        interval (Wilson score interval).
+
+        Runs without a value, such as failed ones, count as outside. The interval is valid for independent
+        runs: a random design. Raises ``InputError``.
+        """
+        values = self._numbers(name)
+        if not (0.0 < confidence < 1.0 and low <= high):
+            raise InputError(
+                f"the limits are {low:g} and {high:g}, the confidence is {confidence:g}",
+                where=self.name,
+                allowed="a lower and an upper limit, and a confidence between 0 and 1",
+                fix="write for example probability('peak', high=1.2, confidence=0.99)",
+            )
+        inside = int(((values >= low) & (values <= high)).sum())
+        return (inside / values.size, *wilson_interval(inside, values.size, confidence))
+
+    def correlations(self, name: str) -> Mapping[str, float]:
+        """Spearman's rank correlation of a column with each varied parameter, the strongest first.
+
+        1: the column increases with the parameter in all runs, -1: it decreases. Runs without a value are
+        omitted; parameters without numbers, too. Raises ``InputError``.
+        """
+        values = self._numbers(name)
+        valid = ~np.isnan(values)
+        columns = {column: self[column] for column in self.names[1 : self.names.index(STATUS)]}
+        known = {
+            column: rank_correlation(entries[valid], values[valid])
+            for column, entries in columns.items()
+            if entries.dtype != object
+        }
+        return dict(sorted(known.items(), key=lambda item: -abs(np.nan_to_num(item[1]))))
+
+    def _numbers(self, name: str) -> NDArray[np.float64]:
         values = self[name]
-        if values.dtype == object or values.ndim != 1:
+        if values.dtype == object or values.ndim != 1 or not values.size:
             raise InputError(
                 f"the column '{name}' has no numbers",
                 where=self.name,
                 allowed=", ".join(self.measures) or "the parameters",
                 fix="choose a measure",
             )
-        order = np.argsort(sign * values, kind="stable")
-        order = order[~np.isnan(values[order].astype(np.float64))]
-        return self["run"][order[:count]]
+        return values.astype(np.float64)
 
     def to_dataframe(self) -> pd.DataFrame:
         """The table as a pandas data frame with the index ``run``; without kept samples."""

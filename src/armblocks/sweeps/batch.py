@@ -15,7 +15,7 @@ from armblocks.errors import SimulationError
 from armblocks.integration.native_integrator import Integration
 from armblocks.integration.run_point import RunPoint
 from armblocks.integration.system import CompiledSystem
-from armblocks.integration.workspace import Count, Scalar
+from armblocks.integration.workspace import Count, Scalar, Status
 from armblocks.simulation.calls import CalledFunction
 from armblocks.simulation.first_guess import first_guess
 from armblocks.simulation.jumps import max_sides
@@ -183,6 +183,8 @@ class Worker:
                 raise KeyboardInterrupt
             program.run_alone(parameters[row], rows, row)
         general = 0 if self._batch is None else len(remaining)
+        if self._batch is not None:
+            self._batch = self._batch.enlarged()
         return dataclasses.replace(rows, general=general)
 
 
@@ -207,10 +209,12 @@ class RunMemory:
 class NativeBatch:
     """The arrays of the native loop over runs."""
 
-    def __init__(self, program: RunProgram) -> None:
+    def __init__(self, program: RunProgram, doublings: int = 0) -> None:
+        """``doublings``: how often the initial memory for jumps is doubled."""
         self._program = program
+        self._doublings, self._jumps_full = doublings, False
         compiled, observation = program.compiled, program.observation
-        self._memory = memory = _run_memory(program)
+        self._memory = memory = _run_memory(program, doublings)
         arrays = {**_run_arrays(memory), **_observation_arrays(compiled, observation, memory)}
         self._arrays: dict[Place, NDArray[np.generic]] = arrays
         self._addresses = np.zeros(Place.END, dtype=np.int64)
@@ -252,6 +256,13 @@ class NativeBatch:
         self._numbers = np.array([numbers[place] for place in Number if place in numbers], dtype=np.int64)
         self._call = _RUNS(batch_code().address("runs"))
 
+    def enlarged(self) -> NativeBatch:
+        """A batch with twice the memory for jumps if a run has needed more, up to the maximum of a run."""
+        full = len(self._memory.jumps) >= max_sides(self._program.compiled)
+        if not self._jumps_full or full:
+            return self
+        return NativeBatch(self._program, self._doublings + 1)
+
     def compute(self, parameters: Array, rows: RunRows) -> list[int]:
         """Write the rows of runs with parameters ``(n, np)``; returns those that the general path must
         compute."""
@@ -271,6 +282,8 @@ class NativeBatch:
         self._call(self._addresses.ctypes.data, self._numbers.ctypes.data, 0, count)
         status = reports[:, Report.STATUS]
         rows.steps[:], rows.events[:] = reports[:, Report.STEPS], reports[:, Report.EVENTS]
+        states = reports[status == Outcome.OTHER, Report.GUARD]
+        self._jumps_full = bool((states == Status.JUMPS_FULL).any())
         remaining = np.flatnonzero((status == Outcome.OTHER) | (status == Outcome.LIMIT)).tolist()
         for row in np.flatnonzero(status == Outcome.STOPPED).tolist():
             guard = int(reports[row, Report.GUARD])
@@ -297,7 +310,7 @@ class NativeBatch:
         return guesses
 
 
-def _run_memory(program: RunProgram) -> RunMemory:
+def _run_memory(program: RunProgram, doublings: int) -> RunMemory:
     """The arrays of a run, whose start values the native loop replaces."""
     compiled, options, plan = program.compiled, program.options, program.plan
     sizes, samples = compiled.sizes, plan.sample_times.part(0, plan.sample_times.count)
@@ -333,6 +346,8 @@ def _run_memory(program: RunProgram) -> RunMemory:
         span=DEFAULT_INTERVALS * plan.sample_times.sample_time,
         jumps=max_sides(compiled) if options.record_jumps else 0,
     )
+    for _ in range(doublings):
+        run.jumps.enlarge(0.0)
     layout, workspace = run.integrator.layout, run.integrator.workspace
     return RunMemory(
         advance=run.integrator.address,

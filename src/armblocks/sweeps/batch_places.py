@@ -128,7 +128,7 @@ class Report(IntEnum):
     STATUS = 0
     """An :class:`Outcome`."""
     GUARD = 1
-    """The guard that ended the run."""
+    """The guard that ended the run; of another outcome, the status of the loop."""
     STEPS = 2
     EVENTS = 3
     SAMPLES = 4

@@ -268,6 +268,7 @@ def _run(r: Routine, a: Addresses, n: Integers, run: Integer) -> None:
     status, reals = outcome.value, a[Place.REALS].reals
     a[Place.END_TIMES].reals[run] = reals[Scalar.TIME]
     report[Report.STEPS], report[Report.EVENTS] = counts[Count.ACCEPTED], counts[Count.EVENTS]
+    report[Report.GUARD] = status
     with r.when(status == Status.PAUSED):
         report[Report.STATUS] = Outcome.LIMIT
     with r.unless((status == Status.DONE) | (status == Status.STOPPED)):
