@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cache
 from math import pi
+from typing import Any
 
 import numpy as np
 from casadi import Function
@@ -26,6 +27,7 @@ from armblocks.robot import (
     Robot,
     Spherical,
     Universal,
+    modified_dh,
     serial_chain,
     standard_dh,
 )
@@ -198,6 +200,9 @@ def build_random_tree(seed: int, count: int = 7, *, chain: bool = False) -> Robo
     )
 
 
+MOVING_TYPES = tuple(kind for kind in JOINT_TYPES if kind is not Fixed)
+
+
 def random_joint(kind: type[Joint], random: np.random.Generator) -> Joint:
     """Return a joint of a type with random parameters."""
     values = {
@@ -240,6 +245,64 @@ def build_mixed_tree(seed: int, kinds: Sequence[type[Joint]]) -> Robot:
     )
 
 
+def build_unusual_robot(seed: int) -> Robot:
+    """Return a random tree with values that are legal but rare.
+
+    Links of zero length or without mass, quarter turns, reversed axes, offsets, negative gear ratios and
+    pitches, rows of both D-H conventions, joints with quaternions in the middle, and gravity along any axis.
+    """
+    random = np.random.default_rng(seed)
+    count = int(random.integers(3, 6))
+    links: list[Link] = []
+    for k in range(count):
+        massless = k < count - 1 and random.random() < 0.2
+        ratio = float(random.choice([-50.0, -1.0, 1.0]))
+        common: dict[str, Any] = {
+            "parent": None if k == 0 else f"link{random.integers(max(1, k - 1), k + 1)}",
+            "mass": 0.0 if massless else random.uniform(0.2, 3),
+            "centre_of_mass": random.choice([0.0, 0.2]) * random.normal(size=3),
+            "inertia": np.zeros((3, 3)) if massless else random_inertia(random),
+            "motor": Motor(inertia=1e-3, gear_ratio=ratio, coulomb_friction=(0.1, -0.2))
+            if random.random() < 0.5
+            else None,
+        }
+        if random.random() < 0.4:
+            make = modified_dh if random.random() < 0.6 else standard_dh
+            numbers: dict[str, Any] = {
+                "alpha": float(random.choice([0.0, pi / 2, -pi / 2, pi, 0.3])),
+                "a": float(random.choice([0.0, 0.4, -0.2])),
+                "d": float(random.choice([0.0, 0.3])),
+                "theta": float(random.choice([0.0, pi / 2])),
+                "offset": float(random.choice([0.0, pi / 2, -pi, 0.7])),
+                "sigma": int(random.integers(2)),
+            }
+            links.append(make(f"link{k + 1}", **numbers, **common))
+            continue
+        kind = MOVING_TYPES[random.integers(len(MOVING_TYPES))]
+        axis = tuple(float(random.choice([-1.0, 1.0])) * np.eye(3)[random.integers(3)])
+        values: dict[str, Any] = {"axis": axis, "offset": float(random.choice([0.0, pi / 2])), "pitch": -0.05}
+        joint = kind(
+            **{
+                name: value
+                for name, value in values.items()
+                if name in kind.parameters and kind is not Universal
+            }
+        )
+        quarters = [
+            Transform(
+                rotation=rotation_about(tuple(np.eye(3)[random.integers(3)]), random.integers(-2, 3) * pi / 2)
+            )
+            for _ in range(2)
+        ]
+        links.append(Link(name=f"link{k + 1}", joint=joint, before=quarters[0], after=quarters[1], **common))
+    return Robot(
+        name=f"unusual{seed}",
+        links=tuple(links),
+        base=random_transform(random),
+        gravity=(0.0, 9.81, 0.0) if seed % 2 else (-7.0, 3.0, 2.0),
+    )
+
+
 RANDOM_ROBOTS: tuple[Robot, ...] = (
     build_random_tree(1),
     build_random_tree(2),
@@ -247,7 +310,6 @@ RANDOM_ROBOTS: tuple[Robot, ...] = (
     build_random_tree(4, 9),
 )
 
-MOVING_TYPES = tuple(kind for kind in JOINT_TYPES if kind is not Fixed)
 MIXED_ROBOTS: tuple[Robot, ...] = (
     build_mixed_tree(5, MOVING_TYPES),
     build_mixed_tree(6, (Spherical, Fixed, Revolute, Universal, Free, Spherical)),
