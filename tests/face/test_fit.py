@@ -11,7 +11,17 @@ import pytest
 from numpy.testing import assert_allclose
 
 import armblocks as ab
-from armblocks.blocks import FromFile, Gain, Integrator, Saturation, SineWave, Step, Sum
+from armblocks.blocks import (
+    Expression,
+    FromFile,
+    Gain,
+    Integrator,
+    Saturation,
+    SineWave,
+    Step,
+    Sum,
+    TransportDelay,
+)
 from armblocks.errors import InputError, UnknownNameError
 
 TRUE = {"k": 3.0, "rate.gain": 2.0, "x.initial": 0.5}
@@ -156,10 +166,18 @@ def test_parameters_without_exact_derivatives_use_differences_of_runs() -> None:
     exact = ab.fit(diagram, "limit.upper", data)
     assert_allclose(exact.values, 0.6, rtol=1e-4)
     assert not exact.differences
-    seeded = ab.DiagramBuilder("seeded")
-    seeded.add("y", Gain(gain=1.0), seeded.add("step", Step(time=1.0)))
-    result = ab.fit(seeded.build(), ["y.gain"], {"t": [0.0, 0.5, 2.0], "y": [0.0, 0.0, 3.0]})
-    assert_allclose(result.values, 3.0)
+    # Delays together with an implicit equation have no exact derivatives.
+    builder = ab.DiagramBuilder("implicit")
+    delayed = builder.add("delay", TransportDelay(delay=0.3), builder.add("wave", SineWave(frequency=2.0)))
+    total = builder.add("sum", Sum(signs="++"), delayed)
+    builder.connect(builder.add("law", Expression(formula="0.5*sin(u) + 0.1*u"), total), total["u2"])
+    builder.add("x", Integrator(), builder.add("k", Gain(gain=1.0), total))
+    implicit = builder.build()
+    true = ab.simulate(implicit, parameters={"k.gain": 3.0}, stop_time=3.0, sample_time=0.1)
+    result = ab.fit(implicit, ["k.gain", "x.initial"], {"t": true.time, "x": true["x"]})
+    assert_allclose(result.values, [3.0, 0.0], atol=1e-5)
+    assert set(result.differences) == {"k.gain", "x.initial"}
+    assert "k.gain by differences of runs: the delayed signals and the implicit equation" in str(result)
 
 
 def test_files_frames_settings_and_pickles(tmp_path: Path) -> None:

@@ -112,6 +112,18 @@ def test_trees_with_all_joint_types_are_identified(robot: ab.Robot) -> None:
     assert_allclose(result.arm.rne(q, qd, qdd), log["tau"][:20], atol=1e-3 * scale)
 
 
+@pytest.mark.parametrize("name", ["irb460", "stanford"])
+def test_exact_logs_of_shipped_robots_give_their_parameters(name: str) -> None:
+    arm = ab.load_robot(name)  # one with coupled joints, one with a prismatic joint
+    q, qd, qdd = np.random.default_rng(0).normal(size=(3, 300, arm.n))
+    log = {"t": np.arange(300.0), "q": q, "qd": qd, "qdd": qdd, "tau": arm.rne(q, qd, qdd)}
+    size = np.abs(log["tau"]).max()
+    for friction, rotors in (("asymmetric", True), ("viscous", True), ("none", False)):
+        result = ab.identify(arm, log, friction=friction, rotor_inertia=rotors)
+        assert_allclose(result.values, result.prior, atol=1e-9 * size)
+        assert_allclose(result.arm.rne(q, qd, qdd), log["tau"], atol=1e-3 * size)
+
+
 def test_the_robot_is_physically_consistent_and_stays_near_the_description() -> None:
     arm = ab.load_robot("puma560")  # two of its published inertias are impossible
     log = noisy_log(arm, 800, noise=np.array([1, 1, 1, 0.1, 0.1, 0.1]))

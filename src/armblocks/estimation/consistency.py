@@ -32,6 +32,8 @@ _FIRST_BARRIER = 10.0
 _LAST_BARRIER = 1e-8
 _REDUCTION = 0.15
 _NEWTON_STEPS = 60
+_LARGEST = 1e5
+"""Largest length of a column of the weighted matrix in scaled units."""
 
 
 def _basis() -> Array:
@@ -105,8 +107,11 @@ def consistent_fit(A: Array, y: Array, prior: Array, constraints: Constraints) -
     scale = constraints.scale
     start = constraints.interior(prior)
     matrix = A * scale
+    # Exact data have weights without bound; the pull to the start would be lost in rounding errors.
+    weight = min(1.0, _LARGEST / max(float(np.linalg.norm(matrix, axis=0).max(initial=0.0)), 1e-300))
+    matrix, y = weight * matrix, weight * (y - A @ start)
     H = matrix.T @ matrix + PULL**2 * np.eye(len(prior))
-    g = matrix.T @ (y - A @ start)
+    g = matrix.T @ y
     origin = start / scale
     z = np.zeros_like(prior)
     barrier = _FIRST_BARRIER
