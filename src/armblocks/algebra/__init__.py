@@ -1,1 +1,1 @@
-"""Equations for reading: sums of products of symbols and of sines and cosines of sums of joint angles."""
+"""Readable equations: sums of products of symbols and of sines and cosines of sums of joint angles."""

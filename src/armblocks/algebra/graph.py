@@ -1,4 +1,4 @@
-"""Evaluation of a CasADi function with other numbers: sums of products, or expressions of SymPy."""
+"""Evaluation of a CasADi function with sums of products, or expressions of SymPy, in place of numbers."""
 
 from __future__ import annotations
 

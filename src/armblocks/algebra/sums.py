@@ -44,7 +44,7 @@ class Sum:
     """A sum of monomials with numbers.
 
     ``terms``: for each monomial its number, and the sum of the magnitudes of the numbers that were added to
-    it, with which rounding errors are told from small numbers.
+    it, which distinguishes rounding errors from small numbers.
     """
 
     __slots__ = ("terms",)
@@ -228,7 +228,7 @@ _Contraction = tuple[Monomial, Mapping[float, tuple[float, Monomial]]]
 
 @lru_cache(maxsize=20_000)
 def _contractions(monomial: Monomial) -> tuple[_Contraction, ...]:
-    """All of :func:`_contractions_of`, which intermediate sums need again and again."""
+    """The cached results of :func:`_contractions_of`, which intermediate sums need repeatedly."""
     return tuple(_contractions_of(monomial))
 
 

@@ -1,4 +1,4 @@
-"""Functions of a robot for reading: with symbols in the place of lengths, inertial parameters and gravity.
+"""Readable functions of a robot, with symbols in the place of lengths, inertial parameters and gravity.
 
 The equations are those of :mod:`armblocks.dynamics.traces`, but the inertial parameters are those of the
 links, not their base parameters, so that the symbols of the user remain.
@@ -38,7 +38,7 @@ INERTIAS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
 @dataclass(frozen=True, kw_only=True)
 class Values:
-    """What replaces numbers of a robot: texts of formulas, and numbers.
+    """The values that replace numbers of a robot: texts of formulas, and numbers.
 
     ``lengths``: by the name of a link and ``"a"`` or ``"d"`` of its D-H row, m. ``masses``, kg. ``centres``
     (3), m. ``inertias`` (6): xx yy zz xy yz xz about the centre of mass, kg m2. ``gravity`` (3), m/s2.
@@ -139,7 +139,7 @@ class _LengthParts:
             self._parts.append((formula(text), KinematicTree.of(unit).with_tool_at(frame)))
 
     def moved(self, pose: Transform, of_tree: Callable[[KinematicTree], Transform]) -> Transform:
-        """A pose without the named lengths, with them."""
+        """The pose with the named lengths, from the ``pose`` without them."""
         translation: Vector = pose.translation
         for length, tree in self._parts:
             translation = add(translation, scale(length, of_tree(tree).translation))

@@ -145,7 +145,7 @@ class SymbolicEquations:
                 f"link '{link.name}' {what}",
                 where=f"{field} of link '{link.name}'",
                 allowed="a and d of D-H rows, d of revolute joints only",
-                fix="describe the robot with symbolic_dh, or leave out this symbol",
+                fix="describe the robot with symbolic_dh, or omit this symbol",
             )
 
     def _check_names(self) -> None:
