@@ -16,7 +16,7 @@ export function DroppedTableDialog() {
     <Modal opened={opened} onClose={close} title={<b>Replace {waiting.name}?</b>} size="md">
       <Stack gap="sm">
         <Text size="sm">
-          The project folder contains another file with this name. Blocks that use it would get the new
+          The project folder contains another file with this name. Blocks that use this file would get the new
           values.
         </Text>
         <Group justify="flex-end" gap="xs">

@@ -33,7 +33,7 @@ export function StaticArm({ name, drawing, state, children }: StaticArmProps) {
       {svg && <img src={`data:image/svg+xml;utf8,${encodeURIComponent(svg)}`} alt={`The robot ${name}`} />}
       <figcaption className="empty">
         This browser has no WebGL, so the arm is shown as a still picture. Runs, scopes and the editor work as
-        usual. Turn hardware acceleration on in the browser's settings to see it move.
+        usual. Turn hardware acceleration on in the browser's settings to see the arm move.
       </figcaption>
       {children && <div className="view-tools">{children}</div>}
     </figure>

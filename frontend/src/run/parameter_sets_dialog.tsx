@@ -145,7 +145,8 @@ function Comparison({ table }: { table: ParameterSetTable }) {
       </div>
       <Group justify="space-between" mt="xs">
         <Text size="xs" c="dimmed">
-          Bold values differ from the model. Grey ones are those of the model: the set does not contain them.
+          Bold values differ from the model. Grey values are those of the model: the set does not contain
+          them.
         </Text>
         {names.length > 1 && (
           <Checkbox
