@@ -2,7 +2,7 @@ import { create } from 'zustand'
 import { ask, useStudio } from './store'
 
 /**
- * All dialogs except that of a block (`useStudio().edit`) and the tour.
+ * All dialogs except the tour and the dialog of a block (`useStudio().edit`).
  */
 type Dialog =
   | 'commands'
@@ -22,14 +22,15 @@ type Dialog =
 
 interface Dialogs {
   open: Dialog | null
-  /** Distinguishes consecutive openings of the dialog. */
+  /** Number of dialogs opened so far: the React key, so that each opening has a new state. */
   openCount: number
   /** Text typed into the search lists. */
   typed: string
   /** Whether Enter was pressed before the field of a search list had the focus. */
   accepted: boolean
   /**
-   * The subsystem whose mask is edited; `''` is the model. `ownsVisibleSheet`: it owns the visible sheet.
+   * The subsystem whose mask is edited; `''` is the model. `ownsVisibleSheet`: the visible sheet is the sheet
+   * of this subsystem.
    */
   maskOwner: string
   ownsVisibleSheet: boolean

@@ -70,7 +70,7 @@ def test_results_are_found_by_the_names_of_signals() -> None:
 
 
 def test_columns_files_views_and_drawings_have_the_names(tmp_path: Path) -> None:
-    """A signal with several names has that of the outermost sheet."""
+    """A signal with several names is stored under its name on the outermost sheet."""
     diagram = model()
     result = ab.simulate(diagram, stop_time=1.0, sample_time=0.1)
     assert sorted(result.columns()) == [
@@ -88,7 +88,7 @@ def test_columns_files_views_and_drawings_have_the_names(tmp_path: Path) -> None
 
 
 def test_files_contain_every_legal_name(tmp_path: Path) -> None:
-    """Names of parameters of a NumPy function, and separators of tables."""
+    """Signal names may equal parameter names of ``numpy.savez`` or contain separators of CSV files."""
     builder = DiagramBuilder("names")
     names = ("file", "allow_pickle", "kwds", "args", "self", "arr_0", 'a, "b"', "time 2")
     for number, name in enumerate(names):

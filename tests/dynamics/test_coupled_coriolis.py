@@ -17,7 +17,7 @@ PALLETISERS = ("irb460", "irb660", "irb760", "kr40_pa", "kr100_2_pa", "kr180_2_p
 
 
 def coupled(tree: Robot) -> Robot:
-    """The tree with two couplings: one with a constant, one that depends on the other."""
+    """The tree with two couplings that share a joint."""
     a, b, c, d, *_ = (link.name for link in tree.moving_links if link.joint.nv == 1)
     couplings = (
         Coupling(name="one", terms=((a, 2.0), (c, -1.0), (d, 0.5)), constant=0.3),

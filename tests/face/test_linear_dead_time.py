@@ -105,7 +105,7 @@ def test_dead_time_in_a_sampled_system_agrees_with_its_transfer_function() -> No
     z = np.exp(0.1j * FREQUENCIES[:4])
     a = np.exp(-0.1)
     expected = (1 - a) / (z - a) / z**2
-    # a step contains all frequencies; those far above order / delay are delayed too little
+    # a step contains all frequencies; the approximation has too little delay far above order / delay
     np.testing.assert_allclose(
         system.frequency_response(FREQUENCIES[:4])[:, 0, 0], expected, atol=2e-3, rtol=0
     )

@@ -122,8 +122,8 @@ class BlockNumbers:
     def _states_after_last_trigger(self, natural: Mapping[str, dict[str, SX]]) -> dict[str, SX]:
         """Return the discrete states after the update of the previous trigger event.
 
-        That update is a function of the time to this event, the present value of T. The states, the inputs
-        and T at the previous event are stored; ``last:done`` is 0 before the first event.
+        That update depends on ``T_next``, the time until the next event: the ``T`` of the present event. The
+        states, the inputs and T at the previous event are stored; ``last:done`` is 0 before the first event.
         """
         for key, symbol in [(key, symbol) for key, symbol in self.symbols.items() if key[0] == "u"]:
             self._last[key] = (SX.sym(f"last {key}", symbol.numel()), symbol)
@@ -155,7 +155,7 @@ class BlockNumbers:
         add("out", outputs, out_shapes)
         add("xdot", block.derivatives(t, x, u, p), {s.name: s.shape for s in self.states})
         if self._last:
-            # At a trigger event the states become those after the previous event.
+            # A trigger event sets the states to their values after the previous event.
             add("update", x, {s.name: s.shape for s in self.discrete})
             last = {f"last:{key}": value for key, (_, value) in self._last.items()}
             add("update", last, {key: (value.numel(),) for key, value in last.items()})

@@ -5,7 +5,7 @@ import { createContext, useEffect, useState, type RefObject } from 'react'
 const REST_MS = 150
 /** Number of blocks above which a sheet is moved as one layer and has a map. */
 const MANY_BLOCKS = 40
-/** Events that need the present view, or that start an action whose views are shown at once. */
+/** Events that end a motion, because their handlers use the present view. */
 const ENDING_EVENTS = ['pointerdown', 'keydown', 'dragenter', 'pagehide'] as const
 
 /** The motion of the sheet that contains a component. */
@@ -41,7 +41,7 @@ export function useSheetMotion(
  * the ports and wires of all blocks again. React Flow receives all other views at once.
  */
 export class SheetMotion {
-  /** The present view; the same object at every change. React Flow regards it as controlled. */
+  /** The present view. Changes modify this object; React Flow treats the view as a controlled property. */
   readonly view: Viewport
   isLarge = false
   sheet: HTMLElement | null = null
@@ -56,7 +56,7 @@ export class SheetMotion {
     this.view = { ...view }
   }
 
-  /** Call a function after every change of the view, also during a motion; returns the cancellation. */
+  /** Call a function after every change of the view. Returns a function that stops these calls. */
   readonly onView = (listener: () => void): (() => void) => {
     this.listeners.add(listener)
     return () => this.listeners.delete(listener)

@@ -51,7 +51,7 @@ function showSelected(list: HTMLElement): void {
   list.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: 'nearest', inline: 'nearest' })
 }
 
-/** Whether the tabs are wider than their list. A list of another width shows the selected tab. */
+/** Whether the tabs are wider than their list. A change of the width scrolls the selected tab into view. */
 function useOverflow(list: RefObject<HTMLDivElement | null>, count: number): boolean {
   const [overflows, setOverflows] = useState(false)
   useEffect(() => {
@@ -170,7 +170,7 @@ async function closeAll(tabs: Tab[]): Promise<void> {
   for (const { document } of tabs) await closeDocument(document)
 }
 
-/** A list of all tabs, at the end of a strip that does not show all. */
+/** A menu of all tabs, shown at the end of the strip if the tabs are wider than the strip. */
 function AllTabs({ tabs, labels }: { tabs: Tab[]; labels: string[] }) {
   const inFront = useDocumentInFront()
   return (

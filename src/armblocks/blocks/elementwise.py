@@ -21,7 +21,7 @@ def parameters_shape(block: Block, *names: str) -> Shape:
 
 
 def common_unit(units: Mapping[str, str]) -> str:
-    """The unit that all have in common; ``""`` if the units differ."""
+    """The common unit of all quantities; ``""`` if the units differ."""
     distinct = set(units.values())
     return distinct.pop() if len(distinct) == 1 else ""
 

@@ -9,13 +9,13 @@ from armblocks.argument_errors import ArgumentErrors
 
 @dataclass(frozen=True, kw_only=True)
 class SimulationOptions(metaclass=ArgumentErrors):
-    """Settings of one run. ``None`` leaves the choice to the simulation, which reports it.
+    """Settings of one run. For ``None``, the simulation chooses a value and reports it.
 
     ``stop_time``: end of the run, s. ``solver``: a name of ``armblocks.simulation.tableaux``, or ``"auto"``.
-    ``step``: length of a fixed step, s. ``sample_time``: interval of the recorded samples, s; they are at
-    ``k * sample_time``, computed as a product, and at the stop time. ``max_step``: maximum length of a step,
-    s. ``rtol``, ``atol``: an adaptive step is accepted where the error is below ``atol + rtol |x|`` in the
-    root-mean-square norm. ``record_jumps``: whether both sides of each jump are recorded between samples.
+    ``step``: length of a fixed step, s. ``sample_time``: interval of the recorded samples, s; the samples are
+    at ``k * sample_time``, computed as a product, and at the stop time. ``max_step``: maximum length of a
+    step, s. ``rtol``, ``atol``: an adaptive step is accepted if the error is below ``atol + rtol |x|`` in
+    the root-mean-square norm. ``record_jumps``: whether both sides of each jump are recorded between samples.
     """
 
     stop_time: float = 10.0

@@ -205,7 +205,7 @@ LOGICAL_FUNCTIONS = frozenset(("true", "false", "and", "or", "xor", "not", "any"
 
 
 def is_logical(expression: Expression) -> bool:
-    """Whether an expression is a comparison, a logical operation, or an array of such."""
+    """Whether an expression is a comparison, a logical operation, or an array that contains one."""
     match expression:
         case Chain(rest=rest):
             return rest[0].operator in LOGIC or rest[0].operator in COMPARISONS
@@ -220,7 +220,7 @@ def is_logical(expression: Expression) -> bool:
 
 
 def levels(expression: Expression) -> Iterator[tuple[Expression, ...]]:
-    """The expressions of a tree level by level: the root, then its parts, then the parts of these …"""
+    """The expressions of a tree level by level, from the root."""
     level: tuple[Expression, ...] = (expression,)
     while level:
         yield level

@@ -147,7 +147,10 @@ def _column(values: Array) -> pa.Array:
 
 
 def _npz(result: RunData) -> bytes:
-    """The bytes of ``numpy.savez_compressed``, which itself rejects arrays named like its parameters."""
+    """The bytes of an NPZ file.
+
+    ``numpy.savez_compressed`` cannot write them: it rejects arrays with the names of its own parameters.
+    """
     arrays = {slot.title or slot.name: result[slot.name] for slot in result.signals_layout}
     arrays |= {"time": result.time, "run": np.array(json.dumps(description_of(result)))}
     buffer = io.BytesIO()

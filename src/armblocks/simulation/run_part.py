@@ -28,7 +28,7 @@ class Rows:
 
     ``time (N,)`` s, ``states (N, nx)``, ``discrete (N, nz)``, ``algebraic (N, nw)``, and the parameters ``p
     (np,)``. ``instant (N,)`` s are the times at which the signals are evaluated; they differ by rounding from
-    the sample times just before a breakpoint. ``previous`` is the time of the sample before these, s.
+    the sample times just before a breakpoint. ``previous`` is the time of the preceding sample, s.
     """
 
     begin: int
@@ -85,7 +85,7 @@ class RunPart:
         breakpoints: Array = NO_NUMBERS,
         record_jumps: bool = True,
     ) -> None:
-        """``change``: the point and the parameters before a change of parameters at the begin of this part.
+        """``change``: the point and the parameters before a change of parameters at the start of this part.
         ``breakpoints``: times at which sources jump, s; without integration these jumps are recorded here,
         unless ``record_jumps`` is false."""
         self.p = p
@@ -156,7 +156,7 @@ class RunPart:
         no_columns = np.empty((in_memory, 0))
         parts = (no_columns,) * 3 if run is None else (run.states, run.discrete, run.algebraic)
         states, discrete, algebraic = (part[start:in_memory] for part in parts)
-        # The loop has the times: a block that ends the run adds the time of the end.
+        # The native loop stores the times, because a block that ends the run adds a sample at the stop time.
         time = (self._time if run is None else run.inputs[1])[start:in_memory]
         return Rows(
             begin=self.begin + start,
@@ -196,7 +196,7 @@ class RunPart:
 
     @property
     def _offset(self) -> int:
-        """The number of the sample whose recorded number is 0."""
+        """Difference between the sample numbers of the run and those that the native loop records."""
         return 0 if self.integration is None else self.begin
 
     @property

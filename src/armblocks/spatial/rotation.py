@@ -1,7 +1,7 @@
 """Three-vectors and rotation matrices as tuples of floats, so that descriptions can be compared and hashed.
 
 Rotations by multiples of 90 degrees are exact: ``cos(pi/2)`` is 0 and not 6e-17. The matrices of an arm with
-perpendicular axes then have exact zeros, and the traced equations omit the terms that these multiply.
+perpendicular axes then have exact zeros, and the traced equations omit all terms with these factors.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ RPY_CONVENTIONS: Mapping[str, tuple[str, bool]] = {
 }
 """Order of the axes from the left, and whether roll is the last angle (else it is the first).
 
-``zyx``: R = Rz(yaw) Ry(pitch) Rx(roll), the toolbox's default since release 10; ``xyz`` and ``yxz`` are that
-release's other orders. ``release 9`` (and 8): R = Rx(roll) Ry(pitch) Rz(yaw). ``release 7``: R = Rz(roll)
+``zyx``: R = Rz(yaw) Ry(pitch) Rx(roll), the toolbox's default since release 10; ``xyz`` and ``yxz`` are the
+other orders of release 10. ``release 9`` (and 8): R = Rx(roll) Ry(pitch) Rz(yaw). ``release 7``: R = Rz(roll)
 Ry(pitch) Rx(yaw), which releases 8 and 9 call ``zyx``.
 """
 

@@ -373,7 +373,7 @@ def _sum_ports(
 
 
 def _length(network: Network, link: Link, column: Sequence[int]) -> tuple[int, int]:
-    """Number of columns that a feedback line spans, including those through a mirrored block; the port."""
+    """The sort key of a feedback line: the number of columns that it spans, and its input port."""
     farthest = column[link.source]
     for other in network.links:
         if other.target == link.source:

@@ -114,7 +114,7 @@ class Defaults:
             self._read(child, child.required("class", "the name of the default class"), own)
 
     def applied(self, element: Element, inherited_class: str = MAIN) -> Element:
-        """The element with the attributes of its class; ``inherited_class``: that of the bodies around it."""
+        """The element with the attributes of its default class, by default ``inherited_class``."""
         name = element.attributes.get("class", inherited_class)
         if name not in self._classes:
             raise element.error(
@@ -127,7 +127,7 @@ class Defaults:
 
 
 def _default_tag(tag: str) -> str:
-    """The element of a default class that has the attributes of elements with a tag."""
+    """The tag under which a default class stores the attributes of elements with ``tag``."""
     return "general" if tag in ACTUATORS else tag
 
 

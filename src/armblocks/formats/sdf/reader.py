@@ -6,9 +6,9 @@ pose of the child is ``T_PC(q) = T_PJ motion(q) T_JC``; ``before`` of the link i
 a joint carries its parent, the joint is read in the opposite direction: ``T_CP(q) = T_CJ motion(-q) T_JP``.
 
 Links that are joined to the world are children of the base. The base is the frame of the model; its pose is
-that of the model in the world. A model without a joint to the world has a root link, which is fixed to the
-base: the first link that is not the child of a joint. Links are in depth-first order, the children of a link
-in the order of the joints in the file.
+the pose of the model in the world. A model without a joint to the world has a root link, which is fixed to
+the base: the first link that is not the child of a joint. Links are in depth-first order, the children of a
+link in the order of the joints in the file.
 
 Source: sdformat.org/spec, versions 1.4 to 1.12.
 """
@@ -171,7 +171,7 @@ def robot_of(model: Frame, world: Scope, context: FileContext) -> Robot:
 
 
 def _named_frames(model: Frame, scope: Scope, frames: Frames, used: set[str]) -> tuple[NamedFrame, ...]:
-    """The elements ``<frame>`` of a model; a finding for those whose place is not defined."""
+    """The elements ``<frame>`` of a model. Adds a finding for each frame whose pose is not defined."""
     named: list[NamedFrame] = []
     for frame in [*scope.frames("frame")][:MAX_FRAMES]:
         try:
@@ -208,7 +208,7 @@ Ends = tuple[Frame, Frame | None, Frame | None]
 
 
 def _edges(links: list[Frame], joints: list[Frame], frames: Frames) -> tuple[list[Ends], list[Ends]]:
-    """The joints of a tree, and those that close loops of it."""
+    """The joints of a spanning tree, and the joints that close its loops."""
     group: dict[Frame | None, Frame | None] = {link: link for link in (*links, None)}
 
     def leader(link: Frame | None) -> Frame | None:

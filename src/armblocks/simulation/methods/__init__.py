@@ -1,1 +1,4 @@
-"""The integrators as data, one file for each family. Every tableau in a file of this folder is a solver."""
+"""Tableaux of the solvers, one module for each family of methods.
+
+Every tableau of these modules is a solver.
+"""

@@ -1,4 +1,4 @@
-"""The Rosenbrock methods as data: linearly implicit, for stiff systems."""
+"""Tableaux of Rosenbrock methods: linearly implicit methods for stiff systems."""
 
 from __future__ import annotations
 

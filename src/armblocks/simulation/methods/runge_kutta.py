@@ -1,7 +1,7 @@
-"""The explicit Runge-Kutta methods as data.
+"""Tableaux of explicit Runge-Kutta methods.
 
-The dense output of fixed-step methods up to order 4 is the cubic Hermite polynomial, which has their order.
-``rk5`` has the dense output of Dormand and Prince.
+The dense output of fixed-step methods up to order 4 is the cubic Hermite polynomial, which has the order of
+the methods. ``rk5`` has the dense output of Dormand and Prince.
 """
 
 from __future__ import annotations
