@@ -61,7 +61,7 @@ _DISCONTINUOUS = frozenset(
         *("OP_FLOOR", "OP_CEIL", "OP_SIGN", "OP_FMOD", "OP_REMAINDER"),
     )
 )
-"""Discontinuous operations: the derivative does not show a dependence through one of them."""
+"""Discontinuous operations. Their derivatives do not show all dependences of the result on the operands."""
 
 
 def has_discontinuity(expression: SX, unknowns: SX) -> bool:
@@ -78,7 +78,7 @@ def has_discontinuity(expression: SX, unknowns: SX) -> bool:
             dependent = operation != casadi.OP_CONST and any(depends[i] for i in inputs)
             if dependent and operation in _DISCONTINUOUS:
                 return True
-        for output in function.instruction_output(k):  # a call of a function has several
+        for output in function.instruction_output(k):  # a function call has several outputs
             depends[output] = dependent
     return False
 
@@ -122,10 +122,10 @@ def check_solvable(
             raise AlgebraicLoopError(
                 loops[loop[0]],
                 where=where,
-                why="with an equation that does not contain its unknown (its index is above 1)",
+                why="with an equation that does not contain its unknown (index above 1)",
                 allowed="equations that contain their unknown",
-                fix="differentiate the equation with respect to time until it does: twice for a rod and its "
-                "force",
+                fix="differentiate the equation with respect to time until it contains the unknown: "
+                "twice for the force in a rod",
             )
         why = "with no solution or infinitely many"
         if others <= parameters:

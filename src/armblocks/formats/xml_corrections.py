@@ -88,7 +88,7 @@ def corrected_xml(data: bytes, name: str, findings: Sequence[FileFinding], edits
                 continue
             made.append(edit)
             changes.append(Change(finding, edit.what))
-            # Later findings are corrected with the values that earlier corrections gave.
+            # The correction of a later finding uses the values of earlier corrections.
             for key, value in edit.attributes.items():
                 edit.element.attributes.pop(key, None)
                 if value is not None:

@@ -1,4 +1,4 @@
-"""Units of mass and length by the words of CAD exports."""
+"""Units of mass and length, by the names that CAD exports use."""
 
 from __future__ import annotations
 
