@@ -1,4 +1,4 @@
-"""Sweeps: designs, tables, files that continue, and runs that open again with the same bits."""
+"""Sweeps: designs, tables, continued files, and bit-identical repetitions of runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Each run of the native loop over runs has the bits of the same run alone."""
+"""Each run of the native loop over runs is bit-identical to the same run alone."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def all_measures(signal: str) -> list[Measure]:
 
 
 def rows_of(diagram: ab.Diagram, seed: int, **settings: Any) -> tuple[RunRows, RunRows]:
-    """The rows of four runs with random parameters: from the native loop, and each run alone."""
+    """The rows of four runs with random parameters: computed by the native loop, and each run alone."""
     rng = np.random.default_rng(seed)
     model = ab.compile_diagram(diagram)
     compiled = model.compiled

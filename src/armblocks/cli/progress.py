@@ -75,8 +75,11 @@ class FrameProgress(RunProgress):
 
 
 class SweepProgress(RunProgress):
-    """Displays the progress of a sweep: called with the number of computed runs, of all runs, the runs per
-    second and the remaining time, s."""
+    """Displays the progress of a sweep.
+
+    The arguments of a call are the number of computed runs, the number of all runs, the runs per second and
+    the remaining time, s.
+    """
 
     def __call__(self, done: float, runs: float, rate: float, remaining: float = 0.0) -> None:
         self._show(f"run {done:,.0f} of {runs:,.0f}, {factor_text(rate)} runs/s", done / runs)

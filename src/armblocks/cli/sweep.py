@@ -162,7 +162,7 @@ def _number(text: str, where: str) -> float:
 
 
 def _named(text: str) -> tuple[str, str]:
-    """The name and the text of a measure; without a name, the text is the name."""
+    """The name and the text of a measure; if the name is omitted, the text is the name."""
     name, equals, rest = text.partition("=")
     if equals and "(" not in name:
         return name.strip(), rest.strip()
@@ -200,7 +200,7 @@ def print_sweep(result: SweepResult, console: Console) -> None:
 
 
 def _print_exceptions(result: SweepResult, console: Console) -> None:
-    """Print the number of runs with each status other than completed, and the message of the first."""
+    """Print the number of runs with each status except completed, and the message of the first run."""
     status, numbers = result["status"], result["run"]
     for kind in dict.fromkeys(status[status != "completed"].tolist()):
         chosen: Sequence[int] = (status == kind).nonzero()[0].tolist()

@@ -32,13 +32,13 @@ from armblocks.sweeps.scheduling import GroupsOf, RunGroup, Scheduler, default_t
 from armblocks.sweeps.tables import Layout, concatenated
 
 SweepProgress = Callable[[int, int, float, float], None]
-"""Called with the number of computed runs, of all runs, the runs per second and the remaining time, s."""
+"""A function of the number of computed runs, the number of all runs, runs/s, and the remaining time in s."""
 
 PART_SECONDS, PART_RUNS = 5.0, 100_000
 """A part of the results is written after this time (s) or this number of runs."""
 PROGRESS_SECONDS = 0.1
 VERSION = "1"
-"""Version of the computation of the table, part of its identity."""
+"""Version of the computation; files of another version are not continued."""
 
 
 @takes_settings
@@ -63,25 +63,26 @@ def sweep(
 
     ``vary``: ``{"block.parameter": values}``. Values are a list, an array, or a distribution:
     :func:`uniform`, :func:`loguniform`, :func:`normal`, :func:`seeds`. Lists form a grid of all
-    combinations. With distributions ``runs`` is the number of runs, a multiple of the size of the grid, and
-    ``design`` is ``random``, ``sobol``, ``halton`` or ``latin``; ``seed`` determines the points. With
-    ``design="paired"``, or with a table or a list of mappings as ``vary``, each row is a run. Entries of
+    combinations. If there are distributions, ``runs`` is the number of runs, a multiple of the size of the
+    grid, and ``design`` is ``random``, ``sobol``, ``halton`` or ``latin``; ``seed`` determines the points.
+    With ``design="paired"``, or with a table or a list of mappings as ``vary``, each row is a run. Entries of
     arrays are ``block.parameter[k]``. Parameters that are constants of the equations, such as robots and
     sample times, are compiled for each combination.
 
-    ``measures``: by name, a :class:`Measure`, its text such as ``"overshoot(motor/speed, final=1)"``, or a
-    Python function of the result that returns a number. ``keep``: signals whose samples are kept in memory
-    or in the file. ``parameters``: values that all runs have. ``max_steps``: the maximum number of steps of
-    a run. ``threads``: by default the number of cores. The settings are those of :func:`simulate`.
+    ``measures``: each name with a :class:`Measure`, the text of one, such as ``"overshoot(motor/speed,
+    final=1)"``, or a Python function of the result that returns a number. ``keep``: signals whose samples are
+    kept in memory or in the file. ``parameters``: parameter values for all runs. ``max_steps``: the maximum
+    number of steps of a run. ``threads``: by default the number of cores. The settings are those of
+    :func:`simulate`.
 
-    ``out``: a ``.parquet`` or ``.csv`` file. The results are written during the sweep, and memory does not
-    grow with their number. If the sweep is interrupted, another call with the same arguments continues it.
-    ``progress(done, runs, rate, remaining)`` is called about ten times a second. Ctrl-C returns the runs that
-    are done.
+    ``out``: a ``.parquet`` or ``.csv`` file. The results are written during the sweep, so that the memory
+    does not grow with the number of runs. If the sweep is interrupted, another call with the same arguments
+    continues it. ``progress(done, runs, rate, remaining)`` is called about ten times a second. After Ctrl-C
+    the function returns the completed runs.
 
-    A run has the same bits as the same run alone with :func:`simulate`, for any number of threads. Runs that
-    fail are rows with their messages. Raises ``UnknownNameError``, ``DiagramError`` and ``InputError`` for
-    invalid arguments, also where ``out`` has the results of another sweep.
+    Each run is bit-identical to :func:`simulate`, for any number of threads. A failed run is a row with its
+    message. Raises ``UnknownNameError``, ``DiagramError`` and ``InputError`` for invalid arguments, also if
+    ``out`` has the results of another sweep.
     """
     check_settings(settings, sweep)
     model = diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)
@@ -190,7 +191,7 @@ class _Programs:
 
     @property
     def general_reason(self) -> str:
-        """Why no run is computed by the native loop over runs; empty if it is used."""
+        """The reason for not using the native loop over runs; empty if it is used."""
         programs = [program for _, program in self._known.values()]
         if any(program.calls for program in programs):
             return "the model calls Python functions"
@@ -213,7 +214,7 @@ class _Collected:
         self.general = 0
 
     def collect(self, scheduler: Scheduler) -> bool:
-        """Compute all missing runs; returns whether all are done. Ctrl-C ends early."""
+        """Compute all missing runs; returns whether all runs are done. Ctrl-C ends the computation early."""
         file = self._file
         if file is not None and file.complete:
             return True
@@ -278,7 +279,7 @@ def _is_csv(out: str | PathLike[str] | None) -> bool:
 def _split(
     measures: Mapping[str, Measure | str | Callable[[SimulationResult], float]],
 ) -> tuple[dict[str, Callable[[SimulationResult], float]], dict[str, Measure]]:
-    """The Python functions, and the other measures."""
+    """The measures that are Python functions, and the other measures."""
     functions: dict[str, Callable[[SimulationResult], float]] = {}
     named: dict[str, Measure] = {}
     for name, measure in measures.items():
@@ -355,14 +356,14 @@ def _remark(
     general: int,
     functions: Mapping[str, object],
 ) -> str:
-    """What was not computed by the native loop over runs, and why."""
+    """The number of runs that the native loop did not compute, and the reason."""
     parts: list[str] = []
     reason = f"the measure '{next(iter(functions))}' is a Python function" if functions else ""
     reason = reason or programs.general_reason
     if reason:
         parts.append(f"all runs one after the other, because {reason}")
     elif general:
-        parts.append(f"{general} runs one after the other, because they failed, were stiff or long")
+        parts.append(f"{general} runs one after the other, because they failed, were stiff or too long")
     if parameters.recompiled:
         parts.append(f"{parameters.recompiled} models compiled, because constants of the equations vary")
     return "; ".join(parts)

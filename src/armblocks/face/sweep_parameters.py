@@ -1,4 +1,4 @@
-"""The parameters of the runs of a sweep: values of tunable parameters, and models with other structure."""
+"""The parameters of the runs of a sweep: values of tunable parameters, and models with other constants."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class RunParameters:
         """Checks all values. Raises ``UnknownNameError``, ``DiagramError`` and ``InputError``."""
         self._model = model
         self.design = design
-        with_parameters(model.diagram, self.values(0))  # raises the errors of unknown and fixed parameters
+        with_parameters(model.diagram, self.values(0))  # raises errors for unknown and for fixed parameters
         layout = model.compiled.parameters
         fast = {name: column for name, column in design.columns.items() if _fast(name, column, layout)}
         self._fast = self._verified(fast)
@@ -82,7 +82,7 @@ class RunParameters:
         return values_of_run(self._model.diagram, self.design, run)
 
     def groups(self, begin: int, end: int) -> list[tuple[Variant, NDArray[np.intp], Array]]:
-        """The runs ``begin`` to ``end - 1`` by variant: their places in this range, and their parameters."""
+        """The runs ``begin`` to ``end - 1`` by variant: their indices in this range, and their parameters."""
         numbers = self._numbers[begin:end]
         groups: list[tuple[Variant, NDArray[np.intp], Array]] = []
         for number in np.unique(numbers):
@@ -97,12 +97,16 @@ class RunParameters:
         for name in self._fast:
             column = self.design.columns[name]
             if _whole(name) not in layout.ranges:
-                continue  # the block takes no part in this variant of the model
+                continue  # the compiled model of this variant does not contain the parameter
             p[:, _places(name, layout)] = column[runs].reshape(runs.size, -1)
         return p
 
     def _verified(self, fast: Mapping[str, Column]) -> list[str]:
-        """The fast columns, or none if another way to compute the parameters gives other values."""
+        """The columns that are entries of the parameter vector.
+
+        The first, the middle and the last run are compared with the parameters of a changed diagram. If they
+        differ, there are no such columns.
+        """
         base = Variant(model=self._model, parameters=self._model.compiled.parameter_values)
         others = [name for name in self.design.columns if name not in fast]
         checked = {_block_of(name) for name in others}
@@ -244,7 +248,7 @@ def _tuned(model: CompiledDiagram, changed: Diagram) -> Variant | None:
 
 
 def _of_run(error: ArmblocksError, run: int, where: str = "") -> DiagramError:
-    """The error of a value with the number of its run."""
+    """The error for a value, with the number of the run."""
     place = ", ".join(filter(None, (where, error.where, f"run {run}")))
     return DiagramError(error.what, where=place, allowed=error.allowed, fix=error.fix)
 
@@ -281,7 +285,7 @@ def _canonical(value: Any) -> Any:
 
 
 def _whole(name: str) -> str:
-    """The path of the parameter that an entry ``block.parameter[k]`` belongs to."""
+    """The path of the parameter of an entry ``block.parameter[k]``."""
     return name.rpartition("[")[0] if name.endswith("]") else name
 
 
@@ -295,7 +299,7 @@ def _found(diagram: Diagram, name: str) -> Block:
 
 
 def _is_parameter(diagram: Diagram, name: str) -> bool:
-    """Whether a name with brackets is a parameter itself."""
+    """Whether a name with brackets is the name of a parameter."""
     return not _block_of(name) and name in diagram.mask_values
 
 
@@ -329,5 +333,5 @@ def _places(name: str, layout: Signature) -> slice:
 
 
 def _checks_together(block: Block) -> bool:
-    """Whether a block has a check of several parameters."""
+    """Whether a block checks several parameters together."""
     return type(block).check is not Block.check

@@ -31,7 +31,7 @@ Array = NDArray[Any]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SweepSource:
-    """The model, the settings and the design of a sweep, which compute a run again."""
+    """The model, the settings and the design of a sweep, for repeating single runs."""
 
     model: CompiledDiagram
     options: SimulationOptions
@@ -48,8 +48,8 @@ class SweepResult(metaclass=ArgumentErrors):
     signals whose samples are kept: ``result[name]`` is ``(runs, N)`` at ``time (N,)`` s, NaN after the end of
     a run.
 
-    ``complete``: whether all runs were computed; Ctrl-C ends a sweep early. ``planned``: their number.
-    ``remark``: what the sweep did not compute in the fast way, and why.
+    ``complete``: whether all runs were computed; Ctrl-C ends a sweep early. ``planned``: the number of runs
+    of the design. ``remark``: the number of runs that the native loop did not compute, and the reason.
     """
 
     name: str
@@ -92,7 +92,7 @@ class SweepResult(metaclass=ArgumentErrors):
         return values_of_run(self.source.model.diagram, self.source.design, run)
 
     def run(self, run: int) -> SimulationResult:
-        """Compute one run again with all signals: the same bits as in the sweep.
+        """Compute one run again with all signals; the results are bit-identical.
 
         Raises ``InputError`` for a number that does not exist, ``SimulationError`` for a run that fails.
         """

@@ -157,7 +157,7 @@ class NativeIntegrator:
 
     @property
     def address(self) -> int:
-        """The address of the native loop, for native code that runs it."""
+        """The address of the native loop, for native code that calls the loop."""
         return self._code.address("advance")
 
     def advance(self, addresses: tuple[int, ...], max_steps: int) -> Status:

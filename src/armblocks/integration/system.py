@@ -208,8 +208,11 @@ class CompiledSystem:
 
     @property
     def addresses(self) -> Mapping[str, int]:
-        """The addresses of the functions of a run by name, for native code that calls them: ``signals``, and
-        those of the parameters: ``initial_states``, ``breakpoints`` …"""
+        """The addresses of the functions of a run by name, for native code that calls these functions.
+
+        The names are ``signals`` and the names of the functions of the parameters, such as
+        ``initial_states``.
+        """
         functions = {**self._start_functions, "signals": self._signals}
         return {
             name: ctypes.cast(cast("Any", call), ctypes.c_void_p).value or 0

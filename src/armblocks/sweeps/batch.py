@@ -33,17 +33,18 @@ PythonMeasure = Callable[[SimulationResult], float]
 
 COMPLETED, STOPPED, FAILED, STEP_LIMIT = STATUSES = ("completed", "stopped", "failed", "step limit")
 NATIVE_STEPS = 1_000_000
-"""Maximum number of steps of a native run, so that Ctrl-C ends a sweep soon. The general path repeats longer
-runs."""
+"""Maximum number of steps of a native run. The limit ends a sweep soon after Ctrl-C; ``run_alone`` repeats
+longer runs.
+"""
 CHECK_SECONDS = 0.05
-"""Wall time between two checks for an interruption in the general path, s."""
+"""Wall time between two checks for an interruption in ``run_alone``, s."""
 
 _RUNS = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RunRows:
-    """The results of some runs: a row for each.
+    """The results of several runs, a row for each run.
 
     ``status (n,)``: indices in :data:`STATUSES`. ``messages``: texts for stopped and failed runs.
     ``measures (n, nm)``, NaN for runs that failed. ``steps``, ``events (n,)``. ``end_time (n,)`` s. ``kept
@@ -86,8 +87,8 @@ class RunProgram:
         self.layout = layout
         self.plan = make_plan(compiled, options)
         self.interrupted = False
-        """Set to end runs of the general path early, with ``KeyboardInterrupt``."""
-        # All code is loaded before threads use it: two threads would load it twice, and drop one of them.
+        """Whether ``run_alone`` ends early, with ``KeyboardInterrupt``."""
+        # The code is loaded before threads use it; two threads could load the same code twice.
         compiled.prepare(self.plan.tableau)
         _ = batch_code(), observation.expressions and observation.expressions.address
 
@@ -120,7 +121,7 @@ class RunProgram:
         return Simulation(self.compiled, self.options, p, None, None, self.calls, self.layout)
 
     def run_alone(self, p: Array, rows: RunRows, row: int) -> None:
-        """Compute one run by the general path, and write its row."""
+        """Compute one run with ``Simulation``, and write its row."""
         run = self.simulation(p)
         result: SimulationResult | None = None
         try:
@@ -264,8 +265,10 @@ class NativeBatch:
         return NativeBatch(self._program, self._doublings + 1)
 
     def compute(self, parameters: Array, rows: RunRows) -> list[int]:
-        """Write the rows of runs with parameters ``(n, np)``; returns those that the general path must
-        compute."""
+        """Write the rows of runs with parameters ``(n, np)``.
+
+        Returns the runs that ``run_alone`` must compute.
+        """
         compiled, count = self._program.compiled, len(parameters)
         reports = np.zeros((count, Report.END), dtype=np.int64)
         results = rows.measures if rows.measures.shape[1] else np.empty((count, 1))
@@ -371,7 +374,7 @@ def _run_memory(program: RunProgram, doublings: int) -> RunMemory:
 
 
 def _run_arrays(memory: RunMemory) -> dict[Place, NDArray[np.generic]]:
-    """The arrays of a run, and copies of those with which each run begins."""
+    """The arrays of a run, and copies of their initial contents."""
     return {
         Place.REALS: memory.reals,
         Place.COUNTS: memory.counts,

@@ -1,4 +1,4 @@
-"""Functions that the native loop over runs calls: those of the compiled system, and a check of numbers."""
+"""Functions that the native loop over runs calls."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ def expressions(
 
 
 def all_finite(r: Routine, values: Reals, count: Integer) -> Boolean:
-    """Whether all numbers are finite; several sums, because each addition waits for the previous one."""
+    """Whether all numbers are finite.
+
+    Eight partial sums are independent of each other, so that the processor overlaps the additions.
+    """
     lanes = 8
     sums = [r.real(0.0) for _ in range(lanes)]
     whole = count - (count & (lanes - 1))

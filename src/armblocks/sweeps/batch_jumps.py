@@ -1,5 +1,8 @@
-"""The jumps of a run in the native loop over runs: the same rows as those of
-:meth:`armblocks.simulation.SimulationResult.with_jumps`, for each quantity of a sweep."""
+"""The jumps of a run in the native loop over runs.
+
+The rows of each quantity are equal to the rows of
+:meth:`armblocks.simulation.SimulationResult.with_jumps`.
+"""
 
 from __future__ import annotations
 
@@ -57,7 +60,8 @@ def _unpack(r: Routine, a: Addresses, n: Integers, sides: Integer) -> None:
 
 
 def _set_times(r: Routine, a: Addresses, n: Integers, count: Integer, instants: Integer) -> None:
-    """Write the times of the jumps, for both sides: the time of the sample at an instant, else its time.
+    """Write the times of the jumps, for both sides: the time of the sample at an instant, else the time of
+    the instant.
 
     Instants that do not belong to a sample of the run get the time -1.
     """
@@ -123,9 +127,10 @@ def _find_jumping(
 def series_with_jumps(
     r: Routine, a: Addresses, n: Integers, quantity: Integer, count: Integer, instants: Integer
 ) -> Integer:
-    """Write the rows of one quantity with those of its jumps; returns the number of rows.
+    """Write the rows of one quantity, including its jumps; returns the number of rows.
 
-    A jump has its left limit, then the sample at its time or, without one, its value.
+    A jump has two rows: the left limit, then the sample at the same time or, if there is no sample, the value
+    after the jump.
     """
     row = a[Place.QUANTITIES].integers.after(quantity * Quantity.END)[Quantity.ROW]
     sides = instants + instants
@@ -181,7 +186,7 @@ def series_with_jumps(
 
 
 def _jumps(r: Routine, a: Addresses, quantity: Integer, instant: Integer, instants: Integer) -> Integer:
-    """Whether a quantity jumps at an instant: at least one of its signals does."""
+    """Whether a quantity jumps at an instant: at least one of its signals jumps."""
     table = a[Place.QUANTITIES].integers.after(quantity * Quantity.END)
     indices, jumping = a[Place.QUANTITY_SIGNALS].integers, a[Place.JUMPING].integers
     found = r.integer(0)

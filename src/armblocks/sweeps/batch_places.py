@@ -93,7 +93,7 @@ class Number(IntEnum):
     REALS = 7
     COUNTS = 8
     X = 9
-    """Index of the states in the array of doubles; likewise for the next ones."""
+    """Index of the states in the array of doubles. The next members are indices in the same array."""
     Z = 10
     W = 11
     SIGNS = 12
@@ -106,7 +106,7 @@ class Number(IntEnum):
     KEPT = 19
     MAX_STEPS = 20
     SIDES = 21
-    """Capacity for sides of jumps."""
+    """Maximum number of sides of jumps."""
     END = 22
 
 
@@ -116,9 +116,9 @@ class Quantity(IntEnum):
     ROW = 0
     """A row of the signals; -1 - k for the expression k."""
     FIRST = 1
-    """The first of its signals in the table of indices."""
+    """Index of the quantity's first signal in the table of indices."""
     COUNT = 2
-    """The number of its signals."""
+    """The number of the quantity's signals."""
     END = 3
 
 
@@ -144,4 +144,4 @@ class Outcome(IntEnum):
     LIMIT = 2
     """The run has not ended after the maximum number of steps."""
     OTHER = 3
-    """The run is repeated by the general path: it failed, changes its method or needs more memory."""
+    """The run failed, needs another method or needs more memory; ``run_alone`` repeats it."""

@@ -1,7 +1,7 @@
 """The native loop over the runs of a batch: start values, run, signals, jumps, measures.
 
-One call computes many runs without Python, so that threads compute in parallel. A run that needs more than
-this loop offers gets the outcome ``OTHER``; the general path then repeats it.
+One call computes many runs without Python, so that threads compute in parallel. A run that the loop cannot
+complete gets the outcome ``OTHER``; ``RunProgram.run_alone`` then repeats the run.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def _start(r: Routine, a: Addresses, n: Integers, run: Integer, p: Reals) -> Boo
     reals, counts = a[Place.REALS].reals, a[Place.COUNTS].integers
     r.copy(a[Place.FIRST_REALS].reals, reals, n[Number.REALS])
     r.copy(a[Place.FIRST_COUNTS].integers, counts, n[Number.COUNTS])
-    with r.when(n[Number.STOPS] > 0):  # a block that ends the run adds the time of the end
+    with r.when(n[Number.STOPS] > 0):  # a block that ends the run adds a sample at the stop time
         r.copy(a[Place.FIRST_SAMPLES].reals, a[Place.SAMPLES].reals, n[Number.SAMPLES])
     function = external(_of_parameters)
     x, z = reals.after(n[Number.X]), reals.after(n[Number.Z])
@@ -242,7 +242,7 @@ def _write_measures(
 
 
 def _write_kept(r: Routine, a: Addresses, n: Integers, run: Integer, count: Integer) -> None:
-    """Copy the kept samples of a run; the rest of each row keeps its value."""
+    """Copy the kept samples of a run. Entries after the end of the run are not changed."""
     samples, kept, table = n[Number.SAMPLES], a[Place.KEPT].integers, a[Place.QUANTITIES].integers
     y, e = a[Place.VALUES].reals, a[Place.EXPRESSION_VALUES].reals
     for k in r.range(0, n[Number.KEPT]):

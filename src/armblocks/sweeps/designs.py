@@ -95,9 +95,9 @@ def normal(mean: float, deviation: float) -> Distribution:
 
 @with_argument_errors
 def seeds(first: int = 1) -> Distribution:
-    """Another seed for each run: ``first``, ``first + 1`` …, for the seed of a noise block.
+    """A different seed for each run: ``first``, ``first + 1`` …, for the seed of a noise block.
 
-    Without it the noise is the same in all runs.
+    Without a varied seed the noise is the same in all runs.
     """
     if not 0 <= first < 2**31:
         raise InputError(
@@ -130,7 +130,7 @@ class Design:
 
     @cached_property
     def digest(self) -> str:
-        """A digest of all names and values; of objects, their texts."""
+        """A digest of all names and values; objects are represented by their texts."""
         content = hashlib.sha256()
         for name, column in self.columns.items():
             content.update(f"{name} {column.dtype} {column.shape}\n".encode())
@@ -177,7 +177,7 @@ def make_design(vary: object, runs: int | None, kind: str | None, seed: int) -> 
 
 
 def _count(points: int, runs: int | None, random: bool) -> int:
-    """The number of runs: that of the grid of lists, or a multiple of it where parameters are random."""
+    """The number of runs: the size of the grid, or a multiple of this size for random parameters."""
     if runs is None:
         if random and points == 1:
             raise InputError(
@@ -239,7 +239,7 @@ def _is_random(value: object) -> bool:
 
 
 def _levels(name: str, value: object) -> Column:
-    """The values of one parameter as an array with a row for each; other values as objects."""
+    """The values of one parameter, a row for each value; values that are not numbers are objects."""
     listed: Any = value
     if not isinstance(value, list | tuple | np.ndarray | range):
         listed = [value]

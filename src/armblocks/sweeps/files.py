@@ -55,7 +55,8 @@ class SweepFile:
     def __init__(self, path: Path, identity: Mapping[str, str], texts: Collection[str] = ()) -> None:
         """``texts``: the names of the columns with texts.
 
-        Raises ``InputError`` if the path has the results of another sweep, and as :func:`check_suffix`.
+        Raises ``InputError`` if the path has the results of another sweep, and the errors of
+        :func:`check_suffix`.
         """
         check_suffix(path)
         self.path = path
@@ -78,7 +79,7 @@ class SweepFile:
             raise FormatError(
                 f"the folder cannot be created ({error.strerror or error})",
                 where=str(self.folder),
-                fix="give another path, in a folder that exists and can be written",
+                fix="give another path, in an existing folder with write permission",
             ) from error
         write_atomically(description, json.dumps(self._identity).encode())
 
@@ -143,7 +144,7 @@ class SweepFile:
         self.complete = True
 
     def read(self, names: Sequence[str]) -> dict[str, Array]:
-        """Some columns of all runs that are done."""
+        """Columns of all completed runs."""
         self.complete = self.complete or not self.folder.exists()  # another call has completed the sweep
         pa, pq, csv = _arrow()
         if not self.complete:
@@ -240,7 +241,10 @@ def _values(column: Any) -> Array:
 
 
 def write_table(path: Path, columns: Mapping[str, Array]) -> None:
-    """Write a whole table atomically: Parquet, or CSV without pyarrow. Raises as :func:`check_suffix`."""
+    """Write a whole table atomically, as Parquet or (without pyarrow) as CSV.
+
+    Raises the errors of :func:`check_suffix`.
+    """
     if path.suffix.lower() == ".csv":
         import csv
 

@@ -2,7 +2,7 @@
 
 Each function has the arguments ``t (n,)`` s, ``y (n,)``, ``n``, and ``options (4,)``. The rows are those of
 :meth:`armblocks.simulation.SimulationResult.with_jumps` for the signal: a jump has two rows with the same
-time, the left limit and the value. Between two rows the signal is linear; integrals are exact for this line.
+time, the left limit and the value. Between two rows the signal is linear, and the integrals are exact.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ def rms(r: Routine, t: Reals, y: Reals, n: Integer, options: Reals) -> Real:
 
 
 def _final_value(r: Routine, y: Reals, n: Integer, options: Reals) -> tuple[Real, Boolean]:
-    """The final value, by default the last value, and whether it has measures: it is finite and not 0."""
+    """The final value (by default the last value), and whether this value is finite and not 0."""
     given = options[0]
     value = select(given.ordered, given, y[n - 1])
     return value, value.finite & (value != 0.0)
@@ -133,7 +133,7 @@ def _only(r: Routine, valid: Boolean, value: Real) -> Real:
 
 
 def overshoot(r: Routine, t: Reals, y: Reals, n: Integer, options: Reals) -> Real:
-    """The overshoot over the final value, per cent of it."""
+    """The overshoot, per cent of the final value."""
     value, valid = _final_value(r, y, n, options)
     largest = r.real(y[0] / value)
     for k in r.range(1, n):
@@ -142,7 +142,7 @@ def overshoot(r: Routine, t: Reals, y: Reals, n: Integer, options: Reals) -> Rea
 
 
 def undershoot(r: Routine, t: Reals, y: Reals, n: Integer, options: Reals) -> Real:
-    """The largest deviation from 0 against the direction of the final value, per cent of it."""
+    """The largest deviation from 0 with the opposite sign of the final value, per cent of the final value."""
     value, valid = _final_value(r, y, n, options)
     least = r.real(y[0] / value)
     for k in r.range(1, n):
@@ -151,7 +151,7 @@ def undershoot(r: Routine, t: Reals, y: Reals, n: Integer, options: Reals) -> Re
 
 
 def _first_above(r: Routine, t: Reals, y: Reals, n: Integer, value: Real, level: float) -> Real:
-    """The first time at which ``y / value`` reaches a level; NaN if it does not."""
+    """The first time at which ``y / value`` reaches a level; NaN if there is none."""
     found, previous = r.real(math.nan), r.real(0.0)
     with r.part() as search:
         for k in r.range(0, n):
@@ -192,9 +192,9 @@ def settling_time(r: Routine, t: Reals, y: Reals, n: Integer, options: Reals) ->
 
 
 def crossing_time(r: Routine, t: Reals, y: Reals, n: Integer, options: Reals) -> Real:
-    """The first time at which the signal crosses a level, s; NaN if it does not.
+    """The first time at which the signal crosses a level, s; NaN if there is none.
 
-    Option 1: 1 for crossings from below, -1 for those from above, 0 for both.
+    Option 1: 1 for crossings from below, -1 for crossings from above, 0 for both.
     """
     level, direction = options[0], options[1]
     found = r.real(math.nan)

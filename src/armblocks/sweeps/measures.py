@@ -1,4 +1,4 @@
-"""Measures of a sweep as users give them, and their quantities in a compiled system."""
+"""Measures of a sweep as the arguments describe them, and their quantities in a compiled system."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ class Measure(metaclass=ArgumentErrors):
     entry, ``"arm/tau[0]"``, or an expression with paths in braces: ``"{arm/tau[0]} * {arm/qd[0]}"``. As text:
     ``"overshoot(motor/speed, final=1)"``.
 
-    Between samples the signal is linear, and integrals are exact for these lines. Both sides of a recorded
-    jump count. Kinds and their options:
+    Between samples the signal is interpolated linearly, and integrals are exact for the interpolated signal.
+    A recorded jump contributes its values on both sides. Kinds and their options:
 
     - ``minimum``, ``maximum``, ``peak`` (largest absolute value), ``final`` (last value), ``mean`` and
       ``rms`` (averages over the time of the run), ``integral``.
@@ -62,8 +62,8 @@ class Measure(metaclass=ArgumentErrors):
       signal``; ``reference`` is a number, by default 0.
     - ``overshoot``, ``undershoot`` (per cent of ``final``), ``rise_time`` (10 to 90 per cent, s),
       ``settling_time`` (s, after which the signal stays within ``band``, by default 0.02 of ``final``): as
-      those of a step response. Without ``final``, the last value of each run is the final value. NaN where
-      the final value is 0.
+      for a step response. Without ``final``, the last value of each run is the final value. NaN where the
+      final value is 0.
     - ``crossing_time`` (s): the first crossing of ``level``; ``direction`` 1: from below, -1: from above.
     - ``time_outside`` (s): the total time below ``low`` or above ``high``.
     - ``events``: the number of events of the run, without a signal.
@@ -187,7 +187,7 @@ def signal_row(name: str, layout: Signature, aliases: Mapping[str, str], where: 
 
 
 def signal_entries(name: str, layout: Signature, aliases: Mapping[str, str]) -> tuple[str, ...]:
-    """The paths of all entries of a signal; an expression or an entry is one.
+    """The paths of all entries of a signal; an expression or a single entry has one path.
 
     Raises ``UnknownNameError``.
     """

@@ -34,7 +34,8 @@ _MEASURE = ctypes.CFUNCTYPE(
 class RunQuantity:
     """A scalar over time: row ``row`` of the signals, or expression ``-1 - row``.
 
-    ``used``: the rows of the signals that it depends on. It may jump where one of them does.
+    ``used``: the rows of the signals on which the quantity depends. The quantity can jump only where one of
+    these signals jumps.
     """
 
     row: int
@@ -102,7 +103,7 @@ class Expressions:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Observation:
-    """What a sweep computes of each run: measures of quantities, and the ``kept`` quantities' samples."""
+    """The results for each run of a sweep: measures, and samples of the ``kept`` quantities."""
 
     quantities: tuple[RunQuantity, ...] = ()
     measures: tuple[RunMeasure, ...] = ()
@@ -115,7 +116,7 @@ class Observation:
         return tuple(sorted({row for quantity in self.quantities for row in quantity.used}))
 
     def measured(self, result: RunData) -> list[float]:
-        """The measures of one result, with the bits of a sweep."""
+        """The measures of one result, bit-identical to the measures in a sweep."""
         rows = self._values(result.time, result.signals)
         table = result.jumps.table
         sides = [self._values(table.time, side.signals) for side in (table.before, table.after)]
@@ -149,7 +150,7 @@ class Observation:
 
 
 def _merged(time: Array, values: Array, jumps: Array, before: Array, after: Array) -> tuple[Array, Array]:
-    """The rows of one quantity ``(1, N)`` with those of its jumps."""
+    """The rows of one quantity ``(1, N)``, including its jumps."""
     states = np.empty((jumps.size, 0))
     left, right = (Side(states=states, signals=side) for side in (before, after))
     table = JumpTable(time=jumps, before=left, after=right, jumping=np.ones((1, jumps.size), dtype=np.bool_))

@@ -26,7 +26,7 @@ TASK_SECONDS = 0.1
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RunGroup:
-    """Runs of one program: their ``places`` in a task, and their parameters ``(n, np)``."""
+    """Runs of one program: their indices ``places`` in a task, and their parameters ``(n, np)``."""
 
     program: RunProgram
     places: NDArray[np.intp]
@@ -44,7 +44,7 @@ def default_threads() -> int:
 
 
 class Scheduler:
-    """Computes runs in ``threads`` threads. Ctrl-C ends it after the tasks in progress."""
+    """Computes runs in ``threads`` threads. Ctrl-C ends the computation after the tasks in progress."""
 
     def __init__(self, groups_of: GroupsOf, threads: int) -> None:
         self._groups_of = groups_of
@@ -54,7 +54,7 @@ class Scheduler:
         self._seconds_of_a_run = 0.0
 
     def rows(self, ranges: Iterator[tuple[int, int]]) -> Generator[tuple[int, RunRows]]:
-        """The results of ranges of runs ``(begin, end)``, in parts: the number of the first run, and rows."""
+        """The results of ranges of runs ``(begin, end)``: pairs of the first run's number and rows."""
         pending: deque[tuple[int, Future[RunRows]]] = deque()
         pool = ThreadPoolExecutor(self._threads, thread_name_prefix="armblocks-sweep")
         tasks = self._tasks(ranges)
@@ -77,7 +77,7 @@ class Scheduler:
             pool.shutdown(wait=True)
 
     def _tasks(self, ranges: Iterator[tuple[int, int]]) -> Iterator[tuple[int, Sequence[RunGroup], int]]:
-        """The tasks of all ranges; their lengths follow the measured time of a run."""
+        """The tasks of all ranges; the measured time of a run determines the number of runs per task."""
         for first, last in ranges:
             begin = first
             while begin < last:
