@@ -1,4 +1,4 @@
-"""Buses through blocks that accept them: equal to a diagram with one block per signal."""
+"""Blocks that accept buses: the results equal a diagram with one block for each signal."""
 
 import numpy as np
 import pytest

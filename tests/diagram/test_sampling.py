@@ -44,7 +44,7 @@ def test_an_explicit_sample_time_is_inherited_through_blocks_without_sample_time
 
 
 def test_blocks_fed_by_comparisons_have_no_guards_except_in_a_loop() -> None:
-    """Comparisons change only at events: a block with only such inputs needs no modes, except in a loop."""
+    """Comparisons change only at events, so that blocks with only such inputs need no modes outside loops."""
     builder = DiagramBuilder("d")
     moving = builder.add("moving", CompareToZero(), builder.add("sine", SineWave()))
     gate = builder.add("gate", LogicalOperator(), moving, builder.add("one", Constant()))

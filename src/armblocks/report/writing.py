@@ -51,10 +51,10 @@ def write_report(
     """Write ``report.html``, ``diagram.svg``, ``figures/*``, ``data.*`` and the files of To File blocks.
 
     The folder is created if absent. ``formats`` of the figures: svg, png. ``data``: csv, parquet, npz, mat.
-    The default is svg and csv, also png if matplotlib is installed and parquet if pyarrow is. Each file is
-    written atomically, the page as the last one. Raises UnknownNameError for another format,
-    MissingLibraryError for a format whose library is not installed, DiagramError if two blocks write the same
-    file, and FormatError if the folder cannot be written.
+    The default is svg and csv, also png if matplotlib is installed, and parquet if pyarrow is installed. Each
+    file is written atomically, the page last. Raises UnknownNameError for another format, MissingLibraryError
+    for a format whose library is not installed, DiagramError if two blocks write the same file, and
+    FormatError if the folder cannot be written.
     """
     formats = usable_figure_formats() if formats is None else formats
     data = usable_data_formats() if data is None else data
@@ -162,7 +162,8 @@ class _Writer:
     """Encodes and writes files in a separate thread, because compression and file access release the
     interpreter lock.
 
-    After the ``with`` block all files are written. It raises the error of a file that could not be written.
+    After the ``with`` block all files are written. The block raises the error of a file that cannot be
+    written.
     """
 
     def __init__(self) -> None:

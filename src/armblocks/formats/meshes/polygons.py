@@ -32,7 +32,7 @@ def fans(counts: Integers, name: str) -> Integers:
 
 
 def strip(count: int) -> Integers:
-    """The triangles (F, 3) of a strip of ``count`` corners: every second one has its corners exchanged."""
+    """The triangles (F, 3) of a strip of ``count`` corners, all with the same orientation."""
     first = np.arange(max(count - 2, 0))
     odd = first % 2
     return np.stack([first, first + 1 + odd, first + 2 - odd], axis=-1)

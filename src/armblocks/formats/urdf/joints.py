@@ -34,7 +34,7 @@ JOINT_KINDS: dict[str, type[Joint]] = {
     "floating": Free,
     "spherical": Spherical,
 }
-"""The types of URDF, and that of the ball joints of Bullet."""
+"""The joint types of URDF, and the type of ball joints in files for Bullet."""
 _SINGLE = ("revolute", "continuous", "prismatic")
 """The types with one coordinate."""
 UNIT_LENGTH = 1e-3

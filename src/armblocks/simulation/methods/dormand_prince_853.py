@@ -1,7 +1,7 @@
 """The coefficients of DOP853: twelve stages, order 8, with a dense output of order 7.
 
 Source: Hairer, Norsett, Wanner, *Solving Ordinary Differential Equations I*, 2nd edition, II.5 and II.6, and
-their program ``dop853.f`` (constants with 30 digits, rounded to doubles). ``DENSE`` is the nested
+the authors' program ``dop853.f`` (constants with 30 digits, rounded to doubles). ``DENSE`` is the nested
 interpolation of this program, ``x_old + theta (F0 + (1 - theta) (F1 + theta (F2 + …)))`` expanded in powers
 of theta with exact rational arithmetic.
 """

@@ -2,8 +2,8 @@
 as a second client.
 
 The messages are in an unnamed temporary file, so that a long run needs little memory. The system deletes
-the file when the process ends. If the disk is full, no more samples are stored, but the final message of the
-run still is.
+the file when the process ends. If the disk is full, no more samples are stored; the final message of the run
+is stored in memory.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ class RunRecord:
     """All messages of a run, in order."""
 
     def __init__(self) -> None:
-        self._file = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - it lives as long as the run
+        self._file = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - open until the end of the run
         self._unwritten: dict[int, str] = {}
         """Messages that could not be written to disk, by their number."""
         self._extents: list[tuple[int, int, bool]] = []
