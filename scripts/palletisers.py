@@ -52,7 +52,7 @@ class Arm:
     """The data of one arm: lengths in mm, angles in degrees.
 
     ``lengths``: height and offset of axis 2, lower arm, upper arm, wrist to flange forward and down.
-    ``payload`` kg: for the estimate of the masses; ``published_payload`` says whether a source states it.
+    ``payload`` kg: for the estimate of the masses; ``published_payload``: whether a source states it.
     """
 
     name: str
@@ -100,13 +100,14 @@ class Arm:
 
     @property
     def notes(self) -> str:
-        """Conventions, and what is estimated."""
+        """The conventions, and the estimated quantities."""
         return (
-            "Palletiser with four driven axes. Parallelogram linkages move the upper arm by a lever at the "
-            f"turret and keep the flange level; their rods and levers are bodies of the model. {self.note} "
-            f"The pins of the linkages are not published: lever {LEVER:g}, level rods {TRIANGLE:g} of the "
-            f"upper arm. {self.payload_note} Masses are estimated, not measured: the masses of the KUKA "
-            "KR 180 of the paper are scaled in proportion to payload and length "
+            "Palletiser with four driven axes. A parallelogram linkage with a lever at the turret moves the "
+            "upper arm, and further linkages keep the flange level. The rods and levers are bodies of the "
+            f"model. {self.note} The positions of the pins of the linkages are not published. The assumed "
+            f"length of the lever is {LEVER:g} of the upper arm, and the assumed distance of the level rods "
+            f"from the arm axes is {TRIANGLE:g} of the upper arm. {self.payload_note} Masses are estimated, "
+            "not measured: the masses of a KUKA KR 180 are scaled in proportion to payload and length "
             "(armblocks.robot.palletiser.Masses) and rounded to two digits. The links are beams of square "
             "section. Real values may differ by a factor of two. The counterbalance spring is not modelled. "
             "The model has no friction and no motor data."

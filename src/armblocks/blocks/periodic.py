@@ -1,7 +1,7 @@
 """Blocks that sample their input once a period and have a continuous-time output between samples.
 
 T is the period, t_k = offset + k T is the k-th sample time. The sampled value includes the effects of all
-ticks and events at t_k: as long as the input differs from the sample at that instant, it is sampled again.
+ticks and events at t_k: the block samples again until the input at this time equals the sample.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from armblocks.diagram import (
 
 COUNT = State("count", (), "number of samples taken")
 WHEN = State("when", (), "time of the last sample")
-ODD = State("odd", (), "1 after an odd number of repeated samples, else 0")
+ODD = State("odd", (), "whether the number of repeated samples is odd, 1 or 0")
 INSTANT = Guard("instant", (), "t - the next sample time", 1)
 RESAMPLE = Guard("again", (2,), "the input differs from its sample", -1)
 SAME_VALUE = 2.0**-40
-"""Relative tolerance for a signal to equal its sample; in a loop their rounding errors differ."""
+"""Relative tolerance for a signal to equal its sample; in a loop the rounding errors of both differ."""
 
 
 def sample_time(p: Signals, count: SX) -> SX:

@@ -66,10 +66,10 @@ class TriggeredSubsystem(DiagramBlock):
         shown=("In1", "trigger", "Out1"),
     )
 
-    edge: str = parameter("rising", choices=_EDGES, doc="when the trigger fires")
+    edge: str = parameter("rising", choices=_EDGES, doc="edge that executes the subsystem")
 
     def control_ports(self) -> tuple[Port, ...]:
-        return (Port("trigger", "executes the subsystem when it fires", "", ()),)
+        return (Port("trigger", "each event executes the subsystem", "", ()),)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,30 +83,30 @@ class EnabledTriggeredSubsystem(DiagramBlock):
         shown=("In1", "trigger", "Out1"),
     )
 
-    edge: str = parameter("rising", choices=_EDGES, doc="when the trigger fires")
+    edge: str = parameter("rising", choices=_EDGES, doc="edge that executes the subsystem")
 
     def control_ports(self) -> tuple[Port, ...]:
         return (
             Port("enable", "enables the trigger while positive", "", ()),
-            Port("trigger", "executes the subsystem when it fires", "", ()),
+            Port("trigger", "each event executes the subsystem", "", ()),
         )
 
 
 @dataclass(frozen=True, kw_only=True)
 class ResettableSubsystem(DiagramBlock):
-    """A resettable subsystem: always active; all its states are reset when its input reset fires."""
+    """A resettable subsystem: always active; each event at the input ``reset`` resets all inner states."""
 
     title: ClassVar[str] = "Resettable Subsystem"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="An integrator inside: the integral of the sine is reset by each rising edge of the pulse.",
+        shows="Each rising edge of the pulse resets the integrator inside the subsystem.",
         inputs={"reset": _PULSES},
         shown=("In1", "reset", "Out1"),
     )
 
-    edge: str = parameter("rising", choices=_EDGES, doc="when the reset fires")
+    edge: str = parameter("rising", choices=_EDGES, doc="edge that resets the states")
 
     def control_ports(self) -> tuple[Port, ...]:
-        return (Port("reset", "resets all states when it fires", "", ()),)
+        return (Port("reset", "each event resets all states", "", ()),)
 
 
 @dataclass(frozen=True, kw_only=True)

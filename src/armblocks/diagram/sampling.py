@@ -35,7 +35,7 @@ def sample_time_parameter(default: float = INHERITED) -> Any:
         dimensions=(0, 1),
         tunable=False,
         unit="s",
-        doc="the period, or (period, offset); -1 inherits it from the sampled blocks upstream or downstream",
+        doc="the period, or (period, offset); -1: the sample time of sampled blocks upstream or downstream",
     )
 
 

@@ -114,7 +114,7 @@ class SecondOrderLag(Block):
 class LeadLag(Block):
     """A lead or lag compensator: y = gain (T1 s + 1) / (T2 s + 1) u, initially at rest.
 
-    It leads (positive phase) where T1 > T2, else it lags.
+    The block leads (positive phase) for T1 > T2 and lags (negative phase) for T1 < T2.
     """
 
     title: ClassVar[str] = "Lead-Lag"

@@ -63,14 +63,14 @@ class Rpy2T(Block):
 class T2rpy(Block):
     """Roll, pitch and yaw of a pose, the inverse of rpy2T of the same convention, with abs(pitch) <= pi/2.
 
-    At pitch = pi/2 or -pi/2 only the sum or the difference of roll and yaw is determined: roll is 0 there,
-    and the angles still give the pose.
+    At pitch = pi/2 or -pi/2 only the sum or the difference of roll and yaw is determined. The block then sets
+    roll to 0.
     """
 
     title: ClassVar[str] = "T2rpy"
     sign: ClassVar[FaceSign] = Words("T→rpy")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The three angles of a pose that was computed from them; yaw wraps at pi.",
+        shows="The block returns the three angles from which the pose is computed; yaw wraps at pi.",
         inputs={
             "T": driver("Rpy2T").by(
                 roll=driver("SineWave", amplitude=0.5).named("roll"),
@@ -120,14 +120,14 @@ class Eul2T(Block):
 class T2eul(Block):
     """Euler angles ZYZ of a pose, the inverse of eul2T, with 0 <= theta <= pi.
 
-    At theta = 0 or pi only the sum or the difference of phi and psi is determined: phi is 0 there, and the
-    angles still give the pose.
+    At theta = 0 or pi only the sum or the difference of phi and psi is determined. The block then sets
+    phi to 0.
     """
 
     title: ClassVar[str] = "T2eul"
     sign: ClassVar[FaceSign] = Words("T→eul")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The three angles of a pose that was computed from them; phi wraps at pi.",
+        shows="The block returns the three angles from which the pose is computed; phi wraps at pi.",
         inputs={
             "T": driver("Eul2T").by(
                 phi=driver("Ramp").named("phi"),

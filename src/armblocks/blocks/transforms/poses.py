@@ -279,9 +279,9 @@ class Delta2Tr(Block):
 class PoseIntegration(Block):
     """The pose of a frame from its twist: p' = v, Q' = 1/2 w Q (world axes), or p' = R v, Q' = 1/2 Q w.
 
-    V is (v; w) of the frame's origin: in world axes like ``jacob0``, in body axes like ``jacobe``. The states
-    are the position and a quaternion Q. The pose is that of Q / |Q|, so that its rotation matrix is always
-    orthonormal. |Q| returns to 1 at the rate ``restoring``, without effect on the pose.
+    V is the twist (v; w) at the frame's origin, in world axes (as for ``jacob0``) or in body axes (as for
+    ``jacobe``). The states are the position and a quaternion Q. The rotation matrix is computed from Q / |Q|,
+    so that it is always orthonormal. |Q| returns to 1 at the rate ``restoring``, without effect on the pose.
     """
 
     title: ClassVar[str] = "Pose Integration"
