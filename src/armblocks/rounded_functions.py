@@ -9,9 +9,9 @@ correctly rounded, except for arguments whose result is within about 2**-192 of 
 doubles. A call takes 10 to 200 microseconds.
 
 Signed zeros, infinities and NaN follow C99 (Annex F): an argument outside the domain gives NaN, a pole gives
-an infinity, and no function raises. The series are those of Abramowitz and Stegun, Handbook of Mathematical
-Functions, 4.2 to 4.6 and 7.1; the reduction of their arguments is that of R. P. Brent, Fast
-multiple-precision evaluation of elementary functions, J. ACM 23(2), 1976.
+an infinity, and no function raises. Sources: the series from Abramowitz and Stegun, Handbook of Mathematical
+Functions, 4.2 to 4.6 and 7.1; the argument reduction from R. P. Brent, Fast multiple-precision evaluation of
+elementary functions, J. ACM 23(2), 1976.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from functools import lru_cache
 
 INFINITY, NAN = math.inf, math.nan
 _EXTRA_BITS = 192
-"""Extra bits beyond those that the magnitude of an argument needs."""
+"""Number of bits in addition to the bits for the magnitude of an argument."""
 
 
 def _working_bits(x: float) -> int:

@@ -70,7 +70,7 @@ def test_the_poles_are_the_finite_generalised_eigenvalues() -> None:
 
 
 def test_initial_algebraic_variables_follow_from_the_differential_ones() -> None:
-    """x1' = -x1, 0 = x2 - 2 x1: of the initial values (3, 100) only that of x1 is used."""
+    """x1' = -x1, 0 = x2 - 2 x1: of the initial values (3, 100) only the value of x1 is used."""
     block = DescriptorStateSpace(
         E=((1.0, 0.0), (0.0, 0.0)),
         A=((-1.0, 0.0), (-2.0, 1.0)),

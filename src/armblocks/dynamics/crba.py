@@ -27,7 +27,7 @@ def crba(tree: KinematicTree, joints: Sequence[JointMotion]) -> SquareMatrix:
     composite = [body.inertia for body in bodies]
     for i in reversed(range(n)):
         body, inertia = bodies[i], composite[i]
-        # 1. The composite body is added to that of its parent.
+        # 1. Add each composite body to the composite body of its parent.
         if body.parent != BASE:
             composite[body.parent] = composite[body.parent].plus(_in_parent(inertia, joints[i]))
         # 2. The wrench that gives the composite body unit acceleration of joint i.

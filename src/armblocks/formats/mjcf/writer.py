@@ -70,8 +70,7 @@ def write_mjcf(robot: Robot) -> bytes:
     Warns of data that MJCF does not have: line springs with a constant force, gear ratios (rotor inertia and
     friction are written at the joint), speed limits, the tip and the order of the coordinates of some trees,
     Coulomb friction that depends on the direction, friction that accelerates a joint, housings. MuJoCo does
-    not accept moving bodies without mass or with physically impossible inertias; they are written as they
-    are.
+    not accept moving bodies without mass or with physically impossible inertias; they are written unchanged.
     """
     mimics = mimics_of(robot, "MJCF", CLOSURES)
     for link in robot.links:
@@ -114,7 +113,7 @@ def _warn_of_losses(robot: Robot) -> None:
     moving = [link for link in robot.links if link.joint.moves]
     if any(link.motor is not None and link.motor.gear_ratio != 1.0 for link in moving):
         warn_of_loss(
-            where, "gear ratios are not part of an MJCF file; inertia and friction are those at the joint"
+            where, "gear ratios are not part of an MJCF file; inertia and friction are converted to the joint"
         )
     if any(limits.speed is not None for limits in robot.limits):
         warn_of_loss(where, "speed limits are not part of an MJCF file")
@@ -133,7 +132,7 @@ def _check_quaternions(robot: Robot, link: Link) -> None:
         raise FormatError(
             "the free joint is not at the base",
             where=where,
-            allowed="free joints of links at the base: MuJoCo has no others",
+            allowed="free joints of links at the base only, as in MuJoCo",
             fix="save the robot as .json",
         )
     if link.after.rotation != IDENTITY3 or (isinstance(link.joint, Free) and not link.after.is_identity):
@@ -211,7 +210,7 @@ def _nested(
     meshes: list[str],
     sites: Mapping[str | None, list[str]],
 ) -> list[str]:
-    """The lines of the nested bodies; the tool is the last body in that of the tip."""
+    """The lines of the nested bodies; the tool is the last body inside the body of the tip."""
     tip = robot.links[-1].name
     lines: list[str] = []
     waiting: list[tuple[str, int]] = [(name, 2) for name in reversed(roots)]

@@ -1,1 +1,1 @@
-"""Robots in the studio: the editor's tables, edits, readings, scenes."""
+"""Robots in the studio: tables and edits of the robot editor, read-outs of an arm, scenes."""
