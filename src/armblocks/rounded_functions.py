@@ -1,12 +1,12 @@
-"""Elementary functions of numbers, rounded to the nearest double: the same bits on every machine.
+"""Elementary functions of numbers, rounded to the nearest double, with bit-identical results on all machines.
 
 Numbers that are computed before compilation (constants in formulas, angles between the axes of a robot, the
 poles of a filter) become constants of the code. The C library's functions, which :mod:`math`, NumPy and
 CasADi call, differ in the last place from one library or processor to the next. The functions of this module
-use integer arithmetic and give the same bits everywhere. A real number ``x`` is the integer
-``round(x 2**bits)``, with 192 bits more than the magnitude of the argument needs. Results are therefore
-correctly rounded, except for arguments whose result is within about 2**-192 of the middle between two
-doubles. A call takes 10 to 200 microseconds.
+use integer arithmetic, so that their results are bit-identical on all machines. A real number ``x`` is the
+integer ``round(x 2**bits)``, with 192 bits more than the magnitude of the argument needs. Results are
+therefore correctly rounded, except for arguments whose result is within about 2**-192 of the middle between
+two doubles. A call takes 10 to 200 microseconds.
 
 Signed zeros, infinities and NaN follow C99 (Annex F): an argument outside the domain gives NaN, a pole gives
 an infinity, and no function raises. Sources: the series from Abramowitz and Stegun, Handbook of Mathematical

@@ -115,7 +115,7 @@ class DiagramBuilder(metaclass=ArgumentErrors):
     ) -> Any:
         """Declare a parameter of this diagram, and return the formula that is its name.
 
-        ``rules`` are those of a block's parameter: ``minimum``, ``above``, ``maximum``, ``choices``, …
+        ``rules`` are the rules for a block's parameter: ``minimum``, ``above``, ``maximum``, ``choices``, …
         ``value`` is the present value, by default ``default``. Inside a ``with builder.subsystem(…)`` it
         may be a formula of the parameters of the enclosing diagram. Raises ``InputError``.
         """
@@ -239,7 +239,7 @@ class DiagramBuilder(metaclass=ArgumentErrors):
     def bend(self, wire: Connection, bends: Sequence[float]) -> None:
         """Set the route of a connection: alternating x and y of its segments (pixels), from its source on.
 
-        It is ignored if there is no such connection.
+        The route is ignored if the connection does not exist.
         """
         self._bends[wire] = tuple(bends)
 
@@ -275,9 +275,9 @@ class DiagramBuilder(metaclass=ArgumentErrors):
     def parameter_set(self, name: str, values: Mapping[str, Any]) -> None:
         """Store values of parameters under a name: ``builder.parameter_set("stiff", {"pid.kp": 40.0})``.
 
-        The paths are those of ``simulate(parameters=…)``. The diagram keeps its own values:
-        ``ab.with_parameter_set(diagram, "stiff")`` applies those of the set. ``build`` checks them. Raises
-        ``DiagramError`` for an invalid name.
+        The paths have the form of ``simulate(parameters=…)``. The values of the diagram do not change;
+        ``ab.with_parameter_set(diagram, "stiff")`` returns the diagram with the values of the set. ``build``
+        checks the values. Raises ``DiagramError`` for an invalid name.
         """
         check_set_name(name, self._parameter_sets, f"diagram '{self.name}'")
         self._parameter_sets[name] = dict(values)
@@ -293,12 +293,12 @@ class DiagramBuilder(metaclass=ArgumentErrors):
         """Comment a block through: each output equals the input of the same index.
 
         ``build`` checks that their shapes agree. Raises ``UnknownNameError``, and ``DiagramError`` for blocks
-        with fewer inputs than outputs, for those without outputs, and for In and Out blocks.
+        with fewer inputs than outputs, blocks without outputs, and In and Out blocks.
         """
         self.comment(self._commentable(block, "through"), "through")
 
     def comment(self, name: str, comment: Comment) -> None:
-        """Comment a block out or through without a check; ``build`` checks it. File readers use it."""
+        """Comment a block out or through without a check, for file readers; ``build`` checks the comments."""
         self._known(name)
         self._commented[name] = comment
 

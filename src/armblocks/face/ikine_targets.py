@@ -155,7 +155,7 @@ def start_array(q0: ArrayLike | None, nq: int, count: int | None, where: str) ->
 
 
 def mask_array(mask: Sequence[float] | ArrayLike | None, where: str) -> tuple[float, ...]:
-    """Six ones and zeros: the components of the error that count. Raises InputError for other values."""
+    """Six ones and zeros, 1 for each used component of the error. Raises InputError for other values."""
     if mask is None:
         return (1.0,) * 6
     try:

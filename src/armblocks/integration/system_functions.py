@@ -1,9 +1,9 @@
 """Declarations of the system's functions that the native loop calls. ``emit_function`` of the compiler writes
 their code.
 
-Arrays are those of the system: ``t`` the time, ``x`` the states, ``z`` the discrete variables with the
-delayed values, ``w`` the unknowns of the implicit equations, ``p`` the parameters. The last arrays are the
-results.
+The arguments are arrays of the system: ``t`` the time, ``x`` the states, ``z`` the discrete variables with
+the delayed values, ``w`` the unknowns of the implicit equations, ``p`` the parameters. The last arrays are
+the results.
 """
 
 from __future__ import annotations
