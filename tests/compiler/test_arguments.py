@@ -1,4 +1,4 @@
-"""Arguments that kernels refuse, and their messages."""
+"""Invalid arguments of kernels, and the error messages."""
 
 import numpy as np
 import pytest

@@ -72,7 +72,7 @@ NUMBERS = (
 
 
 def read(format: RobotFormat, data: bytes) -> Robot | ArmblocksError:
-    """The robot, with its findings, or the error, which must be fit to be shown."""
+    """The robot with its findings, or the error; checks that its text can be displayed."""
     name = f"file{format.suffixes[0]}"
     context = FileContext()
     began = time.process_time()

@@ -48,13 +48,13 @@ class ArmKernels:
 
     @cached_property
     def description_key(self) -> str:
-        """The content on which the equations depend: all except appearance and source file."""
+        """The content on which the equations depend: the robot without its appearance and source file."""
         links = tuple(replace(link, geometry=None) for link in self.robot.links)
         return hashlib.sha256(repr(replace(self.robot, links=links, source="")).encode()).hexdigest()
 
     @cached_property
     def symbolic(self) -> SymbolicArm:
-        """The equations in symbols; one object, because each has its own symbols."""
+        """The equations in symbols, cached because each object of this class has its own symbols."""
         from armblocks.face.symbolic_arm import SymbolicArm
 
         return SymbolicArm(self.robot)
@@ -118,7 +118,7 @@ class ArmKernels:
         return search
 
     def loaded(self, method: str) -> Callable[..., Array]:
-        """A function that calls the kernel of a method, or with a wrench or payload a second kernel.
+        """A function that calls the kernel of a method, or a second kernel if a wrench or payload is given.
 
         The second kernel is compiled at its first use.
         """

@@ -26,10 +26,10 @@ def write_report(
     """Write ``report.html``, the diagram, figures and data of a run into a folder, created if absent.
 
     ``formats`` of the figures: svg, png. ``data``: csv, parquet, npz, mat. The default is svg and csv, also
-    png if matplotlib is installed and parquet if pyarrow is. The files of To File blocks are written to the
-    same folder. Returns the paths. Raises UnknownNameError for another format, MissingLibraryError for a
-    format whose library is not installed, DiagramError if two blocks write the same file, FormatError if the
-    folder cannot be written.
+    png if matplotlib is installed, and parquet if pyarrow is installed. The files of To File blocks are
+    written to the same folder. Returns the paths. Raises UnknownNameError for another format,
+    MissingLibraryError for a format whose library is not installed, DiagramError if two blocks write the same
+    file, FormatError if the folder cannot be written.
     """
     from armblocks import report
 

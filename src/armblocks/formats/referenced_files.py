@@ -18,9 +18,9 @@ _MANIFEST_BYTES = 100_000
 
 
 def package_folder(name: str, context: FileContext, start: Path | None = None) -> Path | None:
-    """The folder of a ROS package: that of the context, else one found above ``start`` (the file's folder).
+    """The folder of a ROS package: given by the context, or found above ``start`` (the file's folder).
 
-    A folder is that of the package if it has its name, or a ``package.xml`` with its name.
+    The folder has the name of the package, or contains a ``package.xml`` with this name.
     """
     if name in context.packages:
         return Path(context.packages[name])

@@ -40,7 +40,7 @@ def from_derivatives(durations: Sequence[float], highest: Sequence[float], order
 
 
 def trapezoid(speed: float, acceleration: float, deceleration: float) -> PiecewisePolynomial:
-    """The fastest motion over the distance 1 under limits of speed and of acceleration at both ends.
+    """The time-optimal motion over the distance 1 with limits of speed and of acceleration at both ends.
 
     The limits are per unit of distance: 1/s, 1/s². Where the speed limit is not reached, the profile is a
     triangle.
@@ -54,7 +54,8 @@ def trapezoid(speed: float, acceleration: float, deceleration: float) -> Piecewi
 
 
 def double_s(speed: float, acceleration: float, jerk: float) -> PiecewisePolynomial:
-    """The fastest motion over the distance 1 under limits of speed, acceleration and jerk (1/s, 1/s², 1/s³).
+    """The time-optimal motion over the distance 1 with limits of speed, acceleration and jerk (1/s, 1/s²,
+    1/s³).
 
     The speed rises in an S, is constant, and falls in the same S. Phases of constant acceleration and speed
     are omitted where the limits are not reached.

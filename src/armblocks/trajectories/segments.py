@@ -1,7 +1,7 @@
 """The toolbox's ``mstraj``: linear segments between via points with quintic blends.
 
 Source: P. Corke, Robotics Toolbox for MATLAB, releases 9 and 10, ``mstraj``; Robotics, Vision and Control,
-2017, 3.3.3. Durations are rounded up to multiples of the sample time, as there.
+2017, 3.3.3. As in the toolbox, durations are rounded up to multiples of the sample time.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def multi_segment(
 
 
 def _steps(duration: float, dt: float) -> int:
-    """The number of steps that a duration takes, rounded up; rounding errors of the quotient do not count."""
+    """The number of steps of a duration, rounded up, with a tolerance for rounding errors of the quotient."""
     return math.ceil(duration / dt * (1.0 - 1e-12))
 
 
