@@ -692,7 +692,7 @@ export interface AskOutline {
 /**
  * Return the parameter sets of a model.
  *
- * The reply also contains the values in the model of all parameters of the sets, and of those in ``also``.
+ * The reply also contains the model's values of all parameters in the sets and in ``also``.
  */
 export interface AskParameterSets {
   kind: "parameter_sets";

@@ -1,4 +1,4 @@
-"""Search for the signals of a run that are the motion of a robot."""
+"""Search for the signals of a run that describe the motion of a robot."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def test_the_papers_model_has_one_motion_with_exact_rates() -> None:
 
 
 def test_commanded_signals_of_a_controller_are_not_the_motion() -> None:
-    """Computed torque passes the commanded acceleration to rne; that of the arm comes from its dynamics."""
+    """The controller passes the commanded acceleration to rne, not the acceleration of the arm."""
     diagram = ab.load_diagram("puma560_computed_torque")
     result = ab.simulate(diagram)
     (motion,) = motions(diagram, result)

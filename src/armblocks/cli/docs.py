@@ -54,7 +54,7 @@ def docs(
 
 
 def pages(folder: Path) -> dict[str, Path]:
-    """All pages by name, including blocks and robots; a guide takes precedence over one of the same name."""
+    """All pages by name, including blocks and robots. For equal names, the guide takes precedence."""
     kinds = ("robots", "blocks")
     files = [path for kind in kinds for path in sorted(folder.glob(f"reference/{kind}/*.html"))]
     files += sorted(folder.glob("reference/*.html"))

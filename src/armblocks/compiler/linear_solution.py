@@ -4,7 +4,8 @@ Gaussian elimination with row pivoting. Pivots are chosen relative to the larges
 scaling an equation does not change the choice (Golub, Van Loan, *Matrix Computations*, 4th ed., 3.5.2). One
 step of iterative refinement in working precision makes the residual of every equation as small as the
 rounding error of its terms (Skeel, *Math. Comp.* 35 (1980) 817-832). Each lane exchanges its rows by select
-instructions. All lanes run the same instructions, and the results are bitwise those of one lane.
+instructions. All lanes run the same instructions, and the results are bit-identical to the results with one
+lane.
 """
 
 from __future__ import annotations

@@ -202,7 +202,8 @@ def shown_name(diagram: Diagram, source: PortRef, propagated: Mapping[PortRef, s
 def wire_label(diagram: Diagram, source: PortRef) -> str:
     """The label at both ends of a wire without a line.
 
-    It is the name of the signal, else the source block, with its port if it has several.
+    The label is the name of the signal, else the name of the source block, with the port if the block has
+    several.
     """
     if source in diagram.signal_names:
         return diagram.signal_names[source]
@@ -215,7 +216,7 @@ def obstacle(box: Box) -> Obstacle:
 
 
 def _label(box: Box) -> tuple[float, float, float, float]:
-    """The rectangle of the block's name; that of a hidden name is the block."""
+    """The rectangle of the block's name; if the name is hidden, the rectangle of the block."""
     width, middle = box.name_width, box.y + box.height / 2 - 7
     match box.shown_name_side:
         case "hidden":

@@ -41,7 +41,7 @@ class Ellipsoid(metaclass=ArgumentErrors):
 
     @property
     def volume(self) -> Array:
-        """The product of the radii: the volume of the ellipsoid over that of the unit ball."""
+        """The product of the radii: the volume of the ellipsoid divided by the volume of the unit ball."""
         return np.asarray(self.radii.prod(axis=-1))
 
 

@@ -1,7 +1,7 @@
 """Constraints ``<equality>`` of MJCF: ``connect``, ``weld`` and ``joint``.
 
-MuJoCo's constraints are soft; those of a robot are exact. Frames that the file does not give are those of the
-initial configuration. Source: MuJoCo documentation, *XML reference*, *equality*.
+MuJoCo's constraints are soft; constraints of a robot are exact. Frames that the file does not give are
+computed from the initial configuration. Source: MuJoCo documentation, *XML reference*, *equality*.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ def _closure(element: Element, parts: Parts, poses: Mapping[str | None, Transfor
 
 
 def _given_pose(element: Element) -> Transform | None:
-    """The relative pose of a weld; None where the quaternion is zero: that of the initial configuration."""
+    """The relative pose of a weld. A zero quaternion gives None: the pose in the initial configuration."""
     if "relpose" not in element.attributes:
         return None
     x, y, z, *quaternion = element.numbers("relpose", (7,))

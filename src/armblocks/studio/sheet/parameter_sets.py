@@ -95,7 +95,7 @@ def without_parameter(edit: RemoveSetParameter, diagram: Diagram, _context: obje
 
 
 def parameter_set_table(diagram: Diagram, also: Sequence[str] = ()) -> ParameterSetTable:
-    """Return all sets of a model, and its own values of their parameters and of those in ``also``."""
+    """Return all sets of a model, and the model's values of the parameters in these sets and in ``also``."""
     paths = sorted({*also, *(path for entries in diagram.parameter_sets.values() for path in entries)})
     table = ParameterSetTable(parameters=[_row(diagram, path) for path in paths], sets={}, faults={})
     for name, entries in diagram.parameter_sets.items():

@@ -309,7 +309,7 @@ class ParameterSetTable(Message):
 class AskParameterSets(Request[ParameterSetTable]):
     """Return the parameter sets of a model.
 
-    The reply also contains the values in the model of all parameters of the sets, and of those in ``also``.
+    The reply also contains the model's values of all parameters in the sets and in ``also``.
     """
 
     kind: Literal["parameter_sets"] = "parameter_sets"
