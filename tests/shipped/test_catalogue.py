@@ -53,7 +53,7 @@ def test_the_catalogue_has_more_than_fifty_arms_with_sources() -> None:
         assert ("estimated" in facts.notes) == (facts.masses is MassOrigin.ESTIMATED) or name == "stanford", (
             name
         )
-        convention = "Parallelogram linkages" if name in PALLETISERS else "D-H rows"
+        convention = "parallelogram linkage" if name in PALLETISERS else "D-H rows"
         assert convention in facts.notes, f"{name}: the notes state the convention"
 
 
