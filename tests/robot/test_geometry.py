@@ -1,15 +1,20 @@
 """The geometry of robots: closed, correctly oriented surfaces that follow the kinematics."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
+from armblocks.errors import RobotError
+from armblocks.formats import load_robot
 from armblocks.robot import JointLimits, Link, Revolute, Robot, serial_chain, standard_dh
 from armblocks.robot.geometry import link_frames, reach, robot_bodies, robot_shapes
+from armblocks.robot.linkage_points import rod_points
 from armblocks.robot.shapes import IDENTITY, Box, Cylinder, Housing, Material, Mesh, Shape, Sphere
 from armblocks.robot.triangles import SIDES, TriangleMesh, triangles
-from armblocks.spatial import transl
+from armblocks.spatial import Transform, transl
+from mechanisms_for_tests import four_bar
 
 _TETRAHEDRON = Mesh(
     vertices=((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)), faces=((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
@@ -114,3 +119,70 @@ def test_a_robot_on_a_column_stands_in_its_base_frame(puma560: Robot) -> None:
         assert min(feet) <= 0.0
         if bottom is not None:
             assert min(feet) == pytest.approx(bottom)
+
+
+@pytest.mark.parametrize(
+    "pose",
+    [
+        Transform(translation=(0.1, 0.2, 0.3)),
+        Transform(translation=(0.1, 0.2, 0.3)).matrix,
+        Transform(translation=(0.1, 0.2, 0.3)).matrix.tolist(),
+        tuple(Transform(translation=(0.1, 0.2, 0.3)).matrix.tolist()),
+    ],
+)
+def test_shapes_with_lists_and_arrays_are_stored_as_tuples(pose: Any) -> None:
+    box = Box(size=[1.0, 2.0, 3.0], pose=pose)  # pyright: ignore[reportArgumentType]
+    assert box == Box(size=(1.0, 2.0, 3.0), pose=Transform(translation=(0.1, 0.2, 0.3)))  # pyright: ignore[reportArgumentType]
+    mesh = Mesh(vertices=np.eye(3), faces=[[0, 1, 2]], pose=pose)  # pyright: ignore[reportArgumentType]
+    robot = Robot(name="boxes", links=(Link(name="link", geometry=(box, mesh)),))
+    assert hash(robot) == hash(Robot(name="boxes", links=(Link(name="link", geometry=(box, mesh)),)))
+    assert mesh.faces == ((0, 1, 2),)
+    assert robot_shapes(robot)
+
+
+def test_a_shape_with_an_invalid_pose_is_refused_by_name() -> None:
+    with pytest.raises(RobotError, match="pose of a Sphere: the pose is no Transform"):
+        Sphere(radius=1.0, pose=[[1.0]])  # pyright: ignore[reportArgumentType]
+
+
+def corners_near(robot: Robot, link: str, point: Any, distance: float) -> bool:
+    """Whether the drawing of a link has surface points near a point of its frame."""
+    row = 1 + [one.name for one in robot.links].index(link)
+    corners = [body.mesh.corners.reshape(-1, 3) for body in robot_bodies(robot) if body.row == row]
+    return bool((np.linalg.norm(np.concatenate(corners) - point, axis=1) < distance).any())
+
+
+def test_links_that_end_at_a_closure_are_drawn_up_to_it() -> None:
+    robot = four_bar()
+    for link, end in (("coupler", (0.9, 0.0, 0.0)), ("rocker", (0.7, 0.0, 0.0))):
+        assert corners_near(robot, link, end, 0.1)
+        assert corners_near(robot, link, (end[0] / 2 - 0.3, 0.0, 0.0), 0.4)
+
+
+@pytest.mark.parametrize("name", ["irb460", "kr180_2_pa", "m410ic_185"])
+def test_the_rods_of_palletisers_end_at_a_drawn_bracket(name: str) -> None:
+    robot = load_robot(name)
+    row_of = {link.name: row for row, link in enumerate(robot.links, start=1)}
+    size = reach(robot)
+    rng = np.random.default_rng(2)
+    frames = [
+        link_frames(robot, q.tolist()) for q in robot.neutral + 0.2 * rng.standard_normal((3, robot.nq))
+    ]
+    for rod, carrier in (
+        ("drive_rod", "upper_arm"),
+        ("lower_level_rod", "triangle"),
+        ("upper_level_rod", "wrist"),
+    ):
+        found = rod_points(robot, frames, size)[carrier]
+        for point, axis in found:
+            assert corners_near(robot, carrier, point, 0.1 * size)
+            assert abs(np.linalg.norm(axis) - 1.0) < 1e-9
+        shape = robot.link(rod).geometry
+        assert shape is not None
+        pose = np.array(shape[0].pose)
+        assert isinstance(shape[0], Cylinder)
+        ends = [pose @ (0.0, 0.0, side * shape[0].length / 2, 1.0) for side in (-1, 1)]
+        for T in frames:
+            carried = [(T[row_of[carrier]] @ np.append(point, 1.0))[:3] for point, _ in found]
+            gaps = [np.linalg.norm((T[row_of[rod]] @ end)[:3] - p) for end in ends for p in carried]
+            assert min(gaps) < 1e-9 * size

@@ -3,8 +3,10 @@
 Figures use tones (:class:`Tone`) instead of colours; each tone has a light and a dark value. Text tones have
 a contrast of at least 4.5:1 on page and surface, trace tones of at least 3:1 (WCAG 2.2, 1.4.3 and 1.4.11).
 Trace colours are the set of Okabe and Ito (2008). As far as this contrast requires, light colours are darker
-on white and blue is lighter on black, with the same hue. The order keeps the colours of the first six
-channels, the joints of most arms, far apart. Every joint has the same colour in all views.
+on white and blue is lighter on black, with the same hue. Their sky blue would then be near the blue; violet
+replaces it, which differs from the others in lightness as well, also for colour-blind readers. The order
+keeps the colours of the first six channels, the joints of most arms, far apart. Every joint has the same
+colour in all views.
 """
 
 from __future__ import annotations
@@ -100,7 +102,7 @@ PALETTE: dict[Tone, Shade] = {
     Tone.TRACE_3: Shade("#b85f96", "#d58fb9"),
     Tone.TRACE_4: Shade("#9a8f00", "#f0e442"),
     Tone.TRACE_5: Shade("#23211e", "#e8ebf0"),
-    Tone.TRACE_6: Shade("#2b8cc4", "#56b4e9"),
+    Tone.TRACE_6: Shade("#581579", "#bac3f3"),
     Tone.TRACE_7: Shade("#b67c00", "#e69f00"),
     Tone.TINT_RED: Shade("#f8d9d5", "#4a2624"),
     Tone.TINT_ORANGE: Shade("#fbe0c8", "#4a3018"),

@@ -259,7 +259,7 @@ def _run(contents: ReportContents) -> str:
     rows = [
         f'<tr><th scope="row">{label}</th><td class="text">{escape(text)}</td></tr>' for label, text in facts
     ]
-    text = f"<table><tbody>{''.join(rows)}</tbody></table>"
+    text = f"<table class='run'><tbody>{''.join(rows)}</tbody></table>"
     if result.parameters:
         values = [
             f'<tr><th scope="row"><code>{escape(name)}</code></th>'

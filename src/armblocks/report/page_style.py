@@ -54,6 +54,7 @@ th:first-child,td:first-child{text-align:left;padding-left:0}
 tbody th{font-weight:600}
 th .unit{display:block}
 td.text,.words thead th{text-align:left}
+.run td{white-space:normal;overflow-wrap:anywhere}
 tr:last-child>*{border-bottom:0}
 .key{display:inline-block;width:18px;height:3px;border-radius:2px;margin-right:8px;vertical-align:middle}
 td.bad{color:var(--error);background:var(--error-wash);font-weight:600}

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.robot.link import Link
+from armblocks.robot.linkage_points import LinkPoints, closure_points, configurations, rod_points
 from armblocks.robot.robot import Robot
 from armblocks.robot.shapes import Box, Cylinder, Housing, Material, Pose, Shape, Sphere
 from armblocks.robot.triangles import TriangleMesh, triangles
@@ -59,6 +60,7 @@ def robot_shapes(robot: Robot) -> tuple[tuple[Shape, ...], ...]:
         link_shapes = _link_shapes(robot, link, plan)
         rows.append(list(link.geometry) if link.geometry is not None else link_shapes)
     rows.append([])
+    _add_linkages(robot, rows, plan)
     # The rail of a prismatic joint belongs to the body that carries the joint.
     row_of = {link.name: row for row, link in enumerate(robot.links, start=1)}
     for link in robot.links:
@@ -66,6 +68,37 @@ def robot_shapes(robot: Robot) -> tuple[tuple[Shape, ...], ...]:
         if link.joint.translations == 1 and link.geometry is None:
             rows[carrier].append(_rail(link, plan))
     return tuple(tuple(shapes) for shapes in rows)
+
+
+def _add_linkages(robot: Robot, rows: list[list[Shape]], plan: _Plan) -> None:
+    """Extend the links to the ends of closed loops, and by brackets to the ends of parallel rods."""
+    loops = closure_points(robot)
+    rods: LinkPoints = {}
+    if robot.couplings and any(link.geometry for link in robot.links):
+        frames = [link_frames(robot, q.tolist()) for q in configurations(robot)]
+        rods = rod_points(robot, frames, plan.reach)
+    thickest = max(plan.radius.values())
+    for row, link in enumerate((None, *robot.links)):
+        name = link.name if link is not None else None
+        r = plan.radius[link.name] if link is not None else 0.7 * thickest
+        for points, part in ((loops, 0.6), (rods, 0.3)):
+            if points is loops and link is not None and link.geometry is not None:
+                continue
+            for point, axis in points.get(name, []):
+                rows[row] += _branch(link, point, axis, part * r)
+
+
+def _branch(link: Link | None, point: _Array, axis: _Array, r: float) -> list[Shape]:
+    """A bar from the joint of a link to a point, with a pin there; for the base, the pin only."""
+    shapes: list[Shape] = []
+    start = link.after.inverse().matrix[:3, 3] if link is not None else point
+    length = float(np.linalg.norm(point - start))
+    if length > _NEGLIGIBLE * r:
+        pose = _aligned(start, point - start, axis)
+        shapes.append(Housing(start=(r, r), end=(0.9 * r, 0.9 * r), length=length, roundness=0.55, pose=pose))
+    pin = _aligned(point, axis)
+    shapes.append(Cylinder(radius=1.3 * r, length=2.6 * r, bevel=0.1 * r, material=Material.JOINT, pose=pin))
+    return shapes
 
 
 def drum_radii(robot: Robot) -> dict[str, float]:
@@ -228,7 +261,8 @@ def _link_shapes(robot: Robot, link: Link, plan: _Plan) -> list[Shape]:
         end = np.array(child.before.translation)
         end_axis = child.before.R @ np.array(child.joint.axis)
         shapes += _casting(start, axis, r, end, end_axis, plan.radius[child.name])
-    if not children:
+    ends_at_closure = any(link.name in (c.first.link, c.second.link) for c in robot.closures)
+    if not children and not (ends_at_closure and link is not robot.links[-1]):
         shapes += _tip(robot, link, start, axis, r)
     return shapes
 

@@ -1,13 +1,18 @@
 """Solid shapes of links for drawings: values only, no meshes (see :mod:`armblocks.robot.geometry`).
 
-Every shape has a pose in its link's frame (p_link = pose p_shape). Lengths are in m.
+Every shape has a pose in its link's frame (p_link = pose p_shape), which may be given as a Transform or a
+(4, 4) matrix. Lengths are in m. Shapes are hashable: lists are stored as tuples.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import Enum
-from typing import TypeAlias
+from typing import TypeAlias, cast
+
+import numpy as np
+
+from armblocks.robot.fields import pose as checked_pose
 
 Row: TypeAlias = tuple[float, float, float, float]
 Pose: TypeAlias = tuple[Row, Row, Row, Row]
@@ -31,6 +36,39 @@ class Material(Enum):
     """Pedestal and base plate."""
 
 
+def _store_tuples(shape: Shape) -> None:
+    """Store the pose and all lists of a new shape as tuples, so that robots are hashable."""
+    where = f"pose of a {type(shape).__name__}"
+    if not _is_rows(shape.pose):
+        a, b, c, d = (tuple(row) for row in checked_pose(shape.pose, where=where).matrix.tolist())
+        object.__setattr__(shape, "pose", (a, b, c, d))
+    for field in fields(shape):
+        value = cast("object", getattr(shape, field.name))
+        if _has_lists(value):
+            object.__setattr__(shape, field.name, _tuples(value))
+
+
+def _has_lists(value: object) -> bool:
+    if isinstance(value, tuple):
+        return any(isinstance(entry, list | np.ndarray) for entry in cast("tuple[object, ...]", value))
+    return isinstance(value, list | np.ndarray)
+
+
+def _is_rows(value: object) -> bool:
+    return isinstance(value, tuple) and all(
+        isinstance(row, tuple) for row in cast("tuple[object, ...]", value)
+    )
+
+
+def _tuples(value: object) -> object:
+    """The value with tuples instead of lists and arrays, at all depths."""
+    if isinstance(value, np.ndarray):
+        value = cast("list[object]", value.tolist())
+    if isinstance(value, list | tuple):
+        return tuple(_tuples(entry) for entry in cast("list[object]", value))
+    return value
+
+
 @dataclass(frozen=True, kw_only=True)
 class Cylinder:
     """A cylinder about the shape's z axis, centred on the origin; ``bevel`` rounds both rims (m)."""
@@ -40,6 +78,9 @@ class Cylinder:
     bevel: float = 0.0
     material: Material = Material.PAINT
     pose: Pose = IDENTITY
+
+    def __post_init__(self) -> None:
+        _store_tuples(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +98,9 @@ class Housing:
     material: Material = Material.PAINT
     pose: Pose = IDENTITY
 
+    def __post_init__(self) -> None:
+        _store_tuples(self)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Box:
@@ -65,6 +109,9 @@ class Box:
     size: Vector3
     material: Material = Material.PAINT
     pose: Pose = IDENTITY
+
+    def __post_init__(self) -> None:
+        _store_tuples(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,6 +122,9 @@ class Sphere:
     material: Material = Material.PAINT
     pose: Pose = IDENTITY
 
+    def __post_init__(self) -> None:
+        _store_tuples(self)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Mesh:
@@ -84,6 +134,9 @@ class Mesh:
     faces: tuple[tuple[int, int, int], ...]
     material: Material = Material.PAINT
     pose: Pose = IDENTITY
+
+    def __post_init__(self) -> None:
+        _store_tuples(self)
 
 
 Shape: TypeAlias = Cylinder | Housing | Box | Sphere | Mesh
