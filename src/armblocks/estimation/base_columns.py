@@ -15,6 +15,9 @@ INDEPENDENT = 1e-8
 """A column is dependent if its distance from the space of the columns before it is smaller than this
 fraction of its length. Rounding errors are 1e-13, and the smallest real distances about 1e-4."""
 
+ROUNDING = 1e-13
+"""Sums below this fraction of their terms are rounding errors."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BaseColumns:
@@ -31,9 +34,12 @@ class BaseColumns:
     K: Array
 
     def combined(self, parameters: Array) -> Array:
-        """The base parameters (b,) of all parameters (p,)."""
-        value: Array = parameters[self.base] + self.K @ parameters[self.dependent]
-        return value
+        """The base parameters (b,) of all parameters (p,); sums that cancel up to rounding errors are 0."""
+        shares = self.K * parameters[self.dependent]
+        own = parameters[self.base]
+        value: Array = own + shares.sum(axis=1)
+        size = np.abs(own) + np.abs(shares).sum(axis=1)
+        return np.where(np.abs(value) > ROUNDING * size, value, 0.0)
 
     def expansion(self, count: int) -> Array:
         """The matrix (b, p) from all p parameters to the base parameters."""
