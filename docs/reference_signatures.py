@@ -12,8 +12,8 @@ from typing import Any
 
 from sphinx.util.inspect import TypeAliasForwardRef
 
-import armblocks as ab
-from armblocks.face import arm as arm_module
+from armblocks.face import arm_functions
+from armblocks.face.native_functions import NativeFunctions
 
 SHORT = {
     r"NDArray\[np\.(float64|bool_)\]": "Array",
@@ -92,9 +92,9 @@ def _default(value: object) -> str:
 def arm_page() -> str:
     """The class Arm with the call signatures of its methods, which are created at their first access."""
     methods: dict[str, list[str]] = {}
-    for name, member in vars(ab.Arm).items():
+    for name, member in vars(NativeFunctions).items():
         if isinstance(member, cached_property) and not name.startswith("_"):
-            call = getattr(arm_module, str(member.func.__annotations__["return"])).__call__
+            call = getattr(arm_functions, str(member.func.__annotations__["return"])).__call__
             names = [part.replace(annotation=inspect.Parameter.empty) for part in _parameters(call)]
             text = inspect.cleandoc(member.func.__doc__ or "")
             text = f"Returns {text.partition(' → ')[2]}"

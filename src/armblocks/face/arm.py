@@ -10,20 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armblocks.argument_errors import ArgumentErrors
 from armblocks.compiler import OperationCount
 from armblocks.errors import UnknownNameError, counted
-from armblocks.face.arm_functions import (
-    ConfigurationFunction,
-    DifferenceFunction,
-    DrivenStateFunction,
-    FramedStateFunction,
-    FrameFunction,
-    IntegrateFunction,
-    MotionFunction,
-    SpeedFunction,
-    StateFunction,
-)
 from armblocks.face.arm_kernels import ArmKernels, traces
 from armblocks.face.arm_measures import (
     Ellipsoid,
@@ -40,6 +28,7 @@ from armblocks.face.assembly import Assembly, assemble, coordinates
 from armblocks.face.forward_simulation import ArmMotionResult, TorqueLaw, simulate_arm
 from armblocks.face.ikine_branches import IkineBranches
 from armblocks.face.ikine_result import IkineResult
+from armblocks.face.native_functions import NativeFunctions
 from armblocks.face.parametric import ParametricArm
 from armblocks.robot import FrictionModel, Link, Robot
 from armblocks.robot.dh_table import kinematics_text
@@ -55,7 +44,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class Arm(metaclass=ArgumentErrors):
+class Arm(NativeFunctions):
     """A robot with compiled kinematics and dynamics.
 
     Arguments are positional or keywords, ``rne(q, qd, qdd)`` or ``rne(q=q, qd=qd, qdd=qdd)``; positional
@@ -131,51 +120,6 @@ class Arm(metaclass=ArgumentErrors):
         return Arm(self.robot.with_friction_model(friction_model_of(model, self.name)), self._near)
 
     # ---- kinematics --------------------------------------------------------------------------------------
-    @cached_property
-    def fkine(self) -> FrameFunction:
-        """``fkine(q)`` → T (4, 4): pose of the tool in the world, lengths in m.
-
-        ``frame=``: the name of a frame instead of the tool: a named frame of the robot, or a link.
-        ``robot.frame_names`` lists the names.
-        """
-        return self._code.framed("fkine")
-
-    @cached_property
-    def link_poses(self) -> ConfigurationFunction:
-        """``link_poses(q)`` → (L + 2, 4, 4): poses in the world of the base, the L links and the tool."""
-        return self._code.entry("link_poses")
-
-    @cached_property
-    def jacob0(self) -> FrameFunction:
-        """``jacob0(q)`` → J (6, n): velocity of the tool in world axes is ``J qd``.
-
-        Rows: linear velocity x y z in m/s, then angular velocity x y z in rad/s. ``frame=`` as for ``fkine``.
-        """
-        return self._code.framed("jacob0")
-
-    @cached_property
-    def jacobe(self) -> FrameFunction:
-        """``jacobe(q)`` → J (6, n): velocity of the tool in tool axes is ``J qd``, rows as ``jacob0``.
-
-        ``frame=`` as for ``fkine``; the axes are those of the frame.
-        """
-        return self._code.framed("jacobe")
-
-    @cached_property
-    def jacob0_dot(self) -> FramedStateFunction:
-        """``jacob0_dot(q, qd)`` → dJ/dt (6, n): the time derivative of ``jacob0``."""
-        return self._code.framed("jacob0_dot")
-
-    @cached_property
-    def jacob_dot(self) -> FramedStateFunction:
-        """``jacob_dot(q, qd)`` → dJ/dt qd (6,): acceleration of the tool for ``qdd = 0``, m/s² and rad/s²."""
-        return self._code.framed("jacob_dot")
-
-    @cached_property
-    def hessian0(self) -> FrameFunction:
-        """``hessian0(q)`` → H (n, 6, n): derivatives ``H[k]`` of ``jacob0`` for unit speeds ``qd[k]``."""
-        return self._code.framed("hessian0")
-
     def maniplty(self, q: ArrayLike, kind: str = "yoshikawa", axes: str = "all") -> Array:
         """A measure of the mobility of the tool at ``q`` (nq,) or (N, nq); 0 at a singularity.
 
@@ -204,33 +148,6 @@ class Arm(metaclass=ArgumentErrors):
     def isspherical(self) -> bool:
         """Whether the arm has a spherical wrist: its last three axes are revolute and meet in a point."""
         return has_spherical_wrist(self.robot)
-
-    @cached_property
-    def manipulability(self) -> ConfigurationFunction:
-        """``manipulability(q)`` → one number, Yoshikawa's sqrt(det(J J')): 0 at a singularity."""
-        return self._code.entry("manipulability")
-
-    @cached_property
-    def integrate(self) -> IntegrateFunction:
-        """``integrate(q, qd, dt)`` → q (nq,) after ``dt`` s at constant speeds; quaternions have length 1.
-        A ball rotates about a fixed axis by the angle ``|w| dt``; all other coordinates are ``q + qd dt``.
-        """
-        return self._code.entry("integrate")
-
-    @cached_property
-    def difference(self) -> DifferenceFunction:
-        """``difference(q0, q1)`` → qd (n,) with ``integrate(q0, qd, 1) = q1``; balls rotate by at most π."""
-        return self._code.entry("difference")
-
-    @cached_property
-    def normalised(self) -> ConfigurationFunction:
-        """``normalised(q)`` → q (nq,) with quaternions of length 1."""
-        return self._code.entry("normalised")
-
-    @cached_property
-    def position_rates(self) -> StateFunction:
-        """``position_rates(q, qd)`` → dq/dt (nq,): ``qd`` itself, and the rates of quaternions."""
-        return self._code.entry("position_rates")
 
     def assemble(
         self, q: ArrayLike | None = None, qd: ArrayLike | None = None, *, locked: Sequence[str] = ()
@@ -310,33 +227,6 @@ class Arm(metaclass=ArgumentErrors):
         return self._inverse.with_letters(T, configuration, limits, threads)
 
     # ---- dynamics ----------------------------------------------------------------------------------------
-    @cached_property
-    def rne(self) -> MotionFunction:
-        """``rne(q, qd, qdd)`` → tau (n,) N m or N: joint torques of a motion, with motors and friction.
-
-        The torques of a motion that violates the constraints of the robot are NaN. ``wrench=`` [fx fy fz mx
-        my mz] in the last link's frame, ``payload=`` a :class:`Payload` at the tool, or a point mass (kg).
-        """
-        return self._code.loaded("rne")
-
-    @cached_property
-    def joint_wrenches(self) -> MotionFunction:
-        """``joint_wrenches(q, qd, qdd)`` → (L + K, 6): reaction force (N) and moment (N m) of each joint.
-
-        Row k is the wrench that its parent exerts on link k, about the origin and in the axes of the distal
-        frame of the joint (NOTATION.md). The component along the axis is the torque of the rigid bodies:
-        ``rne`` without friction and rotor inertia. The last K rows are those of the closures of loops: the
-        wrench that the first link exerts on the second one, in the second frame. Forces of redundant closure
-        equations are statically indeterminate and are 0 in the result. ``wrench=`` and ``payload=`` as for
-        ``rne``.
-        """
-        return self._code.loaded("joint_wrenches")
-
-    @cached_property
-    def accel(self) -> DrivenStateFunction:
-        """``accel(q, qd, tau)`` → qdd (n,) rad/s² or m/s²: accelerations under joint torques and friction."""
-        return self._code.loaded("accel")
-
     def fdyn(
         self,
         duration: float,
@@ -357,44 +247,9 @@ class Arm(metaclass=ArgumentErrors):
         """
         return simulate_arm(self.robot, duration, torque, q0, qd0, sample_time, dt, settings)
 
-    @cached_property
-    def gravload(self) -> ConfigurationFunction:
-        """``gravload(q)`` → (n,) N m or N: torques that hold the arm at rest."""
-        return self._code.entry("gravload")
-
-    @cached_property
-    def inertia(self) -> ConfigurationFunction:
-        """``inertia(q)`` → M (n, n) kg m² or kg: joint-space mass matrix, motor inertia included."""
-        return self._code.entry("inertia")
-
     def cinertia(self, q: ArrayLike) -> Array:
         """The inertia at the tool in world axes (6, 6), ``(J M⁻¹ J')⁻¹``; NaN at singularities."""
         return operational_inertia(self.jacob0, self.inertia, q)
-
-    @cached_property
-    def coriolis(self) -> StateFunction:
-        """``coriolis(q, qd)`` → C (n, n): ``C qd`` are the velocity torques (N m, N); dM/dt - 2 C is skew."""
-        return self._code.entry("coriolis")
-
-    @cached_property
-    def friction(self) -> SpeedFunction:
-        """``friction(qd)`` → (n,) N m or N: joint torques that overcome friction, a part of ``rne``."""
-        return self._code.entry("friction")
-
-    @cached_property
-    def kinetic_energy(self) -> StateFunction:
-        """``kinetic_energy(q, qd)`` → energy in J, including the rotors of the motors."""
-        return self._code.entry("kinetic_energy")
-
-    @cached_property
-    def potential_energy(self) -> ConfigurationFunction:
-        """``potential_energy(q)`` → energy in J, zero with the centre of mass at the origin's height."""
-        return self._code.entry("potential_energy")
-
-    @cached_property
-    def centre_of_mass(self) -> ConfigurationFunction:
-        """``centre_of_mass(q)`` → (3,) m: centre of mass of all links, in the world."""
-        return self._code.entry("centre_of_mass")
 
     def parametric(self, links: Sequence[str]) -> ParametricArm:
         """The dynamics as functions of the masses, centres of mass and inertias of the named ``links``.
