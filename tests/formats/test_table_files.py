@@ -17,7 +17,7 @@ from scipy.io import savemat
 
 import armblocks as ab
 from armblocks.errors import ArmblocksError, FormatError, InputError, UnknownNameError
-from armblocks.formats.table_columns import ColumnFile, header_unit, table_of
+from armblocks.formats.table_columns import ColumnFile, header_unit, table_of, unique_names
 from armblocks.formats.table_files import columns_of
 
 NUMBERS = st.floats(-1e9, 1e9).map(lambda value: round(value, 6))
@@ -136,6 +136,20 @@ def test_columns_with_repeated_names_are_kept() -> None:
     file = columns("time,x,x,x (2)\n0,1,2,3\n1,4,5,6\n")
     assert table_of(file, "a").names == ("x", "x (3)", "x (2)")
     assert any("same name" in note for note in file.notes)
+
+
+def test_tens_of_thousands_of_equal_names_are_numbered() -> None:
+    names = unique_names(["x"] * 30_000)
+    assert names[:3] == ["x", "x (2)", "x (3)"]
+    assert len(set(names)) == len(names)
+
+
+@given(st.lists(st.sampled_from(["", "a", "a (2)", "a (3)", "c0", "c1", "c1 (2)"]), max_size=9))
+def test_names_are_unique_and_given_names_are_kept(names: list[str]) -> None:
+    unique = unique_names(names)
+    assert len(set(unique)) == len(names)
+    firsts = {name: names.index(name) for name in names if name}
+    assert all(unique[k] == name for name, k in firsts.items())
 
 
 def test_the_column_of_times_is_found_by_name_and_unit() -> None:

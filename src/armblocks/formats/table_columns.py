@@ -118,12 +118,17 @@ class ColumnFile:
 
 def unique_names(names: Sequence[str]) -> list[str]:
     """The names, with ``(2)``, ``(3)``, … after repeated ones; an empty name becomes ``c0``, ``c1``, …"""
-    used_names = {name for name in names if name}
+    given = {name for name in names if name}
+    taken: set[str] = set()
+    next_numbers: dict[str, int] = {}
     unique: list[str] = []
     for k, name in enumerate(names):
-        candidate, number = name or f"c{k}", 2
-        while candidate in unique or (candidate != name and candidate in used_names):
-            candidate, number = f"{name or f'c{k}'} ({number})", number + 1
+        stem = candidate = name or f"c{k}"
+        number = next_numbers.get(stem, 2)
+        while candidate in taken or (candidate != name and candidate in given):
+            candidate, number = f"{stem} ({number})", number + 1
+        next_numbers[stem] = number
+        taken.add(candidate)
         unique.append(candidate)
     return unique
 
