@@ -8,6 +8,9 @@ interrupted with Ctrl-C. ``diff`` also exits with 1 if its diagrams differ, ``li
 from __future__ import annotations
 
 import gc
+import inspect
+import re
+from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
@@ -66,22 +69,33 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Industrial arms and block diagrams, traced once and compiled to native code.",
 )
-app.command("run")(run.run)
-app.command("sweep")(sweep.sweep)
-app.command("linearize")(linearize.linearize)
-app.command("trim")(trim.trim)
-app.command("diff")(diff.diff)
-app.command("diagram")(diagram.diagram)
-app.command("convert")(convert.convert)
-app.command("show")(show.show)
-app.command("lint")(lint.lint)
-app.command("size")(size.size)
-app.command("workspace")(workspace.workspace)
-app.command("list")(listing.list_names)
-app.command("blocks")(blocks.describe_blocks)
-app.command("docs")(docs.docs)
-app.command("bench")(bench.bench)
-app.command("studio")(studio.studio)
+COMMANDS: dict[str, Callable[..., None]] = {
+    "run": run.run,
+    "sweep": sweep.sweep,
+    "linearize": linearize.linearize,
+    "trim": trim.trim,
+    "diff": diff.diff,
+    "diagram": diagram.diagram,
+    "convert": convert.convert,
+    "show": show.show,
+    "lint": lint.lint,
+    "size": size.size,
+    "workspace": workspace.workspace,
+    "list": listing.list_names,
+    "blocks": blocks.describe_blocks,
+    "docs": docs.docs,
+    "bench": bench.bench,
+    "studio": studio.studio,
+}
+
+
+def _help(command: Callable[..., None]) -> str:
+    """The docstring with the lines of each paragraph joined: the terminal determines the line breaks."""
+    return re.sub(r"(?<=\S)\n(?=\S)", " ", inspect.cleandoc(command.__doc__ or ""))
+
+
+for _name, _command in COMMANDS.items():
+    app.command(_name, help=_help(_command))(_command)
 
 
 def _print_version(requested: bool) -> None:
