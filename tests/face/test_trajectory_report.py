@@ -49,6 +49,20 @@ def test_rounding_errors_of_a_position_of_0_are_not_shown() -> None:
     assert report.table()[0]["lowest"] == 0.0 and "e−17" not in str(report)
 
 
+@pytest.mark.parametrize("payload", [None, 0.5])
+def test_rounding_errors_of_a_speed_at_rest_cause_no_friction(payload: float | None) -> None:
+    """The speeds at both ends are +-3e-15 instead of 0, against the direction of the motion."""
+    puma = ab.load_robot("puma560")
+    motion = ab.jtraj(np.zeros(6), np.full(6, 0.4), np.linspace(0.0, 2.0, 41))
+    qd = motion.qd.copy()
+    qd[0], qd[-1] = -3e-15, -3e-15
+    rounded = ab.JointTrajectory(t=motion.t, q=motion.q, qd=qd, qdd=motion.qdd)
+    report = ab.trajectory_report(puma, rounded, payload=payload)
+    for row in (0, -1):
+        holding = puma.rne(motion.q[row], np.zeros(6), motion.qdd[row], payload=payload or 0.0)
+        assert report.tau[row] == pytest.approx(holding, abs=1e-9)
+
+
 def test_exceeded_limits_are_sentences() -> None:
     arm = ab.load_robot("puma560")
     path = ab.jtraj(np.zeros(6), [6.0, 0, 0, 0, 0, 0], np.linspace(0, 1, 50))

@@ -35,6 +35,8 @@ _ROUNDING = 1e-14
 _SAMPLES = 1000
 _INSTANT = 1e-9
 """Times that differ by less (s) are the two sides of a jump."""
+_AT_REST = 1e-9
+"""Speeds below this fraction of the largest one of the joint are rounding errors, without friction."""
 _MAX_TEXT_INTERVALS = 12
 _QUANTITIES = ("speed", "acceleration", "torque")
 
@@ -268,13 +270,15 @@ def motion_with_torques(
     rows = rows[np.argsort(rows[:, 0], kind="stable")]
     q, qd, qdd = (np.ascontiguousarray(part) for part in np.split(rows[:, 1:], 3, axis=1))
     time = rows[:, 0]
+    # The sign of a rounding error would decide the direction of Coulomb friction at rest.
+    moving = np.where(np.abs(qd) > _AT_REST * np.abs(qd).max(axis=0), qd, 0.0)
     if payload is None:
-        return time, q, qd, qdd, arm.rne(q, qd, qdd), None
+        return time, q, qd, qdd, arm.rne(q, moving, qdd), None
     numbers = payload.numbers if isinstance(payload, Payload) else payload_numbers(payload)
     loads = np.tile(np.asarray(numbers, dtype=np.float64), (len(q), 1))
     if isinstance(motion, PickAndPlaceCycle):
         loads *= _loaded(motion, time)[:, None]
-    return time, q, qd, qdd, arm.rne(q, qd, qdd, payload=loads), loads
+    return time, q, qd, qdd, arm.rne(q, moving, qdd, payload=loads), loads
 
 
 def _loaded(cycle: PickAndPlaceCycle, time: Array) -> Array:
