@@ -271,14 +271,14 @@ def motion_with_torques(
     q, qd, qdd = (np.ascontiguousarray(part) for part in np.split(rows[:, 1:], 3, axis=1))
     time = rows[:, 0]
     # The sign of a rounding error would decide the direction of Coulomb friction at rest.
-    moving = np.where(np.abs(qd) > _AT_REST * np.abs(qd).max(axis=0), qd, 0.0)
+    qd = np.where(np.abs(qd) > _AT_REST * np.abs(qd).max(axis=0), qd, 0.0)
     if payload is None:
-        return time, q, qd, qdd, arm.rne(q, moving, qdd), None
+        return time, q, qd, qdd, arm.rne(q, qd, qdd), None
     numbers = payload.numbers if isinstance(payload, Payload) else payload_numbers(payload)
     loads = np.tile(np.asarray(numbers, dtype=np.float64), (len(q), 1))
     if isinstance(motion, PickAndPlaceCycle):
         loads *= _loaded(motion, time)[:, None]
-    return time, q, qd, qdd, arm.rne(q, moving, qdd, payload=loads), loads
+    return time, q, qd, qdd, arm.rne(q, qd, qdd, payload=loads), loads
 
 
 def _loaded(cycle: PickAndPlaceCycle, time: Array) -> Array:
