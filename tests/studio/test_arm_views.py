@@ -90,6 +90,7 @@ def test_a_stream_of_events_reports_changes_and_the_end(links: list[str]) -> Non
     lines = iter(stream.readline, b"")
     event = json.loads(next(line for line in lines if line.startswith(b"data: ")).removeprefix(b"data: "))
     assert event["q"] == [0.0] * 6 and len(event["poses"]) == 8
+    assert json.loads(fetched(page.link + "joints", Q))["number"] > event["number"]
     waiting = threading.Thread(target=page.wait)
     waiting.start()
     page.close()

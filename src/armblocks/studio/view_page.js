@@ -22,7 +22,11 @@ const change = (name, value) => {
   values[name] = value
   for (const listener of listeners[`change:${name}`] ?? []) listener()
 }
-const showArm = ({ q, poses }) => {
+let shown = 0
+// The reply to a movement of a slider may arrive after a later event.
+const showArm = ({ q, poses, number }) => {
+  if (number < shown) return
+  shown = number
   values.joints = q
   change('_poses', { q, poses })
 }

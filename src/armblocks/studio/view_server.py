@@ -78,6 +78,7 @@ class ArmPage:
         self.link = ""
         self._q = content.q
         self._poses: list[list[list[float]]] = []
+        self._moves = 0
         self._changed = threading.Condition()
         self._version = 0
         self._streams = 0
@@ -127,7 +128,8 @@ class ArmPage:
         """Move the arm; returns its coordinates and poses for the page whose sliders have moved."""
         with self._changed:
             self._q, self._poses = moved(self.content.robot, self._q, q)
-            return {"q": self._q.tolist(), "poses": self._poses}
+            self._moves += 1
+            return self._shown()
 
     def next_event(self, version: int) -> tuple[int, dict[str, Any] | None]:
         """Wait for a change after ``version``, at most one heartbeat interval; its number and data."""
@@ -138,7 +140,11 @@ class ArmPage:
                 return version, {"closed": True}
             if self._version == version or not self._poses:
                 return self._version, None
-            return self._version, {"q": self._q.tolist(), "poses": self._poses}
+            return self._version, self._shown()
+
+    def _shown(self) -> dict[str, Any]:
+        """The state for a page, which ignores states with a smaller ``number`` than that of its own state."""
+        return {"q": self._q.tolist(), "poses": self._poses, "number": self._moves}
 
     def stream_opened(self) -> None:
         """Record that a page has opened its event stream."""
