@@ -5,7 +5,16 @@ import pytest
 from casadi import SX, Function, acos, asin, atan2, hypot, if_else, jtimes, sqrt, vertcat
 
 import armblocks as ab
-from armblocks.blocks import Expression, Integrator, PulseGenerator, Ramp, RateLimiterContinuous, Sqrt
+from armblocks.blocks import (
+    Clock,
+    Derivative,
+    Expression,
+    Integrator,
+    PulseGenerator,
+    Ramp,
+    RateLimiterContinuous,
+    Sqrt,
+)
 from armblocks.diagram import Block
 from armblocks.equations import directional_derivative
 
@@ -56,6 +65,24 @@ def test_operands_that_rest_do_not_contribute(formula: str, point: tuple[float, 
     difference = (beside[0] - beside[1]) / (2.0 * step)
     assert float(derivative(point, [0.0, 1.0])) == pytest.approx(difference, abs=1e-9)
     assert float(derivative(point, [0.0, 0.0])) == 0.0
+
+
+def test_the_rate_of_a_root_is_differentiable_where_it_is_zero() -> None:
+    """The second derivative at rest, and the derivative of a rate by a parameter with the value 0."""
+    root = Expression(formula="sqrt(1+u^2)")
+    twice = ab.simulate(chain(Clock(), root, Derivative(), Derivative()), stop_time=1.0, sample_time=0.25)
+    np.testing.assert_allclose(twice["b2"].ravel(), (1.0 + twice.time**2) ** -1.5, rtol=1e-12)
+
+    still = chain(Ramp(slope=0.0, initial=4.0), Sqrt(), Derivative())
+    by_slope = ab.sensitivity(still, ["source.slope"], ["b1"], stop_time=1.0, sample_time=0.25)
+    np.testing.assert_allclose(by_slope["b1", "source.slope"].ravel(), 0.25, rtol=1e-12)
+
+    power = Expression(formula="u^n", names="n", values=0.0)
+    by_exponent = ab.sensitivity(
+        chain(Ramp(initial=1.0), power, Derivative()), ["b0.values"], ["b1"], stop_time=1.0, sample_time=0.25
+    )
+    moving = 1.0 + by_exponent.time
+    np.testing.assert_allclose(by_exponent["b1", "b0.values"].ravel(), 1.0 / moving, rtol=1e-12)
 
 
 def test_the_derivative_of_a_power_with_exponent_zero_is_zero() -> None:

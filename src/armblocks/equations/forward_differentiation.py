@@ -1,8 +1,9 @@
 """Directional derivatives that are finite where the direction does not change a root, a power or an angle.
 
 The derivative of ``sqrt(u)`` is infinite at ``u = 0``. CasADi's forward differentiation multiplies it by the
-rate of u, so that a root that rests at 0 has the rate ``0 * inf = nan``. Here the rate of an operation whose
-operand does not change is 0, whatever its partial derivative is.
+rate of u, so that a root that rests at 0 has the rate ``0 * inf = nan``. Here an operand with the rate 0
+contributes 0 at these points. At all other points the formulas are those of CasADi, and so are their own
+derivatives: the rate of u may be 0 at one time or for one value of a parameter only.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi
-from casadi import SX, Function, densify, if_else, jtimes, logic_and, reshape, symvar, vec, vertcat
+from casadi import SX, Function, densify, fabs, if_else, jtimes, logic_and, reshape, symvar, vec, vertcat
 
 from armblocks.equations.constant_folding import operation_value, results_of_operations, substituted
 
@@ -43,8 +44,22 @@ class _Operation:
         total = SX(0.0)
         for k, rate in enumerate(rates):
             if not rate.is_zero():
-                total += if_else(rate == 0.0, 0.0, rate * self._partial(k))
+                rests = logic_and(rate == 0.0, self._unbounded(k))
+                total += if_else(rests, 0.0, rate * self._partial(k))
         return total
+
+    def _unbounded(self, index: int) -> SX:
+        """Whether the partial derivative with respect to one operand is infinite or does not exist."""
+        a, b = self.operands[0], self.operands[-1]
+        match self.number:
+            case casadi.OP_SQRT:
+                return a == 0.0
+            case casadi.OP_ASIN | casadi.OP_ACOS | casadi.OP_ACOSH:
+                return fabs(a) == 1.0
+            case casadi.OP_ATAN2 | casadi.OP_HYPOT:
+                return logic_and(a == 0.0, b == 0.0)
+            case _:  # a power; the logarithm of its base does not exist for negative bases
+                return logic_and(a == 0.0, b < 1.0) if index == 0 else a <= 0.0
 
     def _partial(self, index: int) -> SX:
         """The partial derivative with respect to one operand."""
@@ -53,18 +68,18 @@ class _Operation:
         partial = jtimes(value, symbols[index], SX(1.0))
         if self.number in _POWERS:
             base, exponent = symbols
-            # 0 ** y is 0 for all y > 0, and x ** 0 is 1 for all x.
-            constant = (exponent == 0.0, logic_and(base == 0.0, exponent > 0.0))[index]
-            partial = if_else(constant, 0.0, partial)
+            # At x = 0, x ** 0 is 1 beside x, too, and x ** y is 0 for all y > 0.
+            constant = exponent == 0.0 if index == 0 else exponent > 0.0
+            partial = if_else(logic_and(base == 0.0, constant), 0.0, partial)
         return substituted(partial, vertcat(*symbols), vertcat(*self.operands))
 
 
 def directional_derivative(expression: SX, variables: SX, direction: SX) -> SX:
     """The derivative of ``expression`` along ``direction``, in the shape of the expression.
 
-    ``variables`` is a column of symbols (n, 1), and ``direction`` (n, 1) their rates. An operation whose
-    operands have the rate 0 has the rate 0. A rate that is not finite remains: that of ``sqrt(u)`` where u
-    leaves 0 with a rate other than 0.
+    ``variables`` is a column of symbols (n, 1), and ``direction`` (n, 1) their rates. Where the partial
+    derivative of a root, power, arc or norm is unbounded, an operand with the rate 0 contributes 0. A rate
+    that is not finite remains: that of ``sqrt(u)`` where u leaves 0 with a rate other than 0.
     """
     own = {variables[k].element_hash() for k in range(variables.numel())}
     others = vertcat(*(symbol for symbol in symvar(expression) if symbol.element_hash() not in own), SX(0, 1))
