@@ -123,6 +123,23 @@ def test_a_jump_that_switches_a_block_or_passes_a_delay_shifts_with_the_paramete
     assert not derivative(held, "u.slope").any()
 
 
+@pytest.mark.parametrize(
+    ("formula", "expected"),
+    [
+        ("if(u > 1.3, u, 2*u)", lambda t: np.where(t < 0.3, 2.0 * t, t)),
+        ("sign(u - 1.3)*u", lambda t: np.where(t < 0.3, -t, t)),
+        ("floor(u)*u", lambda t: np.floor(1.0 + t) * t),
+    ],
+)
+def test_formulas_that_jump_in_a_diagram_without_states(
+    formula: str, expected: Callable[[np.ndarray], np.ndarray]
+) -> None:
+    builder = ab.DiagramBuilder("no states")
+    builder.add("f", Expression(formula=formula), builder.add("u", Ramp(initial=1.0)))
+    result = ab.sensitivity(builder.build(), "u.slope", "f", stop_time=1.0, sample_time=0.25)
+    np.testing.assert_allclose(result["f", "u.slope"].ravel(), expected(result.time), atol=1e-12)
+
+
 def test_a_jump_inside_an_enabled_subsystem_and_in_a_modulo_without_events() -> None:
     inside = ab.DiagramBuilder("inside")
     value = Expression(formula="if(u > p, 1, 0)", names="p", values=0.73)

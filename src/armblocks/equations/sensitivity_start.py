@@ -94,7 +94,7 @@ class _Start:
         the start."""
         system = self.system
         t, x, z, w, p, e = system.reset.arguments
-        after = vertcat(*system.reset.results)[: x.numel()]
+        after = vertcat(*system.reset.results)[: x.numel(), :]
         changes: list[SX] = []
         for of_states, of_discrete, seed in self._initial_rates(p, entries):
             changes.append(jtimes(after, vertcat(x, z, p), vertcat(of_states, of_discrete, seed)) - of_states)
