@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from block_evaluation import evaluate
 
+import armblocks as ab
 from armblocks.blocks import (
     Atan2,
     Clock,
     Demux,
+    Derivative,
     Gain,
     MathFunction,
     MatrixGain,
@@ -37,6 +39,11 @@ def test_sources_have_their_closed_forms() -> None:
     assert evaluate(Step(time=1.0, initial=2.0, final=5.0), t=1.0)["y"] == 5.0
     assert evaluate(Ramp(slope=[2.0, -1.0], start=1.0, initial=0.5), t=3.0)["y"].tolist() == [4.5, -1.5]
     assert evaluate(Ramp(start=1.0, initial=0.5), t=0.3)["y"] == 0.5
+    # At the start the rate is that after it.
+    builder = ab.DiagramBuilder("rate")
+    builder.add("rate", Derivative(), builder.add("ramp", Ramp(slope=2.0, start=0.5)))
+    rates = ab.simulate(builder.build(), stop_time=1.0, sample_time=0.25)["rate"].ravel()
+    assert rates.tolist() == [0.0, 0.0, 2.0, 2.0, 2.0]
     sine = SineWave(amplitude=2.0, frequency=3.0, phase=0.4, bias=-1.0)
     assert evaluate(sine, t=0.7)["y"] == pytest.approx(2 * np.sin(3 * 0.7 + 0.4) - 1, rel=1e-15)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from casadi import SX, fmax, if_else, sin
+from casadi import SX, if_else, sin
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import parameters_shape
@@ -114,7 +114,7 @@ class Ramp(Block):
         return {"y": parameters_shape(self, "slope", "initial")}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": p["initial"] + p["slope"] * fmax(t - p["start"], 0.0)}
+        return {"y": p["initial"] + p["slope"] * if_else(t >= p["start"], t - p["start"], 0.0)}
 
     def breakpoints(self, p: Signals) -> tuple[SX, ...]:
         return (p["start"],)
