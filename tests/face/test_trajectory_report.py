@@ -51,11 +51,12 @@ def test_rounding_errors_of_a_position_of_0_are_not_shown() -> None:
 
 @pytest.mark.parametrize("payload", [None, 0.5])
 def test_rounding_errors_of_a_speed_at_rest_cause_no_friction(payload: float | None) -> None:
-    """The speeds at both ends are +-3e-15 instead of 0, against the direction of the motion."""
+    """The speeds at both ends, and those of a joint that does not move, are -3e-15 rad/s instead of 0."""
     puma = ab.load_robot("puma560")
-    motion = ab.jtraj(np.zeros(6), np.full(6, 0.4), np.linspace(0.0, 2.0, 41))
+    target = np.array([0.4, 0.4, 0.4, 0.4, 0.4, 0.0])
+    motion = ab.jtraj(np.zeros(6), target, np.linspace(0.0, 2.0, 41))
     qd = motion.qd.copy()
-    qd[0], qd[-1] = -3e-15, -3e-15
+    qd[[0, -1]] = qd[:, 5] = -3e-15
     rounded = ab.JointTrajectory(t=motion.t, q=motion.q, qd=qd, qdd=motion.qdd)
     report = ab.trajectory_report(puma, rounded, payload=payload)
     for row in (0, -1):

@@ -37,6 +37,8 @@ _INSTANT = 1e-9
 """Times that differ by less (s) are the two sides of a jump."""
 _AT_REST = 1e-9
 """Speeds below this fraction of the largest one of the joint are rounding errors, without friction."""
+_STILL = 1e-12
+"""All speeds of a joint that moves by less (rad or m) in the whole motion are rounding errors."""
 _MAX_TEXT_INTERVALS = 12
 _QUANTITIES = ("speed", "acceleration", "torque")
 
@@ -271,7 +273,8 @@ def motion_with_torques(
     q, qd, qdd = (np.ascontiguousarray(part) for part in np.split(rows[:, 1:], 3, axis=1))
     time = rows[:, 0]
     # The sign of a rounding error would decide the direction of Coulomb friction at rest.
-    qd = np.where(np.abs(qd) > _AT_REST * np.abs(qd).max(axis=0), qd, 0.0)
+    fastest = np.where(np.ptp(q, axis=0) > _STILL, np.abs(qd).max(axis=0), np.inf)
+    qd = np.where(np.abs(qd) > _AT_REST * fastest, qd, 0.0)
     if payload is None:
         return time, q, qd, qdd, arm.rne(q, qd, qdd), None
     numbers = payload.numbers if isinstance(payload, Payload) else payload_numbers(payload)
