@@ -13,11 +13,18 @@ from armblocks.spatial.inertia import NO_INERTIA, RigidInertia
 from armblocks.spatial.vectors import ZERO, Symmetric
 
 
-@lru_cache(maxsize=64)
 def base_parameter_tree(robot: Robot) -> KinematicTree:
     """The tree of a robot with regrouped parameters, for functions of its independent coordinates."""
-    tree = regrouped(KinematicTree.of(robot))
-    return regrouped_by_couplings(tree, robot) if robot.couplings else tree
+    if not robot.couplings:
+        return regrouped(KinematicTree.of(robot))
+    # Equal robots may differ in the sign of a zero.
+    return _coupled_tree(robot, repr([replace(link, geometry=None) for link in robot.links]))
+
+
+@lru_cache(maxsize=64)
+def _coupled_tree(robot: Robot, links: str) -> KinematicTree:
+    """The tree of a robot with couplings; ``links``: their numbers as text."""
+    return regrouped_by_couplings(regrouped(KinematicTree.of(robot)), robot)
 
 
 def regrouped(tree: KinematicTree) -> KinematicTree:
