@@ -62,6 +62,19 @@ def test_a_thin_obstacle_between_samples_is_found() -> None:
     assert float(path(report.first_contact.contact)[0][0]) == pytest.approx(-0.0205, abs=1e-6)
 
 
+@pytest.mark.parametrize("samples", [401, 201])
+def test_fast_motions_there_and_back_are_no_rest(samples: int) -> None:
+    """100 periods in 100 s: the samples 401 and 201 are at every quarter, and at every zero crossing."""
+    t, w = np.linspace(0.0, 100.0, samples), 2.0 * np.pi
+    q, qd = np.sin(w * t)[:, None], w * np.cos(w * t)[:, None]
+    path = ab.JointTrajectory(t=t, q=q, qd=qd, qdd=-w * w * q)
+    wall = ab.Box(size=(0.2, 1.0, 1.0), pose=at(1.0), name="wall")
+    report = ab.collisions(slider(shapes.Sphere(radius=0.1)), path, [wall], resolution=0.05)
+    assert report.first_contact is not None and report.first_contact.contact is not None
+    assert report.first_contact.contact == pytest.approx(np.arcsin(0.8) / w, abs=0.005)
+    assert float(path(report.first_contact.contact)[0][0]) == pytest.approx(0.8, abs=1e-6)
+
+
 def three_links() -> ab.Arm:
     """Parallel axes in a plane with thin links of 1 m: the last one can touch the base and the first link."""
     bar = shapes.Box(size=(0.9, 0.02, 0.02), pose=tuple(map(tuple, at(0.5).matrix.tolist())))

@@ -124,9 +124,10 @@ def _named(obstacles: Sequence[Obstacle], where: str) -> dict[str, Obstacle]:
 
 def _times(scene: Scene, path: JointTrajectory, step: float) -> Array:
     """Times between which no body moves by much more than ``step`` (m)."""
-    time = np.linspace(float(path.t[0]), float(path.t[-1]), FIRST_SAMPLES)
+    first = np.linspace(float(path.t[0]), float(path.t[-1]), FIRST_SAMPLES)
     if not path.duration > 0.0:
-        return time[:1]
+        return first[:1]
+    time = np.union1d(first, _inside_pieces(path, first))
     poses = scene.arm.link_poses(np.ascontiguousarray(path(time)[0]))
     moved = np.zeros(len(time) - 1)
     for row, body in enumerate(scene.bodies):
@@ -134,7 +135,9 @@ def _times(scene: Scene, path: JointTrajectory, step: float) -> Array:
             for hull in range(len(body.radii)):
                 points = body.points_at(np.full(len(poses), hull), poses[:, row])
                 moved = np.maximum(moved, np.linalg.norm(np.diff(points, axis=0), axis=2).max(axis=1))
-    parts = np.maximum(1, np.ceil(moved / step)).astype(int)
+    way = np.append(0.0, np.cumsum(moved))
+    ends = way[np.searchsorted(time, first)]
+    parts = np.maximum(1, np.ceil(np.diff(ends) / step)).astype(int)
     if parts.sum() > MAX_SAMPLES:
         raise InputError(
             f"a resolution of {step:g} m needs {int(parts.sum())} samples",
@@ -142,10 +145,21 @@ def _times(scene: Scene, path: JointTrajectory, step: float) -> Array:
             allowed=f"at most {MAX_SAMPLES}",
             fix="give a larger resolution, in m",
         )
-    pieces: list[Array] = [
-        np.linspace(a, b, n, endpoint=False) for a, b, n in zip(time[:-1], time[1:], parts.tolist())
-    ]
-    return np.append(np.concatenate(pieces), time[-1])
+    within = [np.linspace(a, b, n + 1)[1:-1] for a, b, n in zip(ends[:-1], ends[1:], parts.tolist())]
+    return np.union1d(first, np.interp(np.concatenate(within), way, time))
+
+
+def _inside_pieces(path: JointTrajectory, first: Array) -> Array:
+    """The ends and quarters of the pieces of a motion that are shorter than two of the ``first`` times.
+
+    A motion there and back between two of the first times would otherwise seem to be a rest.
+    """
+    knots = np.unique(path.rows()[:, 0])
+    knots = knots[:: math.ceil(len(knots) / MAX_SAMPLES)]
+    quarters = np.linspace(knots[:-1], knots[1:], 4, endpoint=False)
+    inside = quarters[:, np.diff(knots) < 2.0 * (first[1] - first[0])].ravel()
+    inside = inside if len(inside) <= MAX_SAMPLES else knots
+    return inside[(inside > first[0]) & (inside < first[-1])]
 
 
 def _located(
