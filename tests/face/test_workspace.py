@@ -191,6 +191,7 @@ def test_the_payload_is_the_largest_mass_within_the_torque_limits(name: str, mov
     checked = 0
     for row, most in zip(q, mass):
         own = np.abs(arm.rne(row, qd, qdd)) / torque
+        assert most >= 0.0
         if most == 0.0:
             assert own.max() >= 1.0
         elif np.isfinite(most):
@@ -211,6 +212,9 @@ def test_the_payload_at_another_frame_and_on_a_trajectory() -> None:
     assert ab.payload_capacity(arm, [0.0, 0.0], frame="j1") == pytest.approx(50.0 / (10.0 * 0.5))
     assert ab.payload_capacity(arm, [0.0, 0.0], centre=(0.5, 0, 0)) == pytest.approx(50.0 / 15.0)
     assert np.isinf(ab.payload_capacity(arm, [np.pi / 2, 0.0]))
+    heavy = ab.Arm(ab.load_robot("puma560").robot)
+    weak = ab.payload_capacity(heavy, [[0.0] * 6, [0.0, np.pi, 0, 0, 0, 0]], torque=np.full(6, 1e-3))
+    assert weak.tolist() == [0.0, 0.0]  # the weight alone exceeds the limits, in both directions
     path = ab.jtraj([np.pi / 2, 0.0], [0.0, 0.0], np.linspace(0, 4, 80))
     mass = ab.payload_capacity(arm, path)
     assert isinstance(mass, float) and 3.0 < mass < 5.0

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from casadi import SX, cos, fabs, floor, fmin, if_else, sin, sqrt, vertcat
+from casadi import SX, cos, fabs, floor, fmax, fmin, if_else, sin, sqrt, vertcat
 
 from armblocks.dynamics.base_parameters import regrouped
 from armblocks.dynamics.friction import joint_friction, rotor_torques
@@ -198,7 +198,7 @@ def payload_capacity(robot: Robot, q: SX, loads: Sequence[SX], frame: str | None
     capacity = SX(math.inf)
     for tau, d, limit in zip(entries(own), entries(lever), entries(limits)):
         felt = fabs(d) > NO_LEVER
-        room = limit - if_else(d < 0.0, -1.0, 1.0) * tau
+        room = fmax(0.0, limit - if_else(d < 0.0, -1.0, 1.0) * tau)
         mass = if_else(felt, room / (fabs(d) + (d == 0.0)), math.inf)
         holds = if_else(fabs(tau) <= limit, math.inf, 0.0)
         capacity = fmin(capacity, fmin(mass, holds))
