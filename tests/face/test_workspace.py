@@ -350,6 +350,7 @@ WRONG = [
     ({"measures": "payload", "torque": -1.0}, "torque = -1.0", InputError),
     ({"points": -1}, "points = -1", InputError),
     ({"cell": 1e-5}, "cells of 1e-05 m give a box", InputError),
+    ({"cell": 1e-25}, "cells of 1e-25 m give a box", InputError),
 ]
 
 

@@ -58,8 +58,9 @@ class CellGrid:
         if not points.shape[1]:
             return
         ends = np.stack([points.min(axis=1), points.max(axis=1)])
-        low, high = np.floor((ends - self.anchor) / self.cell + 0.5).astype(np.int64)
-        self._include(low, high)
+        low, high = np.floor((ends - self.anchor) / self.cell + 0.5)
+        self._check_size(low, high)
+        self._include(low.astype(np.int64), high.astype(np.int64))
         corner = self.anchor + (self.first - 0.5) * self.cell
         shape = np.array(self.counts.shape, dtype=np.int64)
         numbers = np.array([*corner, 1.0 / self.cell])
@@ -76,13 +77,7 @@ class CellGrid:
             low = np.where(low < first, low - MARGIN, first)
             high = np.where(high >= end, high + MARGIN, end - 1)
         size = high - low + 1
-        if float(np.prod(size.astype(float))) > MAX_CELLS:
-            raise InputError(
-                f"cells of {self.cell:g} m give a box of {' x '.join(str(side) for side in size)} cells",
-                where=self._where,
-                allowed=f"at most {MAX_CELLS} cells",
-                fix="give a larger cell, in m",
-            )
+        self._check_size(low, high)
         old = self.counts, self.sums, self.most, self.least
         self._allocate(size)
         if shape.all():
@@ -91,6 +86,17 @@ class CellGrid:
             for before, after in zip(old, new):
                 after[(..., *inside)] = before
         self.first = low
+
+    def _check_size(self, low: Array | Counts, high: Array | Counts) -> None:
+        """Raise InputError for a box with too many cells; indices beyond integers are real numbers."""
+        size = (high - low + 1).astype(np.float64)
+        if not float(np.prod(size)) <= MAX_CELLS:
+            raise InputError(
+                f"cells of {self.cell:g} m give a box of {' x '.join(f'{side:.10g}' for side in size)} cells",
+                where=self._where,
+                allowed=f"at most {MAX_CELLS} cells",
+                fix="give a larger cell, in m",
+            )
 
     def trim(self) -> None:
         """Reduce the box to the cells with samples."""
