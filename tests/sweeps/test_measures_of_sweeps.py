@@ -110,7 +110,15 @@ def test_texts_are_read_and_written() -> None:
         assert Measure.parse(text) == Measure.parse(str(Measure.parse(text)))
 
 
+def test_texts_of_measures_are_exact() -> None:
+    for value in (0.1 + 0.2, 1e-300, 1.0 + 1e-12, -math.inf, 1e22):
+        given = Measure("time_outside", "a/y", {"low": value})
+        assert Measure.parse(str(given)) == given
+
+
 def test_messages_of_invalid_measures() -> None:
+    with pytest.raises(InputError, match="low is 3 and high is -3"):
+        Measure("time_outside", "a/y", {"low": 3.0, "high": -3.0})
     with pytest.raises(UnknownNameError, match="overshot"):
         Measure("overshot", "a/y")
     with pytest.raises(UnknownArgumentError, match="finale"):

@@ -101,6 +101,14 @@ class Measure(metaclass=ArgumentErrors):
                 where=where,
                 fix="give the level",
             )
+        low, high = self.options.get("low", -math.inf), self.options.get("high", math.inf)
+        if low > high:
+            raise InputError(
+                f"low is {_exact(low)} and high is {_exact(high)}",
+                allowed="low up to high",
+                where=where,
+                fix="exchange them",
+            )
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -141,8 +149,13 @@ class Measure(metaclass=ArgumentErrors):
         return Measure(call[1], signal.strip(), options)
 
     def __str__(self) -> str:
-        options = [f"{name}={value:g}" for name, value in self.options.items()]
+        options = [f"{name}={_exact(value)}" for name, value in self.options.items()]
         return f"{self.kind}({', '.join(filter(None, [self.signal, *options]))})"
+
+
+def _exact(value: float) -> str:
+    """The shortest text of a number from which ``float`` reads the same number."""
+    return repr(float(value)).removesuffix(".0")
 
 
 def _is_number(value: object) -> bool:
