@@ -32,6 +32,13 @@ def test_distributions_and_runs_that_do_not_complete(invoke: Invoke) -> None:
     assert "step limit: 3 runs; run 0: not finished after 2 steps" in result.stdout
 
 
+def test_each_name_occurs_once(refusal: Callable[..., str]) -> None:
+    once = ("sweep", "van_der_pol_pid", "--vary", "PID.P=1,2")
+    assert "'PID.P' occurs twice" in refusal(*once, "--vary", "PID.P=3")
+    measures = ("--measure", "a=peak(x1/y)", "--measure", "a=rms(x1/y)")
+    assert "'a' occurs twice" in refusal(*once, *measures)
+
+
 @pytest.mark.parametrize(
     ("option", "message"),
     [

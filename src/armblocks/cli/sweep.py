@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -84,8 +84,8 @@ def sweep(
     with SweepProgress(diagram.name, messages_console()) as progress:
         result = ab.sweep(
             diagram,
-            dict(_varied(text) for text in vary),
-            measures=dict(_named(text) for text in measure or ()),
+            _unique((_varied(text) for text in vary), "--vary"),
+            measures=_unique((_named(text) for text in measure or ()), "--measure"),
             keep=keep or (),
             runs=runs,
             design=design,
@@ -100,6 +100,21 @@ def sweep(
     print_sweep(result, results_console())
     if not result.complete:
         raise KeyboardInterrupt
+
+
+def _unique(pairs: Iterable[tuple[str, Any]], option: str) -> dict[str, Any]:
+    """The values by name; raises ``InputError`` for a name that occurs twice."""
+    named: dict[str, Any] = {}
+    for name, value in pairs:
+        if name in named:
+            raise InputError(
+                f"'{name}' occurs twice",
+                where=option,
+                allowed="each name once",
+                fix=f"remove one {option}, or give it another name",
+            )
+        named[name] = value
+    return named
 
 
 def _varied(text: str) -> tuple[str, Any]:
