@@ -13,7 +13,8 @@ import armblocks as ab
 from armblocks import blocks
 from armblocks.errors import DiagramError, FormatError, InputError, UnknownNameError
 from armblocks.face import sweep as sweep_module
-from armblocks.sweeps import scheduling
+from armblocks.sweeps import files, scheduling
+from armblocks.sweeps.files import SweepFile
 
 VDP = "van_der_pol_pid"
 SHORT: dict[str, Any] = {"stop_time": 2.0, "sample_time": 0.1}
@@ -145,6 +146,28 @@ def test_masks_entries_and_constants_of_the_equations_vary() -> None:
         assert periods.run(run).run.ticks == (5, 9)[run]
 
 
+def test_every_column_has_a_name_of_its_own() -> None:
+    builder = ab.DiagramBuilder("vector")
+    source = builder.add("source", blocks.Constant(value=[1.0, 2.0]))
+    builder.add("scope", blocks.Scope(), builder.add("integrator", blocks.Integrator(initial=[0, 0]), source))
+    diagram = builder.build()
+    with pytest.raises(InputError, match=r"'source.value\[0\]' varies twice: as an entry"):
+        ab.sweep(diagram, {"source.value[0]": [7.0], "source.value": [[5.0, 6.0]]}, **SHORT)
+    measures = {"source.value[0]": "final(source/y[0])"}
+    with pytest.raises(InputError, match=r"'source.value\[0\]' of a measure is used by another column"):
+        ab.sweep(diagram, {"source.value": [[5.0, 6.0]]}, measures=measures, **SHORT)
+    rows = [{"source.value": [0.0] * n, "integrator.initial": [0.0] * n} for n in (2, 3)]
+    with pytest.raises(InputError, match=r"the kept signal 'source/y\[2\]' does not exist in all runs"):
+        ab.sweep(diagram, rows, keep="source/y", **SHORT)
+    assert len(ab.sweep(diagram, rows, keep="source/y[1]", **SHORT)) == 2
+
+
+def test_equal_texts_are_compiled_once() -> None:
+    texts = np.array(["<", ">"] * 3)
+    result = ab.sweep(decay(), {"below.relation": texts}, design="paired", **SHORT)
+    assert "2 models" in result.remark or "1 models" in result.remark
+
+
 def test_python_functions_measure_results() -> None:
     def half_peak(result: ab.SimulationResult) -> float:
         return 0.5 * float(np.abs(result["x1/y"]).max())
@@ -202,6 +225,65 @@ def test_an_interrupted_sweep_continues(name: str, tmp_path: Path, monkeypatch: 
         arguments: dict[str, Any] = {"vary": vary, "measures": MEASURES, **SHORT, **changed}
         with pytest.raises(InputError, match=f"results of another sweep: {what}"):
             ab.sweep(VDP, arguments.pop("vary"), out=path, **arguments)
+
+
+def test_a_file_belongs_to_the_exact_options_of_its_measures(tmp_path: Path) -> None:
+    for reference in (1.0, 1.0 + 1e-9):
+        measures = {"a": ab.Measure("iae", "x1/y", {"reference": reference})}
+        arguments: Any = {"measures": measures, "out": tmp_path / "table.parquet", **SHORT}
+        if reference == 1.0:
+            ab.sweep(VDP, {"PID.P": [1.0]}, **arguments)
+            continue
+        with pytest.raises(InputError, match="measures differs"):
+            ab.sweep(VDP, {"PID.P": [1.0]}, **arguments)
+
+
+@pytest.mark.parametrize("name", ["", "table.parquet", "table.csv"])
+def test_a_sweep_that_is_interrupted_at_once_has_no_rows(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(worker: Any, parameters: Any) -> Any:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(scheduling.Worker, "compute", interrupted)
+    arguments: Any = {"measures": MEASURES, "out": tmp_path / name if name else None, **SHORT}
+    empty = ab.sweep(VDP, {"PID.P": [1.0, 2.0]}, **arguments)
+    assert "0 runs of 2, INCOMPLETE" in repr(empty) and not empty.complete
+    assert len(empty) == 0 and not empty.failed.size
+    empty.save(tmp_path / "empty.csv")
+    assert len((tmp_path / "empty.csv").read_text().splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", ["table.parquet", "table.csv"])
+def test_runs_that_two_processes_have_computed_occur_once(name: str, tmp_path: Path) -> None:
+    file = SweepFile(tmp_path / name, {"model": "a"})
+    for begin, end in ((0, 4), (2, 3), (2, 6), (6, 7)):
+        file.append(begin, {"run": np.arange(begin, end), "y": np.arange(begin, end) * 0.5})
+    for complete in (False, True):
+        assert file.complete == complete
+        assert file.read(["run"])["run"].tolist() == list(range(7))
+        assert file.read(["y"])["y"].tolist() == [0.5 * run for run in range(7)]
+        if not complete:
+            file.finish()
+
+
+def test_a_csv_file_is_complete_only_with_its_identity(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = SweepFile(tmp_path / "table.csv", {"model": "a"})
+    file.append(0, {"run": np.arange(3)})
+
+    def fail(path: Path, data: bytes) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(files, "write_atomically", fail)
+    with pytest.raises(KeyboardInterrupt):
+        file.finish()
+    monkeypatch.undo()
+    again = SweepFile(tmp_path / "table.csv", {"model": "a"})
+    assert not again.complete and again.done == [(0, 3)]
+    again.finish()
+    assert SweepFile(tmp_path / "table.csv", {"model": "a"}).complete
 
 
 def test_files_of_others_are_not_replaced(tmp_path: Path) -> None:
@@ -266,6 +348,11 @@ def test_a_table_of_pandas_is_a_paired_design() -> None:
     assert result["x1.initial"].tolist() == [0.5, 0.25]
     paired = ab.sweep(VDP, table.to_dict("list"), design="paired", **SHORT)
     assert_same_table(result, paired)
+    column = ab.sweep(VDP, {"PID.P": table["PID.P"]}, **SHORT)
+    assert column["PID.P"].tolist() == [1.0, 2.0]
+    twice = pandas.DataFrame([[1.0, 2.0]], columns=["PID.P", "PID.P"])
+    with pytest.raises(InputError, match=r"the table has several columns 'PID\.P'"):
+        ab.sweep(VDP, twice, **SHORT)
 
 
 @pytest.mark.parametrize(
@@ -280,6 +367,10 @@ def test_a_table_of_pandas_is_a_paired_design() -> None:
         ({"PID.P": ab.uniform(1, 2)}, {"design": "grid"}, "the design is a grid"),
         ({"PID.P": ab.uniform(1, 2)}, {"design": "gird", "runs": 2}, "gird"),
         ({"PID.P": [1, 2]}, {"runs": 3}, "runs is 3"),
+        ({"PID.P": ab.uniform(1, 2)}, {"runs": 2.0}, r"runs is 2\.0.*an integer from 0 on"),
+        ({"PID.P": ab.uniform(1, 2)}, {"runs": 2, "seed": -1}, "seed is -1.*an integer from 0 on"),
+        ({"PID.P": range(10**5), "PID.D": range(10**5)}, {}, "has 10000000000 runs.*at most 1000000000"),
+        ({"PID.P": [1]}, {"threads": 1.5}, "threads is 1.5, not an integer above 0"),
         ({"PID.P": [1, 2], "PID.D": [1]}, {"design": "paired"}, "different lengths"),
         ({"PID.P": [1]}, {"keep": "x1/y", "out": "a.csv"}, "a CSV file has no columns"),
         ({"PID.P": [1]}, {"max_steps": 0}, "max_steps is 0, not an integer above 0"),
@@ -315,6 +406,8 @@ def test_messages_of_invalid_distributions_and_entries() -> None:
         ab.loguniform(0, 1)
     with pytest.raises(InputError, match="normal has the mean 0 and the standard deviation 0"):
         ab.normal(0, 0)
+    with pytest.raises(InputError, match=r"the first seed is 1\.5"):
+        ab.seeds(1.5)  # pyright: ignore[reportArgumentType]
     with pytest.raises(InputError, match="the first seed is -1"):
         ab.seeds(-1)
     builder = ab.DiagramBuilder("vector")

@@ -112,7 +112,8 @@ def sweep(
         planned=layout.design.count,
         complete=complete,
         remark=_remark(programs, all_parameters, collected.general, functions),
-        columns={} if file is not None else concatenated(collected.parts, layout),
+        # A sweep that is interrupted before its first part has no file to read.
+        columns={} if file is not None and file.started else concatenated(collected.parts, layout),
         file=file,
         source=SweepSource(model=model, options=options, design=layout.design),
     )
@@ -141,11 +142,21 @@ class _Programs:
     ) -> tuple[Layout, NDArray[np.float64]]:
         """The layout of the table, and the sample times ``(N,)``, s."""
         first = parameters.variants[0]
+        kept = self.kept(first)
+        for variant in {id(variant.model): variant for variant in parameters.variants}.values():
+            different = set(self.kept(variant)).symmetric_difference(kept)
+            if different:
+                raise InputError(
+                    f"the kept signal '{min(different)}' does not exist in all runs",
+                    allowed="signals with equal shapes in all runs",
+                    where="sweep",
+                    fix="keep single entries",
+                )
         times = self.of(first).plan.sample_times
         layout = Layout(
             design=parameters.design,
             measures=names,
-            kept=self.kept(first),
+            kept=kept,
             samples=times.count,
             text_file=text_file,
         )
@@ -221,8 +232,9 @@ class _Collected:
         if file is None:
             ranges: Iterator[tuple[int, int]] = iter([(0, self._count)])
         else:
-            self._done = self._before = sum(end - begin for begin, end in file.done)
-            ranges = file.missing(self._count)
+            missing = list(file.missing(self._count))
+            self._done = self._before = self._count - sum(end - begin for begin, end in missing)
+            ranges = iter(missing)
         try:
             expected = -1
             for begin, rows in scheduler.rows(ranges):
@@ -301,7 +313,8 @@ def _split(
 
 def _check_numbers(max_steps: int | None, threads: int | None) -> None:
     for name, number in (("max_steps", max_steps), ("threads", threads)):
-        if number is not None and (isinstance(number, bool) or number < 1):
+        whole = isinstance(number, int | np.integer) and not isinstance(number, bool)
+        if number is not None and (not whole or number < 1):
             raise InputError(
                 f"{name} is {number!r}, not an integer above 0",
                 allowed="1, 2, 3 …",

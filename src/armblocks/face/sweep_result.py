@@ -181,7 +181,9 @@ class SweepResult(metaclass=ArgumentErrors):
         write_table(Path(path), self._all())
 
     def _all(self) -> Mapping[str, Array]:
-        return {name: self[name] for name in self.names} if self.file is None else self.file.read(self.names)
+        if self.file is None or self.columns:
+            return {name: self[name] for name in self.names}
+        return self.file.read(self.names)
 
     def __repr__(self) -> str:
         status = self[STATUS]

@@ -99,7 +99,7 @@ def seeds(first: int = 1) -> Distribution:
 
     Without a varied seed the noise is the same in all runs.
     """
-    if not 0 <= first < 2**31:
+    if not 0 <= first < 2**31 or first != int(first):
         raise InputError(
             f"the first seed is {first!r}",
             allowed="an integer from 0 to 2^31 - 1",
@@ -150,6 +150,15 @@ def make_design(vary: object, runs: int | None, kind: str | None, seed: int) -> 
     """
     if kind is not None and kind not in (GRID, PAIRED, *DESIGNS):
         raise UnknownNameError("design", kind, (GRID, PAIRED, *DESIGNS), where="sweep")
+    for name, number in (("runs", runs), ("seed", seed)):
+        whole = isinstance(number, int | np.integer) and not isinstance(number, bool) and number >= 0
+        if number is not None and not whole:
+            raise InputError(
+                f"{name} is {number!r}",
+                allowed="an integer from 0 on",
+                where="sweep",
+                fix=f"give another {name}",
+            )
     given, paired = _columns_of(vary)
     levels = {name: _levels(name, value) for name, value in given.items() if not _is_random(value)}
     random = {name: value for name, value in given.items() if isinstance(value, Distribution)}
@@ -187,8 +196,15 @@ def _count(points: int, runs: int | None, random: bool) -> int:
                 fix="write for example runs=1000",
             )
         runs = points
+    if runs > MAX_RUNS:
+        raise InputError(
+            f"the sweep has {runs} runs",
+            allowed=f"at most {MAX_RUNS}",
+            where="sweep",
+            fix="give fewer values, or distributions with runs=…",
+        )
     fits = runs % points == 0 if random else runs == points
-    if not (0 < runs <= MAX_RUNS and fits):
+    if not (runs > 0 and fits):
         multiple = f"a multiple of {points}, the number of combinations of the lists"
         raise InputError(
             f"runs is {runs}",
@@ -218,6 +234,15 @@ def _columns_of(vary: object) -> tuple[Mapping[str, object], bool]:
     columns = getattr(vary, "columns", None)
     if columns is not None and not isinstance(vary, Mapping):
         frame = cast("Any", vary)
+        names = [str(name) for name in columns]
+        equal = next((name for name in names if names.count(name) > 1), None)
+        if equal is not None:
+            raise InputError(
+                f"the table has several columns '{equal}'",
+                allowed="a column for each parameter",
+                where="sweep",
+                fix="rename or delete columns",
+            )
         return {str(name): np.asarray(frame[name]) for name in columns}, True
     if isinstance(vary, Sequence) and not isinstance(vary, str) and vary:
         listed = cast("Sequence[object]", vary)
@@ -241,7 +266,9 @@ def _is_random(value: object) -> bool:
 def _levels(name: str, value: object) -> Column:
     """The values of one parameter, a row for each value; values that are not numbers are objects."""
     listed: Any = value
-    if not isinstance(value, list | tuple | np.ndarray | range):
+    if isinstance(value, np.ndarray) or hasattr(value, "__array__"):  # also a column of a pandas table
+        listed = np.atleast_1d(cast("Any", value))
+    elif not isinstance(value, list | tuple | range):
         listed = [value]
     if len(listed) == 0:
         raise InputError(
@@ -270,6 +297,10 @@ def _levels(name: str, value: object) -> Column:
     return objects
 
 
+def _key(value: object) -> object:
+    return str(value) if isinstance(value, str) else id(value)
+
+
 def _plain(value: Any) -> Any:
     return cast("Any", value.tolist()) if isinstance(value, np.ndarray | np.generic) else value
 
@@ -277,13 +308,14 @@ def _plain(value: Any) -> Any:
 def combinations(columns: Sequence[Column]) -> tuple[list[int], NDArray[np.intp]]:
     """The first run with each combination of values, and the number of the combination of each run.
 
-    Numbers are equal if all bits are; objects if they are the same object.
+    Numbers are equal if all bits are, texts if all characters are; other objects if they are the same object.
     """
     known: dict[tuple[object, ...], int] = {}
     first: list[int] = []
     numbers = np.empty(len(columns[0]), dtype=np.intp)
     keys = [
-        map(id, column) if column.dtype == object else (row.tobytes() for row in column) for column in columns
+        map(_key, column) if column.dtype == object else (row.tobytes() for row in column)
+        for column in columns
     ]
     for run, key in enumerate(zip(*keys)):
         number = known.setdefault(key, len(known))

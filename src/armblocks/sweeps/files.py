@@ -100,6 +100,11 @@ class SweepFile:
         matches = (_PART.fullmatch(entry.name) for entry in self.folder.iterdir())
         return sorted((int(match[1]), int(match[2])) for match in matches if match)
 
+    @property
+    def started(self) -> bool:
+        """Whether there are results of runs."""
+        return self.complete or bool(self.done)
+
     def missing(self, count: int) -> Iterator[tuple[int, int]]:
         """The ranges of runs that are in no part."""
         position = 0
@@ -119,27 +124,25 @@ class SweepFile:
         """Join all parts into the complete file, and delete them."""
         _, pq, csv = _arrow()
 
-        parts = self.done
         file = GrowingFile(self.path)
         try:
             if self.path.suffix.lower() == ".csv":
-                for number, (begin, end) in enumerate(parts):
-                    table = pq.read_table(self._part(begin, end))
+                # A table without its identity could not be read again, so that the identity is first.
+                identity = self.path.with_name(self.path.name + ".json")
+                write_atomically(identity, json.dumps(self._identity).encode())
+                for number, table in enumerate(self._tables()):
                     csv.write_csv(table, file.stream, csv.WriteOptions(include_header=number == 0))
             else:
-                schema = pq.read_schema(self._part(*parts[0]))
+                schema = pq.read_schema(self._part(*self.done[0]))
                 writer = pq.ParquetWriter(file.stream, schema)
-                for begin, end in parts:
-                    writer.write_table(pq.read_table(self._part(begin, end)))
+                for table in self._tables():
+                    writer.write_table(table)
                 writer.add_key_value_metadata({KEY.decode(): json.dumps(self._identity)})
                 writer.close()
         except BaseException:
             file.abandon()
             raise
         file.finish()
-        if self.path.suffix.lower() == ".csv":
-            identity = self.path.with_name(self.path.name + ".json")
-            write_atomically(identity, json.dumps(self._identity).encode())
         shutil.rmtree(self.folder, ignore_errors=True)
         self.complete = True
 
@@ -148,7 +151,7 @@ class SweepFile:
         self.complete = self.complete or not self.folder.exists()  # another call has completed the sweep
         pa, pq, csv = _arrow()
         if not self.complete:
-            tables: list[Any] = [pq.read_table(self._part(*part), columns=list(names)) for part in self.done]
+            tables: list[Any] = list(self._tables(names))
         elif self.path.suffix.lower() == ".csv":
             kinds = {name: pa.int64() if name in _INTEGERS else pa.float64() for name in names}
             kinds |= {name: pa.string() for name in names if name in self._texts}
@@ -157,6 +160,15 @@ class SweepFile:
         else:
             tables = [pq.read_table(self.path, columns=list(names))]
         return {name: np.concatenate([_values(table[name]) for table in tables]) for name in names}
+
+    def _tables(self, names: Sequence[str] | None = None) -> Iterator[Any]:
+        """The tables of all parts. Runs that two processes have computed at the same time occur once."""
+        _, pq, _ = _arrow()
+        position = 0
+        for begin, end in self.done:
+            table = pq.read_table(self._part(begin, end), columns=names and list(names))
+            yield table.slice(max(0, position - begin))
+            position = max(position, end)
 
     def _part(self, begin: int, end: int) -> Path:
         return self.folder / f"runs-{begin:012d}-{end:012d}.parquet"

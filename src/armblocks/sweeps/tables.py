@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -42,7 +43,15 @@ class Layout:
                 where="sweep",
                 fix="omit keep, or write out='results.parquet'",
             )
-        used = [*FIXED, *self.design.columns]
+        repeated = [name for name, count in Counter(self.parameter_names).items() if count > 1]
+        if repeated:
+            raise InputError(
+                f"'{repeated[0]}' varies twice: as an entry, and with its whole array",
+                allowed="values of the entry, or of the array",
+                where="sweep",
+                fix="remove one of them",
+            )
+        used = [*FIXED, *self.parameter_names]
         for name in (*self.measures, *self.kept):
             if name in used or not name:
                 raise InputError(
