@@ -109,6 +109,16 @@ def test_a_stewart_platform_names_the_reasons_of_failures() -> None:
     assert not far.success
 
 
+def test_a_batch_without_targets_is_empty() -> None:
+    loop, chain = (arm.ikine(np.zeros((0, 4, 4))) for arm in (ab.Arm(stewart()), ab.load_robot("puma560")))
+    assert len(loop) == 0
+    nq = {"q": ab.Arm(stewart()).nq, "excess": ab.Arm(stewart()).nq}
+    for name in ("q", "success", "reason", "excess", "iterations", "restarts", "position_error"):
+        found, expected = getattr(loop, name), getattr(chain, name)
+        assert found.dtype == expected.dtype
+        assert found.shape == ((0, nq[name]) if name in nq else expected.shape)
+
+
 def test_a_delta_robot_reaches_positions() -> None:
     arm = ab.Arm(delta())
     mask = np.array((1, 1, 1, 0, 0, 0))

@@ -85,7 +85,7 @@ class ClosedLoopCall:
             _Search(self, target, first if given is None else given[k]) for k, target in enumerate(targets)
         ]
         results = [search.result() for search in searches]
-        return _stacked(results) if batch else results[0]
+        return _stacked(results, self.names) if batch else results[0]
 
     # ---- functions of one configuration ------------------------------------------------------------------
     @property
@@ -310,14 +310,16 @@ class _Search:
         )
 
 
-def _stacked(results: list[IkineResult]) -> IkineResult:
-    """The result of a batch."""
-    fields = ("q", "success", "position_error", "rotation_error", "iterations", "restarts")
-    values = {name: np.array([getattr(result, name) for result in results]) for name in fields}
-    return IkineResult.trusted(
-        **values,
-        reason=np.array([result.reason for result in results], dtype="<U12"),
-        excess=np.array([result.excess for result in results]),
-        lost_direction=np.array([result.lost_direction for result in results]),
-        names=results[0].names,
-    )
+def _stacked(results: list[IkineResult], names: tuple[str, ...]) -> IkineResult:
+    """The result of a batch of N targets, which may be empty."""
+    N, nq = len(results), len(names)
+    shapes = {"q": (N, nq), "excess": (N, nq), "lost_direction": (N, 6)}
+    kinds = {"success": np.bool_, "iterations": np.int64, "restarts": np.int64, "reason": "<U12"}
+    fields = ("position_error", "rotation_error", *shapes, *kinds)
+    values: dict[str, object] = {
+        name: np.array(
+            [getattr(result, name) for result in results], dtype=kinds.get(name, np.float64)
+        ).reshape(shapes.get(name, (N,)))
+        for name in fields
+    }
+    return IkineResult.trusted(**values, names=names)
