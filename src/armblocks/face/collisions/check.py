@@ -145,7 +145,9 @@ def _times(scene: Scene, path: JointTrajectory, step: float) -> Array:
             allowed=f"at most {MAX_SAMPLES}",
             fix="give a larger resolution, in m",
         )
-    within = [np.linspace(a, b, n + 1)[1:-1] for a, b, n in zip(ends[:-1], ends[1:], parts.tolist())]
+    within: list[Array] = [
+        np.linspace(a, b, n + 1)[1:-1] for a, b, n in zip(ends[:-1], ends[1:], parts.tolist())
+    ]
     return np.union1d(first, np.interp(np.concatenate(within), way, time))
 
 
