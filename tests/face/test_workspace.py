@@ -389,6 +389,8 @@ def test_wrong_payload_and_dexterity_arguments_are_named() -> None:
     arm = planar(0.5, 0.5)
     with pytest.raises(InputError, match=r"qd has the shape \(3,\)"):
         ab.payload_capacity(arm, [0.0, 0.0], [1.0, 2.0, 3.0])
+    with pytest.raises(InputError, match=r"\(2,\) or \(N, 2\), finite numbers"):
+        ab.payload_capacity(arm, [0.0, np.nan])
     with pytest.raises(InputError, match="qd or qdd is given with a trajectory"):
         ab.payload_capacity(arm, ab.jtraj([0, 0], [1, 1], 5), [0.0, 0.0])
     with pytest.raises(UnknownNameError, match="axis named 'r'"):
@@ -397,3 +399,6 @@ def test_wrong_payload_and_dexterity_arguments_are_named() -> None:
         ab.dexterity(arm, [0, 0])
     with pytest.raises(InputError, match="or a vector without direction"):
         ab.dexterity(arm, [0, 0, 0], [[0.0, 0.0, 0.0]])
+    with pytest.raises(InputError, match=r"directions = 2\.5"):
+        ab.dexterity(arm, [0, 0, 0], 2.5)
+    assert ab.dexterity(arm, [0.5, 0.5, 0], np.int64(3)) == ab.dexterity(arm, [0.5, 0.5, 0], 3)

@@ -62,11 +62,11 @@ def payload_capacity(
             *(np.zeros(arm.n) if value is None else as_array(value) for value in (qd, qdd)),
         ]
         for name, values, size in zip(("q", "qd", "qdd"), motion, (arm.nq, arm.n, arm.n)):
-            if values.ndim not in (1, 2) or values.shape[-1] != size:
+            if values.ndim not in (1, 2) or values.shape[-1] != size or not np.isfinite(values).all():
                 raise InputError(
                     f"{name} has the shape {values.shape}",
                     where=where,
-                    allowed=f"({size},) or (N, {size})",
+                    allowed=f"({size},) or (N, {size}), finite numbers",
                     fix=f"give {counted(size, 'number')} for each sample",
                 )
     code = ArmKernels(arm.robot, None, arm.__reduce__()).description_key

@@ -88,7 +88,7 @@ def dexterity(
 
 
 def _directions(directions: int | ArrayLike, where: str) -> Array:
-    if isinstance(directions, int):
+    if np.ndim(directions) == 0:
         D = whole("directions", directions, 1, MAX_DIRECTIONS, where)
         k = np.arange(D) + 0.5
         z, angle = 1.0 - 2.0 * k / D, math.pi * (3.0 - math.sqrt(5.0)) * k
