@@ -38,7 +38,8 @@ def collisions(
     Bodies are the base, the links and the ``obstacles`` (:class:`Box`, :class:`Sphere`, :class:`Cylinder`,
     :class:`Plane`). The shapes of a link are those of its file, each one as its convex hull; a link without
     shapes has the castings of its drawing. ``motion``: a trajectory, or configurations (nq,) or (N, nq), of
-    which only these are checked. Bodies touch where their distance is at most ``margin`` (m).
+    which only these are checked. Bodies touch where their distance is at most ``margin`` (m). The hull of a
+    mesh with more than 120 vertices may be too small: it has only those extreme in 120 directions.
 
     Links that a joint or a closure connects are not compared with each other, nor the base with obstacles,
     nor pairs that touch in almost all configurations (such as the links of a wrist), nor the pairs of names
