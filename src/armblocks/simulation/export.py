@@ -154,11 +154,16 @@ def _npz(result: RunData) -> bytes:
     arrays = {slot.title or slot.name: result[slot.name] for slot in result.signals_layout}
     arrays |= {"time": result.time, "run": np.array(json.dumps(description_of(result)))}
     buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+    _write_arrays(buffer, arrays)
+    return buffer.getvalue()
+
+
+def _write_arrays(stream: BinaryIO, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Write named arrays as an NPZ file."""
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, values in arrays.items():
             with archive.open(f"{name}.npy", "w", force_zip64=True) as entry:
                 np.lib.format.write_array(entry, values, allow_pickle=False)
-    return buffer.getvalue()
 
 
 def _mat(result: RunData) -> bytes:
@@ -223,10 +228,7 @@ def save_table(path: Path, columns: Mapping[str, Array]) -> None:
             arrays = [_column(values) for values in columns.values()]
             pq.write_table(pa.table(arrays, names=list(columns)), buffer)
         case _:
-            with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-                for name, values in columns.items():
-                    with archive.open(f"{name}.npy", "w", force_zip64=True) as entry:
-                        np.lib.format.write_array(entry, np.ascontiguousarray(values), allow_pickle=False)
+            _write_arrays(buffer, {name: np.ascontiguousarray(values) for name, values in columns.items()})
     write_atomically(path, buffer.getvalue())
 
 
