@@ -44,6 +44,9 @@ def test_each_name_occurs_once(refusal: Callable[..., str]) -> None:
     [
         ("PID.P", "'PID.P' is not of the form block.parameter=values"),
         ("PID.P=0:1:1.5", "the number of values is 1.5"),
+        ("PID.P=0:1:inf", "the number of values is inf"),
+        ("PID.P=geomspace(1,10,2.5)", "the number of values is 2.5"),
+        ("PID.P=seeds(1.5)", "the first seed is 1.5"),
         ("PID.P=uniform(a,1)", "'a' is not a number"),
         ("PID.P=1,", "--vary PID.P"),
         ("PID.Z=1,2", "Z"),

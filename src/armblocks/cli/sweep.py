@@ -137,22 +137,25 @@ def _values(text: str, where: str) -> Any:
     if call is not None and call[1] in _DISTRIBUTIONS:
         arguments = [_number(part, where) for part in (call[2] or "").split(",") if part.strip()]
         if call[1] in ("geomspace", "linspace") and len(arguments) == 3:
-            return getattr(ab, call[1])(*arguments[:2], int(arguments[2]))
-        if call[1] == "seeds":
-            return ab.seeds(*map(int, arguments))
+            return getattr(ab, call[1])(*arguments[:2], _count(arguments[2], where))
         return getattr(ab, call[1])(*arguments)
     parts = text.split(":")
     if len(parts) == 3:
         first, last, count = (_number(part, where) for part in parts)
-        if count != int(count) or not 1 <= count <= 1e9:
-            raise InputError(
-                f"the number of values is {parts[2]}",
-                where=where,
-                allowed="first:last:count with an integer count of 1 or more",
-                fix="write for example 0:180:1000",
-            )
-        return ab.linspace(first, last, int(count))
+        return ab.linspace(first, last, _count(count, where))
     return [parse_value(part.strip(), where) for part in _entries(text)]
+
+
+def _count(number: float, where: str) -> int:
+    """A number of values."""
+    if not (1 <= number <= 1e9 and number == int(number)):
+        raise InputError(
+            f"the number of values is {number:g}",
+            where=where,
+            allowed="first:last:count with an integer count of 1 or more",
+            fix="write for example 0:180:1000",
+        )
+    return int(number)
 
 
 def _entries(text: str) -> list[str]:
