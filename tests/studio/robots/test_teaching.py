@@ -21,7 +21,13 @@ from armblocks.spatial import Transform, trotx, trotz
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol.messages import pose_edits
 from armblocks.studio.protocol.messages.documents import Change
-from armblocks.studio.protocol.messages.robot_edits import AddJoint, MoveJoint, RemoveJoint, RenameLink
+from armblocks.studio.protocol.messages.robot_edits import (
+    AddJoint,
+    MoveJoint,
+    RemoveJoint,
+    RenameLink,
+    SetCell,
+)
 from armblocks.studio.robots.document import RobotDocument
 from armblocks.studio.robots.edits import ROBOT_EDITS
 from armblocks.studio.robots.motions import plan, planned_motion, workspace
@@ -195,6 +201,10 @@ def test_poses_follow_the_joints_of_an_edited_robot() -> None:
         (RemoveJoint(link=robot.joint_names[1]), (1.0, 3.0, 4.0, 5.0, 6.0)),
         (MoveJoint(link=first, by=1), (2.0, 1.0, 3.0, 4.0, 5.0, 6.0)),
         (RenameLink(link=first, name="waist"), (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)),
+        (
+            SetCell(link=first, column="joint", text="prismatic", angles="rad"),
+            (0.0, 2.0, 3.0, 4.0, 5.0, 6.0),
+        ),
     ]
     for edit, q in expected:
         after = value.with_robot(ROBOT_EDITS.applied(edit, robot))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from armblocks.formats.robot_poses import TaughtPose
 from armblocks.robot import Robot
@@ -29,17 +30,25 @@ class TaughtRobot:
         if robot is self.robot:
             return self
         poses = self.poses
-        if poses and (robot.joint_names, robot.nq) != (self.robot.joint_names, self.robot.nq):
+        if poses and robot.positions != self.robot.positions:
             poses = tuple(replace(pose, q=_fitted(pose.q, self.robot, robot)) for pose in poses)
         return replace(self, robot=robot, poses=poses)
 
 
-def _coordinates(robot: Robot, q: tuple[float, ...]) -> dict[str, tuple[float, ...]]:
+class _JointCoordinates(NamedTuple):
+    """The coordinates of one joint, and their units."""
+
+    q: tuple[float, ...]
+    units: tuple[str, ...]
+
+
+def _coordinates(robot: Robot, q: tuple[float, ...]) -> dict[str, _JointCoordinates]:
     """The coordinates of each joint, by its name."""
-    parts: dict[str, tuple[float, ...]] = {}
+    parts: dict[str, _JointCoordinates] = {}
     first = 0
     for name, joint in zip(robot.joint_names, robot.joints):
-        parts[name] = tuple(q[first : first + joint.nq])
+        units = tuple(entry.unit for entry in joint.positions)
+        parts[name] = _JointCoordinates(tuple(q[first : first + joint.nq]), units)
         first += joint.nq
     return parts
 
@@ -53,5 +62,5 @@ def _fitted(q: tuple[float, ...], before: Robot, after: Robot) -> tuple[float, .
         known = old.get(name)
         if known is None and renamed and before.joint_names[place] not in new:
             known = old[before.joint_names[place]]
-        result += known if known is not None and len(known) == len(neutral) else neutral
+        result += (known if known is not None and known.units == neutral.units else neutral).q
     return tuple(result)
