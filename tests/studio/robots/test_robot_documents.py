@@ -45,9 +45,10 @@ class Client:
 
     async def reply(self, kind: str, **values: Any) -> dict[str, Any]:
         self._number += 1
-        request = {"number": self._number, "request": {"kind": kind, **values}}
+        number = self._number
+        request = {"number": number, "request": {"kind": kind, **values}}
         await self.hub.answer(self.connection, json.dumps(request))
-        return next(e for e in self.received if e["kind"] == "reply" and e["number"] == self._number)
+        return next(e for e in self.received if e["kind"] == "reply" and e["number"] == number)
 
     async def ask(self, kind: str, **values: Any) -> Any:
         reply = await self.reply(kind, **values)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import base64
 import itertools
 from dataclasses import replace
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from pydantic import ValidationError
 from test_robot_documents import Client, run_scenario
 
 import armblocks as ab
@@ -28,11 +30,12 @@ from armblocks.studio.protocol.messages.robot_edits import (
     RenameLink,
     SetCell,
 )
+from armblocks.studio.protocol.messages.teaching import AskMotion
 from armblocks.studio.robots.document import RobotDocument
 from armblocks.studio.robots.edits import ROBOT_EDITS
 from armblocks.studio.robots.motions import plan, planned_motion, workspace
 from armblocks.studio.robots.pose_edits import POSE_EDITS
-from armblocks.studio.robots.reaching import followed_directions, reached
+from armblocks.studio.robots.reaching import FARTHEST, followed_directions, reached
 from armblocks.studio.robots.robot_kind import RobotKind
 from armblocks.studio.robots.taught_robot import TaughtRobot
 
@@ -129,9 +132,26 @@ def test_arms_follow_the_directions_that_their_joints_have() -> None:
     assert reached(arm, q, turned.ravel().tolist()).reached
 
 
+def translation(*position: float) -> list[float]:
+    T = np.eye(4)
+    T[:3, 3] = position
+    return T.ravel().tolist()
+
+
+def test_a_far_target_is_approached(puma: ab.Arm) -> None:
+    target = puma.fkine(Q)
+    target[0, 3] = FARTHEST
+    assert "out of reach" in reached(puma, Q, target.ravel().tolist()).why
+
+
 @pytest.mark.parametrize(
     ("q", "target", "words"),
-    [([0.0], [0.0] * 16, "q has 1 numbers"), (Q, [0.0] * 3, "the target of the tool has 3 numbers")],
+    [
+        ([0.0], [0.0] * 16, r"q has 1 number\."),
+        (Q, [0.0] * 3, "the target of the tool has 3 numbers"),
+        (Q, translation(0.0, 1e308, 0.0), r"the target of the tool is 1e\+308 m from the origin"),
+        (Q, translation(-1e200, 0.0, 0.0), r"the target of the tool is 1e\+200 m from the origin"),
+    ],
 )
 def test_wrong_numbers_are_refused(puma: ab.Arm, q: list[float], target: list[float], words: str) -> None:
     with pytest.raises(InputError, match=words):
@@ -275,6 +295,18 @@ def test_motions_pass_the_poses_from_rest_to_rest(kuka: ab.Arm, course: Any, dur
     assert shown.time[-1] == pytest.approx(motion.duration)
 
 
+@pytest.mark.parametrize("duration", [None, 2.0])
+def test_a_spline_passes_repeated_poses_in_their_order(kuka: ab.Arm, duration: float | None) -> None:
+    a = np.array([0.0, 0.2, 0.0, -1.8, 0.0, 2.0, 0.7])
+    b = a + np.array([0.3, 0.1, 0.2, 0.1, 0.2, 0.1, 0.1])
+    c = a + np.array([0.6, -0.1, 0.2, 0.3, 0.2, 0.1, -0.4])
+    for rows in ([a, b, a, b, a], [a, b, c, b, c, b, a]):
+        made = plan(kuka, taught(kuka, *rows), "spline", duration)
+        assert (np.diff(made.via) > 0.01).all()
+        assert made.via[-1] == pytest.approx(made.trajectory.duration)
+        assert_allclose([made.trajectory(time).q for time in made.via], rows, atol=2e-3)
+
+
 def test_a_motion_that_is_too_fast_names_the_exceeded_limits(kuka: ab.Arm) -> None:
     poses = taught(kuka, [0.0, 0.0, 0.0, -1.5, 0.0, 1.5, 0.0], [1.5, 0.0, 0.0, -1.5, 0.0, 1.5, 0.0])
     shown = planned_motion(kuka, plan(kuka, poses, "joint", 0.3))
@@ -297,12 +329,19 @@ def test_motions_that_are_impossible_are_refused_with_the_reason(puma: ab.Arm) -
     cases: list[tuple[Any, Any, Any, str]] = [
         ([Q], "joint", 1.0, "1 pose is recorded"),
         ([Q, Q], "joint", 1.0, "the poses 'P1' and 'P2' are the same"),
+        ([Q, np.add(Q, 1e-16)], "joint", 1.0, "the poses 'P1' and 'P2' are the same"),
         ([Q, flipped], "line", 1.0, "the straight line from 'P1' to 'P2' ends at .*configuration"),
         ([Q, [0.0] * 6], "spline", None, "the robot has no limits of speed or torque"),
     ]
     for rows, course, duration, words in cases:
         with pytest.raises(InputError, match=words):
             plan(puma, taught(puma, *rows), course, duration)
+
+
+@pytest.mark.parametrize("duration", [0.0, 1e-200, 9e-4, 3601.0, float("nan")])
+def test_durations_that_are_too_short_or_too_long_are_refused(duration: float) -> None:
+    with pytest.raises(ValidationError, match="duration"):
+        AskMotion(document="d", course="joint", duration=duration)
 
 
 def test_the_workspace_has_positions_that_the_arm_reaches(puma: ab.Arm) -> None:
@@ -355,3 +394,19 @@ def test_poses_are_taught_and_the_motion_is_saved_and_inserted(tmp_path: Path) -
     run_scenario(tmp_path, scenario)
     again = KIND.from_file((tmp_path / "taught.json").read_bytes(), tmp_path / "taught.json")
     assert [pose.name for pose in again.poses] == ["P1", "P2"]
+
+
+def test_a_motion_that_waits_for_another_request_is_that_of_the_present_robot(tmp_path: Path) -> None:
+    async def scenario(client: Client) -> None:
+        key = await client.ask("open_shipped", document_kind="robot", name="puma560")
+        for q in (Q, [0.5] * 6):
+            await client.ask("change", document=key, key=str(q), edit={"kind": "record_pose", "q": q})
+        async with client.hub.documents[key].reading:
+            waiting = asyncio.create_task(client.ask("motion", document=key, course="joint", duration=1.0))
+            for _ in range(5):
+                await asyncio.sleep(0)
+            await client.ask("change", document=key, key="add", edit={"kind": "add_joint", "after": "link1"})
+        motion = await waiting
+        assert motion["q"][-1] == pytest.approx([0.5, 0.0, *[0.5] * 5])
+
+    run_scenario(tmp_path, scenario)

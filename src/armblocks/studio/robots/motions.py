@@ -36,6 +36,8 @@ LEAST_PIECES = 24
 """Least number of quintic pieces of a part of given duration."""
 GRID = 150
 """Least number of segments of a path on which the least time is computed."""
+SAME = 1e-9
+"""Difference of two coordinates, rad or m, up to which they are equal."""
 FRAMES_PER_SECOND = 60
 MAX_FRAMES = 900
 MIN_FRAMES = 60
@@ -65,7 +67,7 @@ def plan(arm: Arm, poses: Sequence[TaughtPose], course: Course, duration: float 
             fix="record another pose",
         )
     for first, second in pairwise(poses):
-        if first.q == second.q:
+        if np.allclose(first.q, second.q, rtol=0.0, atol=SAME):
             raise InputError(
                 f"the poses '{first.name}' and '{second.name}' are the same",
                 where=where,
@@ -90,13 +92,17 @@ def plan(arm: Arm, poses: Sequence[TaughtPose], course: Course, duration: float 
     else:
         parts = [_line(arm, first, second, where) for first, second in pairwise(poses)]
     if duration is None:
-        parts = [fastest_motion(arm, part, limits, None, grid_of(arm, part, GRID)) for part in parts]
-        curve = chained(parts)
-        return Plan(sampled(curve, 0.01), _times_of(curve, parts, points))
-    weights = [_weight(part, limits.speed) for part in parts]
-    parts = [_timed(part, duration * weight / sum(weights)) for part, weight in zip(parts, weights)]
-    curve = chained(parts)
-    return Plan(sampled(curve, 0.01), _times_of(curve, parts, points))
+        grids = [grid_of(arm, part, GRID) for part in parts]
+        motions = [fastest_motion(arm, part, limits, None, grid) for part, grid in zip(parts, grids)]
+        knots = motions[0].times[np.searchsorted(grids[0], parts[0].times)]
+    else:
+        weights = [_weight(part, limits.speed) for part in parts]
+        laws = [_law(part, duration * weight / sum(weights)) for part, weight in zip(parts, weights)]
+        motions = [_timed(part, law) for part, law in zip(parts, laws)]
+        knots = _times_of(laws[0], parts[0].times)
+    # The knots of a spline are its poses; the other motions have one part between two poses.
+    via = knots if course == "spline" else np.append(0.0, np.cumsum([one.duration for one in motions]))
+    return Plan(sampled(chained(motions), 0.01), via.tolist())
 
 
 def _line(arm: Arm, first: TaughtPose, second: TaughtPose, where: str) -> PiecewisePolynomial:
@@ -138,11 +144,15 @@ def _weight(path: PiecewisePolynomial, speed: Array) -> float:
     return float((lengths / np.where(np.isfinite(speed), speed, 1.0)).max())
 
 
-def _timed(path: PiecewisePolynomial, duration: float) -> PiecewisePolynomial:
-    """The motion along a path in ``duration`` (s), from rest to rest: the path coordinate is a quintic."""
+def _law(path: PiecewisePolynomial, duration: float) -> PiecewisePolynomial:
+    """The path coordinate over time, from rest to rest: a quintic."""
     one, zero = np.ones(1), np.zeros(1)
-    law = quintic(path.times[0] * one, path.times[-1] * one, duration, zero, zero)
-    times = np.linspace(0.0, duration, max(LEAST_PIECES, 2 * (len(path.times) - 1)) + 1)
+    return quintic(path.times[0] * one, path.times[-1] * one, duration, zero, zero)
+
+
+def _timed(path: PiecewisePolynomial, law: PiecewisePolynomial) -> PiecewisePolynomial:
+    """The motion along a path with the path coordinate ``law`` over time."""
+    times = np.linspace(0.0, law.duration, max(LEAST_PIECES, 2 * (len(path.times) - 1)) + 1)
     s, rate, change = law.at(times)
     q, first, second = path.at(s[:, 0])
     qd, qdd = first * rate, second * rate**2 + first * change
@@ -151,17 +161,10 @@ def _timed(path: PiecewisePolynomial, duration: float) -> PiecewisePolynomial:
     return hermite(times, starts, ends, end=np.array([q[-1], rest, rest]))
 
 
-def _times_of(curve: PiecewisePolynomial, parts: Sequence[PiecewisePolynomial], points: Array) -> list[float]:
-    """The times at which the recorded poses are passed."""
-    if len(parts) == len(points) - 1:
-        return [0.0, *np.cumsum([part.times[-1] - part.times[0] for part in parts]).tolist()]
-    times = np.linspace(0.0, curve.duration, 2001)
-    q = curve.at(times).q
-    found, first = [0.0], 0
-    for point in points[1:-1]:
-        first += int(np.argmin(np.abs(q[first:] - point).max(axis=1)))
-        found.append(float(times[first]))
-    return [*found, float(curve.times[-1])]
+def _times_of(law: PiecewisePolynomial, s: Array) -> Array:
+    """The times at which the path coordinate has the ascending values ``s``."""
+    times = np.linspace(0.0, law.duration, 4001)
+    return np.interp(s, law.at(times).q[:, 0], times)
 
 
 def planned_motion(arm: Arm, made: Plan) -> PlannedMotion:

@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from armblocks.errors import FormatError
 from armblocks.face.arm import Arm
+from armblocks.formats.robot_poses import TaughtPose
 from armblocks.studio.documents.project_folder import ProjectFolder, check_file_name
 from armblocks.studio.protocol.answers import Answers
 from armblocks.studio.protocol.clients import StudioClient
@@ -36,22 +37,20 @@ class TeachingRequests:
         answers.on(teaching_messages.AskWorkspace, self._workspace)
 
     async def _reach(self, _: StudioClient, request: teaching_messages.AskReach) -> teaching_messages.Reached:
-        return await self._computed(request.document, lambda arm: reached(arm, request.q, request.target))
+        return await self._computed(request.document, lambda arm, _: reached(arm, request.q, request.target))
 
     async def _motion(
         self, _: StudioClient, request: teaching_messages.AskMotion
     ) -> teaching_messages.PlannedMotion:
-        poses = self._robots[request.document].document.value.poses
         return await self._computed(
             request.document,
-            lambda arm: planned_motion(arm, plan(arm, poses, request.course, request.duration)),
+            lambda arm, poses: planned_motion(arm, plan(arm, poses, request.course, request.duration)),
         )
 
     async def _rows(self, _: StudioClient, request: teaching_messages.AskMotionRows) -> list[list[float]]:
-        poses = self._robots[request.document].document.value.poses
         return await self._computed(
             request.document,
-            lambda arm: plan(arm, poses, request.course, request.duration).trajectory.rows().tolist(),
+            lambda arm, poses: plan(arm, poses, request.course, request.duration).trajectory.rows().tolist(),
         )
 
     async def _save(self, _: StudioClient, request: teaching_messages.SaveMotion) -> str:
@@ -64,18 +63,19 @@ class TeachingRequests:
                 allowed="a new file, or overwriting",
                 fix="choose another name, or overwrite the file",
             )
-        poses = self._robots[request.document].document.value.poses
         await self._computed(
             request.document,
-            lambda arm: plan(arm, poses, request.course, request.duration).trajectory.save(path),
+            lambda arm, poses: plan(arm, poses, request.course, request.duration).trajectory.save(path),
         )
         return request.path
 
     async def _workspace(self, _: StudioClient, request: teaching_messages.AskWorkspace) -> str:
-        return await self._computed(request.document, workspace)
+        return await self._computed(request.document, lambda arm, _: workspace(arm))
 
-    async def _computed(self, document: str, compute: Callable[[Arm], Result]) -> Result:
-        """The result of a computation with the compiled arm, in a thread."""
+    async def _computed(
+        self, document: str, compute: Callable[[Arm, tuple[TaughtPose, ...]], Result]
+    ) -> Result:
+        """The result of a computation with the compiled arm and its recorded poses, in a thread."""
         open_file = self._robots[document]
         async with open_file.reading:  # concurrent requests compile the arm only once
-            return await asyncio.to_thread(compute, open_file.arm)
+            return await asyncio.to_thread(compute, open_file.arm, open_file.document.value.poses)
