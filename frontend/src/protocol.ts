@@ -1593,7 +1593,7 @@ export interface FoundBlock {
  *
  * ``time`` (N,) s, ``q``, ``qd``, ``qdd`` (N, n) in rad or m and s. ``poses`` (N, L+2, 12): the first three
  * rows of the poses of base, links and tool. ``via``: the times of the recorded poses, s. ``tool_speed``:
- * largest speed of the tool, m/s. ``exceeded``: the exceeded limits, in words.
+ * largest speed of the tool, m/s. ``exceeded``: a sentence for each exceeded limit.
  */
 export interface PlannedMotion {
   time: number[];
@@ -1694,7 +1694,7 @@ export interface TableColumn {
  *
  * ``q`` (nq,) and the ``poses`` (L+2, 4, 4) of base, links and tool. ``reached``: whether the tool has the
  * target; otherwise ``why`` says what stopped it. ``at_limit``: the coordinates at a limit. ``missing``: the
- * directions that the joints cannot follow. ``tool``: the pose of the tool (16,).
+ * directions that the joints cannot follow, such as ``turn about x``. ``tool``: the pose of the tool (16,).
  */
 export interface Reached {
   q: number[];

@@ -147,12 +147,12 @@ export function goTo(q: number[]): void {
 
 // -- the motion --------------------------------------------------------------------------------------------
 
-/** The typed duration: null for the least one, undefined if it is no number. */
+/** The typed duration: null for the least one, undefined if it is not valid. */
 function typedDuration(): number | null | undefined {
   const text = useTeaching.getState().duration.trim()
   if (!text) return null
   const value = Number(text.replace(',', '.'))
-  return value > 0 && value <= 3600 ? value : undefined
+  return value >= 0.001 && value <= 3600 ? value : undefined
 }
 
 function motionChoice() {
@@ -160,7 +160,7 @@ function motionChoice() {
   const duration = typedDuration()
   if (!shown) return undefined
   if (duration === undefined) {
-    useTeaching.setState({ fault: 'The duration is not a number of seconds from 0 to 3600.' })
+    useTeaching.setState({ fault: 'The duration is not a number of seconds from 0.001 to 3600.' })
     return undefined
   }
   return { document: shown.document, course: useTeaching.getState().course, duration }

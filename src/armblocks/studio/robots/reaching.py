@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 from armblocks.face.arm import Arm
 from armblocks.face.ikine_result import IkineResult
 from armblocks.face.toolbox_trajectories import ctraj
@@ -30,6 +30,8 @@ LARGEST_CHANGE = 0.8
 MAX_STEPS = 400
 MAX_FAILURES = 12
 """Number of steps out of reach after which the motion ends."""
+FARTHEST = 1e6
+"""Largest distance of a target from the origin in each direction, m."""
 CLOSE = 1e-6
 """Distance to a limit from which a coordinate is at its limit, relative to its range."""
 _DIRECTIONS = ("move along x", "move along y", "move along z", "turn about x", "turn about y", "turn about z")
@@ -45,7 +47,7 @@ class Directions(NamedTuple):
 
     @property
     def missing(self) -> list[str]:
-        """The directions that the joints cannot follow, in words."""
+        """The directions that the joints cannot follow, as texts such as "turn about x"."""
         return [word for word, used in zip(_DIRECTIONS, self.mask) if not used]
 
 
@@ -171,19 +173,28 @@ def _between(first: Transform, goal: Transform, s: float) -> Transform:
 def _pose(arm: Arm, target: Sequence[float]) -> Transform:
     if len(target) != 16:
         raise InputError(
-            f"the target of the tool has {len(target)} numbers",
+            f"the target of the tool has {counted(len(target), 'number')}",
             where=f"robot '{arm.name}'",
             allowed="16, the rows of a 4 x 4 matrix",
             fix="give a pose",
         )
-    return Transform.from_matrix(np.reshape(target, (4, 4)))
+    pose = Transform.from_matrix(np.reshape(target, (4, 4)))
+    farthest = max(map(abs, pose.translation))
+    if farthest > FARTHEST:
+        raise InputError(
+            f"the target of the tool is {farthest:.3g} m from the origin",
+            where=f"robot '{arm.name}'",
+            allowed=f"up to {FARTHEST:g} m in each direction",
+            fix="give a pose near the arm; lengths are in m",
+        )
+    return pose
 
 
 def _coordinates(arm: Arm, q: Sequence[float]) -> Array:
     values = np.array(q, dtype=np.float64)
     if values.shape != (arm.robot.nq,):
         raise InputError(
-            f"q has {len(values)} numbers",
+            f"q has {counted(len(values), 'number')}",
             where=f"robot '{arm.name}'",
             allowed=f"{arm.robot.nq}, one for each coordinate",
             fix="give one number for each coordinate",

@@ -9,7 +9,7 @@ from pydantic import Field
 from armblocks.studio.protocol.message import Message, ReplyT, Request
 from armblocks.studio.protocol.messages.robots import Joints
 
-Duration = Annotated[float, Field(gt=0.0, le=3600.0, allow_inf_nan=False)]
+Duration = Annotated[float, Field(ge=1e-3, le=3600.0, allow_inf_nan=False)]
 Points = str
 """Numbers of many points: base64 of little-endian float32."""
 
@@ -21,7 +21,7 @@ class Reached(Message):
 
     ``q`` (nq,) and the ``poses`` (L+2, 4, 4) of base, links and tool. ``reached``: whether the tool has the
     target; otherwise ``why`` says what stopped it. ``at_limit``: the coordinates at a limit. ``missing``: the
-    directions that the joints cannot follow. ``tool``: the pose of the tool (16,).
+    directions that the joints cannot follow, such as ``turn about x``. ``tool``: the pose of the tool (16,).
     """
 
     q: list[float]
@@ -53,7 +53,7 @@ class PlannedMotion(Message):
 
     ``time`` (N,) s, ``q``, ``qd``, ``qdd`` (N, n) in rad or m and s. ``poses`` (N, L+2, 12): the first three
     rows of the poses of base, links and tool. ``via``: the times of the recorded poses, s. ``tool_speed``:
-    largest speed of the tool, m/s. ``exceeded``: the exceeded limits, in words.
+    largest speed of the tool, m/s. ``exceeded``: a sentence for each exceeded limit.
     """
 
     time: list[float]
