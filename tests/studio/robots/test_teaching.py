@@ -34,6 +34,7 @@ from armblocks.studio.protocol.messages.teaching import AskMotion
 from armblocks.studio.robots.document import RobotDocument
 from armblocks.studio.robots.edits import ROBOT_EDITS
 from armblocks.studio.robots.motions import plan, planned_motion, workspace
+from armblocks.studio.robots.open_robots import OpenRobot
 from armblocks.studio.robots.pose_edits import POSE_EDITS
 from armblocks.studio.robots.reaching import FARTHEST, followed_directions, reached
 from armblocks.studio.robots.robot_kind import RobotKind
@@ -401,7 +402,9 @@ def test_a_motion_that_waits_for_another_request_is_that_of_the_present_robot(tm
         key = await client.ask("open_shipped", document_kind="robot", name="puma560")
         for q in (Q, [0.5] * 6):
             await client.ask("change", document=key, key=str(q), edit={"kind": "record_pose", "q": q})
-        async with client.hub.documents[key].reading:
+        open_file = client.hub.documents[key]
+        assert isinstance(open_file, OpenRobot)
+        async with open_file.reading:
             waiting = asyncio.create_task(client.ask("motion", document=key, course="joint", duration=1.0))
             for _ in range(5):
                 await asyncio.sleep(0)

@@ -1,7 +1,7 @@
-import { Button, Group, Modal, Stack, Text, TextInput } from '@mantine/core'
 import { create } from 'zustand'
 import { Refusal } from '../../connection'
 import { connection, useStudio } from '../../store'
+import { FileNameDialog } from '../file_name_dialog'
 import { useRobotEditor, type OpenRobot } from './state'
 
 interface SaveState {
@@ -44,44 +44,18 @@ async function write(robot: string, path: string, overwrite: boolean): Promise<v
 export function SaveDialog() {
   const { robot, path, refusal } = useSaving()
   const files = useStudio((s) => s.welcome?.files) ?? []
-  const close = () => useSaving.setState({ robot: null })
+  const file = path.endsWith('.json') ? path : `${path}.json`
   return (
-    <Modal opened={robot !== null} onClose={close} title={<b>Save the robot</b>} size="sm">
-      <form
-        onSubmit={(event) => {
-          event.preventDefault()
-          if (robot) void write(robot, path.endsWith('.json') ? path : `${path}.json`, false)
-        }}
-      >
-        <Stack gap="sm">
-          <TextInput
-            label="File in this folder"
-            description="A robot file, .json; missing folders are created."
-            data-autofocus
-            value={path}
-            error={refusal || undefined}
-            onChange={(event) => useSaving.setState({ path: event.currentTarget.value, refusal: '' })}
-          />
-          {files.includes(path) && !refusal && (
-            <Text size="xs" c="dimmed">
-              A file with this name exists.
-            </Text>
-          )}
-          <Group justify="flex-end" gap="xs">
-            <Button variant="default" onClick={close}>
-              Cancel
-            </Button>
-            {refusal && robot && (
-              <Button color="red" variant="light" onClick={() => void write(robot, path, true)}>
-                Overwrite
-              </Button>
-            )}
-            <Button type="submit" disabled={!path.trim()}>
-              Save
-            </Button>
-          </Group>
-        </Stack>
-      </form>
-    </Modal>
+    <FileNameDialog
+      opened={robot !== null}
+      title="Save the robot"
+      description="A robot file, .json; missing folders are created."
+      path={path}
+      note={files.includes(path) ? 'A file with this name exists.' : ''}
+      refusal={refusal}
+      onPath={(typed) => useSaving.setState({ path: typed, refusal: '' })}
+      onSave={(overwrite) => robot && void write(robot, file, overwrite)}
+      onClose={() => useSaving.setState({ robot: null })}
+    />
   )
 }

@@ -136,16 +136,20 @@ function Playback({ motion }: { motion: ShownMotion }) {
   )
 }
 
-/** The largest speed and torque of each joint, with bars relative to the limits. */
+/** The largest speed and torque of each joint, and their shares of the limits where there are limits. */
 function Peaks({ motion }: { motion: ShownMotion }) {
   const angles = useRobotEditor((s) => s.angles)
+  const hasSpeedLimits = motion.peaks.some(({ speed_limit }) => speed_limit !== null)
+  const hasTorqueLimits = motion.peaks.some(({ torque_limit }) => torque_limit !== null)
   return (
     <table className="peaks numbers" aria-label="Peaks of the motion">
       <thead>
         <tr>
           <th scope="col">joint</th>
           <th scope="col">speed</th>
+          {hasSpeedLimits && <th scope="col">of limit</th>}
           <th scope="col">torque</th>
+          {hasTorqueLimits && <th scope="col">of limit</th>}
         </tr>
       </thead>
       <tbody>
@@ -155,18 +159,17 @@ function Peaks({ motion }: { motion: ShownMotion }) {
           return (
             <tr key={name}>
               <th scope="row">{name}</th>
-              <Peak text={`${shownSpeed} ${degrees ? '°' : unit}/s`} share={shareOf(speed, speed_limit)} />
-              <Peak
-                text={`${shortNumber(torque, 2)} ${unit === 'rad' ? 'N m' : 'N'}`}
-                share={shareOf(torque, torque_limit)}
-              />
+              <td>{`${shownSpeed} ${degrees ? '°' : unit}/s`}</td>
+              {hasSpeedLimits && <Share share={shareOf(speed, speed_limit)} />}
+              <td>{`${shortNumber(torque, 2)} ${unit === 'rad' ? 'N m' : 'N'}`}</td>
+              {hasTorqueLimits && <Share share={shareOf(torque, torque_limit)} />}
             </tr>
           )
         })}
       </tbody>
       <tfoot>
         <tr>
-          <td colSpan={3}>tool speed at most {shortNumber(motion.tool_speed, 3)} m/s</td>
+          <td colSpan={5}>tool speed at most {shortNumber(motion.tool_speed, 3)} m/s</td>
         </tr>
       </tfoot>
     </table>
@@ -176,13 +179,13 @@ function Peaks({ motion }: { motion: ShownMotion }) {
 /** Excess over a limit by rounding and by interpolation, which is no warning, in percent. */
 const TOLERANCE = 0.1
 
-function Peak({ text, share }: { text: string; share: number | undefined }) {
-  const isOver = share !== undefined && share > 100 + TOLERANCE
+/** A share of a limit in percent, with a bar; empty without a limit. */
+function Share({ share }: { share: number | undefined }) {
+  if (share === undefined) return <td />
   return (
-    <td className={isOver ? 'over' : undefined}>
-      {text}
-      <span className="share">{share === undefined ? '' : `${Math.round(share)} %`}</span>
-      {share !== undefined && <meter aria-hidden min={0} max={100} value={Math.min(share, 100)} />}
+    <td className={share > 100 + TOLERANCE ? 'over' : 'share'}>
+      {Math.round(share)} %
+      <meter aria-hidden min={0} max={100} value={Math.min(share, 100)} />
     </td>
   )
 }

@@ -1,44 +1,21 @@
-import { Button, Group, Modal, Stack, TextInput } from '@mantine/core'
+import { FileNameDialog } from '../file_name_dialog'
 import { saveMotion, useTeaching } from './state'
 
 /** Asks for the name of a trajectory file. */
 export function SaveMotionDialog() {
   const { saving, refusal } = useTeaching()
-  const close = () => useTeaching.setState({ saving: null, refusal: '' })
   const path = saving ?? ''
   const file = path.toLowerCase().endsWith('.csv') ? path : `${path}.csv`
   return (
-    <Modal opened={saving !== null} onClose={close} title={<b>Save the trajectory</b>} size="sm">
-      <form
-        onSubmit={(event) => {
-          event.preventDefault()
-          void saveMotion(file, false)
-        }}
-      >
-        <Stack gap="sm">
-          <TextInput
-            label="File in this folder"
-            description="A table of t, q, qd, qdd, .csv; the block Trajectory and ab.load_trajectory read it."
-            data-autofocus
-            value={path}
-            error={refusal || undefined}
-            onChange={(event) => useTeaching.setState({ saving: event.currentTarget.value, refusal: '' })}
-          />
-          <Group justify="flex-end" gap="xs">
-            <Button variant="default" onClick={close}>
-              Cancel
-            </Button>
-            {refusal && (
-              <Button color="red" variant="light" onClick={() => void saveMotion(file, true)}>
-                Overwrite
-              </Button>
-            )}
-            <Button type="submit" disabled={!path.trim()}>
-              Save
-            </Button>
-          </Group>
-        </Stack>
-      </form>
-    </Modal>
+    <FileNameDialog
+      opened={saving !== null}
+      title="Save the trajectory"
+      description="A table of t, q, qd, qdd, .csv; the block Trajectory and ab.load_trajectory read it."
+      path={path}
+      refusal={refusal}
+      onPath={(typed) => useTeaching.setState({ saving: typed, refusal: '' })}
+      onSave={(overwrite) => void saveMotion(file, overwrite)}
+      onClose={() => useTeaching.setState({ saving: null, refusal: '' })}
+    />
   )
 }

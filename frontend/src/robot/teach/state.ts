@@ -68,6 +68,12 @@ const shownRobot = () => {
   return robot && shown ? { robot, q: shown.q, document: robot.state.document } : undefined
 }
 
+/** Whether the editor still shows this version of this robot, after a reply of the server. */
+function isShown(document: string, version: number): boolean {
+  const { current, robots } = useRobotEditor.getState()
+  return current === document && robots[document]?.state.version === version
+}
+
 /** A motion or a workspace belongs to one version of one robot. */
 useRobotEditor.subscribe(({ robots, current }, before) => {
   if (robots === before.robots && current === before.current) return
@@ -177,9 +183,14 @@ export async function runMotion(): Promise<void> {
   const choice = motionChoice()
   if (!shown || !choice) return
   const { version } = shown.robot.state
+  const { course, duration } = useTeaching.getState()
+  const isCurrent = () => {
+    const teaching = useTeaching.getState()
+    return isShown(shown.document, version) && teaching.course === course && teaching.duration === duration
+  }
   try {
     const motion = await connection.ask({ kind: 'motion', ...choice })
-    if (shownRobot()?.robot.state.version !== version) return
+    if (!isCurrent()) return
     const frames = new MotionPoses(motion)
     const planned = { ...motion, frames, course: choice.course, document: shown.document, version }
     useTeaching.setState({ motion: planned, fault: '', time: 0, playing: true })
@@ -187,6 +198,7 @@ export async function runMotion(): Promise<void> {
     scheduleFrame()
   } catch (error) {
     if (!(error instanceof Refusal)) throw error
+    if (!isCurrent()) return
     useTeaching.setState({ motion: null, playing: false, fault: `${error.what}. ${error.fix}.` })
   }
 }
@@ -257,8 +269,9 @@ export async function saveMotion(path: string, overwrite: boolean): Promise<void
 export async function toggleWorkspace(): Promise<void> {
   if (useTeaching.getState().workspace) return useTeaching.setState({ workspace: null })
   const shown = shownRobot()
-  const packed = shown && (await ask({ kind: 'workspace', document: shown.document }))
-  if (!packed) return
+  if (!shown) return
   const { document, version } = shown.robot.state
+  const packed = await ask({ kind: 'workspace', document })
+  if (!packed || !isShown(document, version)) return
   useTeaching.setState({ workspace: { document, version, points: unpackedFloats(packed) } })
 }
