@@ -67,7 +67,7 @@ def plan(arm: Arm, poses: Sequence[TaughtPose], course: Course, duration: float 
             fix="record another pose",
         )
     for first, second in pairwise(poses):
-        if np.allclose(first.q, second.q, rtol=0.0, atol=SAME):
+        if all(math.isclose(*pair, rel_tol=0.0, abs_tol=SAME) for pair in zip(first.q, second.q)):
             raise InputError(
                 f"the poses '{first.name}' and '{second.name}' are the same",
                 where=where,
