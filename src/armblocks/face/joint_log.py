@@ -158,8 +158,9 @@ def _columns_of_object(source: object, where: str) -> dict[str, Array]:
         )
     columns = {name: value[:, None] if value.ndim == 1 else value for name, value in columns.items()}
     if not columns:
-        numbered = {name: _array(name, value, where).ravel() for name, value in members.items()}
-        columns = _numbered(numbered, dict.fromkeys(numbered, 1.0), where)
+        factors = _factors(dict.fromkeys(members, ""), where)
+        numbered = {name: _array(name, members[name], where).ravel() for name in factors}
+        columns = _numbered(numbered, factors, where)
     columns["t"] = _array(key, members[key], where).ravel()
     return columns
 
@@ -183,15 +184,21 @@ def _columns_of_file(file: ColumnFile, where: str) -> dict[str, Array]:
     key = time_column(file)
     values = {c.name: c.values for c in file.columns if c.values is not None}
     units = {c.name: c.unit for c in file.columns}
-    factors: dict[str, float] = {}
-    for name in values:
-        match = _COLUMN.fullmatch(name.strip())
-        if match:
-            unit = units[name] or (match[3] or "").strip()
-            factors[name] = _factor(unit, torque=match[1] == "tau", where=where)
+    factors = _factors({name: units[name] for name in values}, where)
     columns = _numbered({name: values[name] for name in factors}, factors, where)
     columns["t"] = seconds_of(file.column(key, where), where)
     return columns
+
+
+def _factors(units: Mapping[str, str], where: str) -> dict[str, float]:
+    """The factors to SI units of the columns of joints, by their units or those in their names."""
+    factors: dict[str, float] = {}
+    for name, unit in units.items():
+        match = _COLUMN.fullmatch(name.strip())
+        if match:
+            unit = unit or (match[3] or "").strip()
+            factors[name] = _factor(unit, torque=match[1] == "tau", where=where)
+    return factors
 
 
 def _factor(unit: str, *, torque: bool, where: str) -> float:
@@ -307,9 +314,9 @@ def _runs(used: NDArray[np.bool_], time: Array, step: float) -> Iterator[slice]:
     """The longest ranges of usable samples without a gap in time."""
     after_gap = np.append(True, np.diff(time) > 1.5 * step)
     begins = np.flatnonzero(used & (after_gap | ~np.append(False, used[:-1])))
-    for begin in begins.tolist():
-        stops = np.flatnonzero(~used[begin + 1 :] | after_gap[begin + 1 :])
-        end = begin + 1 + (int(stops[0]) if stops.size else len(time) - begin - 1)
+    stops = np.append(np.flatnonzero(~used | after_gap), len(time))
+    ends = stops[np.searchsorted(stops, begins, side="right")]
+    for begin, end in zip(begins.tolist(), ends.tolist()):
         if end - begin >= _FEWEST:
             yield slice(begin, end)
 
