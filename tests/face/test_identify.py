@@ -140,6 +140,21 @@ def test_the_robot_is_physically_consistent_and_stays_near_the_description() -> 
     assert_allclose(result.validate(log), result.noise, rtol=0.1)
 
 
+def test_descriptions_without_friction_or_masses_do_not_bias_the_robot() -> None:
+    arm = small_arm()
+    log = noisy_log(arm)
+    empty = {"mass": 0.0, "inertia": np.zeros((3, 3))}
+    for changes in ({"motor": ab.Motor()}, empty, {"motor": None, **empty}):
+        robot = arm.robot
+        for link in robot.links:
+            gears = {"motor": ab.Motor(gear_ratio=link.motor.gear_ratio)} if changes.get("motor") else {}
+            robot = robot.with_link(link.name, **{**changes, **gears})
+        result = ab.identify(robot, log)
+        errors = (result.consistent_values - result.values) / result.standard_errors
+        assert np.abs(errors).max() < 0.2
+        assert_allclose(result.validate(log), result.noise, rtol=0.05)
+
+
 def test_parameters_without_excitation_are_named_and_not_invented() -> None:
     arm = small_arm()
     log = noisy_log(arm)
@@ -238,6 +253,9 @@ def test_logs_are_read_from_files_frames_and_runs(tmp_path: Path) -> None:
     pandas = pytest.importorskip("pandas")
     frame = pandas.DataFrame({"t": log["t"], **dict(zip(names, columns.T))})
     assert_allclose(ab.identify(arm, frame).values, expected, rtol=1e-9)
+    units = frame.rename(columns={"q1": "q1 [deg]"}).assign(comment="none")
+    units["q1 [deg]"] = np.degrees(units["q1 [deg]"])
+    assert_allclose(ab.identify(arm, units).values, expected, rtol=1e-9, atol=1e-12)
     np.savez(tmp_path / "log.npz", **log)
     assert_allclose(ab.identify(arm, tmp_path / "log.npz").values, expected, rtol=1e-9)
     twice = ab.identify(arm, [log, log])

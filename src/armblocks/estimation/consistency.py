@@ -114,7 +114,9 @@ def consistent_fit(A: Array, y: Array, prior: Array, constraints: Constraints) -
     g = matrix.T @ y
     origin = start / scale
     z = np.zeros_like(prior)
-    barrier = _FIRST_BARRIER
+    # A start far from the minimum needs a strong barrier, or the damped steps do not reach the centre.
+    gap = 0.5 * float(g @ np.linalg.solve(H, g))
+    barrier = max(_FIRST_BARRIER, gap / len(prior))
     while barrier > _LAST_BARRIER:
         z = _centred(z, H, g, barrier, origin, constraints)
         barrier *= _REDUCTION

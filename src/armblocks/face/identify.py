@@ -97,7 +97,10 @@ def identify(
     start = base.combined(model.prior)
     sensors, fit = _robust_fit(rows, start) if robust else _plain_fit(rows, start)
     A, y = stacked(sensors, len(start), fit.deviations)
-    theta = consistent_fit(A @ base.expansion(len(model.names)), y, model.prior, model.constraints())
+    errors = np.sqrt(np.diag(fit.covariance))
+    estimates = (np.where(fit.unknown, 0.0, array) for array in (fit.values, errors))
+    constraints = model.constraints(base, *estimates)
+    theta = consistent_fit(A @ base.expansion(len(model.names)), y, model.prior, constraints)
     notes = [*logs.notes]
     if decimate > 1:
         notes.append(f"torques and regressor filtered and decimated by {decimate}")

@@ -33,6 +33,8 @@ _OF_MOTORS = ("Jm", "B", "Tc", "Tc+", "Tc-")
 _PREFERRED = ("B", "Tc", "Tc+", "Tc-", "Izz", "Ixx", "Ixy", "Iyz", "Ixz", "mx", "my", "Jm", "Iyy", "mz", "m")
 _SEED = 20261127
 _STATES = 60
+_MOTOR_SHARE = 0.1
+"""Unit of a motor parameter, as a fraction of the value with which it alone explains a base parameter."""
 
 
 class TorqueModel:
@@ -144,8 +146,12 @@ class TorqueModel:
         link = index // 10 if index < 10 * len(self.links) else len(self.links)
         return link, _PREFERRED.index(quantity)
 
-    def constraints(self) -> Constraints:
-        """The conditions of physical consistency, with units of the size of the robot."""
+    def constraints(self, base: BaseColumns, values: Array, errors: Array) -> Constraints:
+        """The conditions of physical consistency, with units of the size of the robot.
+
+        ``values``, ``errors`` (b,): estimated base parameters and their standard errors, 0 if not identified.
+        They enlarge the units of a description that has no friction, or no masses or far too small ones.
+        """
         masses = [max(link.mass, 0.0) for link in map(self.robot.link, self.links)]
         typical = max(float(np.mean(masses)) if masses else 0.0, 1e-3)
         length = max(_typical_length(self.robot), 1e-2)
@@ -156,6 +162,14 @@ class TorqueModel:
             scale[10 * k : 10 * k + 10] = unit * length**powers
         first = 10 * len(self.links)
         scale[first:] = np.maximum(np.abs(self.prior[first:]), 1e-6)
+        shares = np.abs(base.expansion(len(self.names)))
+        certain = np.maximum(np.abs(values) - 3.0 * errors, 0.0)
+        ratios = np.where(shares > 0.0, (certain / (shares @ scale))[:, None], 0.0)
+        # The ten units of a body keep their proportions.
+        of_bodies = ratios[:, :first].reshape(-1, len(self.links), 10).max(axis=(0, 2), initial=1.0)
+        scale[:first] *= np.repeat(of_bodies, 10)
+        alone = (np.abs(values) + 3.0 * errors)[:, None] / np.where(shares > 0.0, shares, np.inf)
+        scale[first:] = np.maximum(scale[first:], _MOTOR_SHARE * alone[:, first:].max(axis=0))
         quantities = [name.rpartition(".")[2] for name in self.names]
         positive = [k for k, name in enumerate(quantities) if k >= first and name != "Tc-"]
         negative = [k for k, name in enumerate(quantities) if k >= first and name == "Tc-"]
