@@ -212,6 +212,26 @@ def test_positions_alone_and_decimation_give_correct_standard_errors() -> None:
     assert "the standard errors are too small" in str(ab.identify(arm, smooth, cutoff=10.0))
 
 
+def test_a_joint_without_torque_or_without_fast_samples_is_identified() -> None:
+    arm = small_arm()
+    free = arm.robot.with_link("wrist", motor=ab.Motor())
+    log = motion(3, 600)
+    log["qdd"][:, 2] = 0.0
+    exact = ab.Arm(free).rne(log["q"], log["qd"], log["qdd"])
+    rest = ab.Arm(free).rne(log["q"], log["qd"], np.eye(3)[2] * np.ones((600, 1))) - ab.Arm(free).rne(
+        log["q"], log["qd"], np.zeros((600, 3))
+    )
+    log["qdd"][:, 2] = -exact[:, 2] / rest[:, 2]  # the acceleration of a joint without a motor
+    tau = ab.Arm(free).rne(log["q"], log["qd"], log["qdd"])
+    tau[:, 2] = 0.0
+    result = ab.identify(free, {**log, "tau": tau}, friction="none", rotor_inertia=False)
+    assert_allclose(result.values, result.prior, atol=1e-6)
+    slow = noisy_log(arm)
+    slow["qd"][:, 2] *= 1e-4
+    some = ab.identify(arm, slow, min_speed=0.1)
+    assert {"wrist.B", "wrist.Tc+"} <= set(some.not_identified) and np.isfinite(some.noise).all()
+
+
 def test_missing_samples_outliers_and_slow_samples() -> None:
     arm = small_arm()
     log = noisy_log(arm)
@@ -300,6 +320,7 @@ def test_unsuitable_arguments_are_refused() -> None:
         ("the times are missing, not finite or not ascending", {"t": log["t"][::-1]}, {}),
         ("an array of numbers, NaN where", {"q": "fast"}, {}),
         ("complete samples for", {"tau": np.full_like(log["tau"], np.nan)}, {}),
+        ("samples below min_speed do not count", {}, {"min_speed": 100.0}),
     ]
     for message, changes, options in cases:
         with pytest.raises(InputError if "named" not in message else UnknownNameError, match=message):

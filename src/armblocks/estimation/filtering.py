@@ -16,7 +16,7 @@ def low_passed(values: Array, step: float, cutoff: float) -> Array:
 
     The gain is that of a Butterworth filter of fourth order applied forwards and backwards, ``1 / (1 + (f /
     cutoff)^8)``, and there is no phase shift. At both ends the signal is continued by its reflection through
-    the end point, so that values and slopes are continuous.
+    the end point, so that values and derivatives are continuous.
     """
     count = len(values)
     if count < 4 or cutoff * step >= 0.5:

@@ -88,10 +88,13 @@ def weighted_fit(sensors: Sequence[Rows], start: Array, deviations: Array | None
     if deviations is not None:
         return _fit(sensors, start, deviations)
     # The first weights: each sensor's residual of its own least squares, or its measured values.
-    sigma = np.array([_own_deviation(rows) for rows in sensors])
+    # Values that are all 0 have no size of their own.
+    sizes = np.array([_size(rows) for rows in sensors])
+    sizes[sizes == 0.0] = sizes.max(initial=0.0) or 1.0
+    sigma = np.array([_own_deviation(rows, size) for rows, size in zip(sensors, sizes)])
     fit = _fit(sensors, start, sigma)
     for _ in range(_ROUNDS):
-        new = np.array([_deviation(rows, fit, old) for rows, old in zip(sensors, sigma)])
+        new = np.array([_deviation(rows, fit, old, size) for rows, old, size in zip(sensors, sigma, sizes)])
         settled = bool(np.all(np.abs(new - sigma) <= _SETTLED * sigma))
         sigma = new
         fit = _fit(sensors, start, sigma)
@@ -105,23 +108,25 @@ def _triangular(matrix: Array) -> Array:
     return np.asarray(cast("Any", np.linalg.qr)(matrix, mode="r"), dtype=np.float64)
 
 
-def _own_deviation(rows: Rows) -> float:
+def _size(rows: Rows) -> float:
+    """The root mean square of the measured values."""
+    return float(np.linalg.norm(rows.factor[:, -1])) / max(rows.count, 1) ** 0.5
+
+
+def _own_deviation(rows: Rows, size: float) -> float:
     """The deviation of the residual of a sensor's rows alone, above 0."""
     corner = rows.factor[-1, -1] if len(rows.factor) == rows.factor.shape[1] else 0.0
-    size = float(np.linalg.norm(rows.factor[:, -1]))
     freedom = max(rows.count - len(rows.columns), 1)
-    return max(abs(float(corner)), 1e-9 * size, 1e-300) / freedom**0.5
+    return max(abs(float(corner)) / freedom**0.5, 1e-9 * size)
 
 
-def _deviation(rows: Rows, fit: LinearFit, old: float) -> float:
+def _deviation(rows: Rows, fit: LinearFit, old: float, size: float) -> float:
     """The standard deviation of a sensor, with the degrees of freedom that its rows have left."""
     X = rows.factor[:, :-1]
     covariance = fit.covariance[np.ix_(rows.columns, rows.columns)]
     used = float(np.einsum("ij,jk,ik->", X, covariance, X)) / old**2
     freedom = rows.count - min(used, rows.count - 1.0)
-    size = float(np.linalg.norm(rows.factor[:, -1]))
-    floor = 1e-12 * max(size, 1e-300) / max(rows.count, 1) ** 0.5
-    return max((rows.squares(fit.values) / max(freedom, 1.0)) ** 0.5, floor)
+    return max((rows.squares(fit.values) / max(freedom, 1.0)) ** 0.5, 1e-12 * size)
 
 
 def _fit(sensors: Sequence[Rows], start: Array, sigma: Array) -> LinearFit:

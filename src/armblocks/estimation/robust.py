@@ -33,6 +33,6 @@ def sandwich_factors(residuals: Array, deviations: Array) -> tuple[Array, Array]
     estimate is ``H^-1 G H^-1``.
     """
     ratio = residuals / deviations
-    slopes = np.mean(np.abs(ratio) <= THRESHOLD, axis=0)
+    inliers = np.mean(np.abs(ratio) <= THRESHOLD, axis=0)
     squares = np.mean(np.clip(ratio, -THRESHOLD, THRESHOLD) ** 2, axis=0)
-    return slopes, squares
+    return inliers, squares

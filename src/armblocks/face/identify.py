@@ -185,14 +185,19 @@ class _Rows:
 
     def check_count(self, where: str) -> None:
         """Raise InputError for fewer torques than parameters."""
-        samples = sum(len(range(0, len(segment.time), self.decimate)) for segment in self.logs.segments)
+        samples, torques = 0, 0
+        for segment in self.logs.segments:
+            speeds = np.abs(segment.qd[:: self.decimate])
+            samples += len(speeds)
+            torques += int(np.sum(speeds >= self.min_speed))
         needed = len(self.base.base)
-        if samples * self.model.robot.n <= needed:
+        if torques <= needed:
             raise InputError(
                 f"{counted(samples, 'complete sample')} for {counted(needed, 'base parameter')}",
                 where=where,
                 allowed="more torques than parameters",
-                fix="give a longer log, or choose fewer links; rows with missing values do not count",
+                fix="give a longer log, or choose fewer links; rows with missing values and samples below "
+                "min_speed do not count",
             )
 
     def parts(self) -> Sequence[tuple[Segment, Array, Array]]:
@@ -291,8 +296,8 @@ def _robust_fit(rows: _Rows, start: Array) -> tuple[list[Rows], LinearFit]:
         if settled:
             break
     residuals = rows.residuals(fit.values)
-    slopes, squares = sandwich_factors(residuals, fit.deviations)
-    outer = weighted_fit(plain, start, fit.deviations / np.sqrt(np.maximum(slopes, 1e-3)))
+    inliers, squares = sandwich_factors(residuals, fit.deviations)
+    outer = weighted_fit(plain, start, fit.deviations / np.sqrt(np.maximum(inliers, 1e-3)))
     A, _ = stacked(plain, len(start), fit.deviations / np.sqrt(squares))
     half = A @ outer.covariance
     covariance = half.T @ half
