@@ -74,6 +74,16 @@ def test_a_step_response_gives_gain_rate_and_start_with_their_covariance() -> No
     assert_allclose(np.diag(result.correlation), 1.0)
 
 
+def test_as_many_values_as_parameters_have_standard_errors_only_with_known_noise() -> None:
+    t = np.array([0.3, 0.9, 2.0])
+    data = {"t": t, "x": response(t) + np.array([0.02, -0.01, 0.01])}
+    unknown = ab.fit(first_order(), list(TRUE), data)
+    assert np.isinf(unknown.standard_errors).all() and np.isinf(unknown.confidence_intervals()).all()
+    assert "the standard errors are unknown" in str(unknown) and not unknown.not_identified
+    known = ab.fit(first_order(), list(TRUE), data, noise={"x": 0.02})
+    assert_allclose(known.covariance, closed_form_covariance(t, 0.02), rtol=0.3)
+
+
 def test_the_derivatives_are_those_of_finite_differences_of_the_closed_form() -> None:
     exact = {"t": np.linspace(0.0, 3.0, 50), "x": response(np.linspace(0.0, 3.0, 50))}
     result = ab.fit(first_order(), list(TRUE), exact, rtol=1e-9, atol=1e-11)
@@ -106,6 +116,22 @@ def test_several_experiments_with_their_own_inputs_and_start_values() -> None:
         ab.fit(diagram, "x.initial", experiments)
 
 
+def test_pictures_show_signals_that_were_not_measured_in_all_experiments() -> None:
+    builder = ab.DiagramBuilder("two")
+    u = builder.add("g", Gain(gain=1.0), builder.add("u", Step(time=0.0)))
+    builder.add("x", Integrator(), u)
+    builder.add("z", Integrator(initial=1.0), u)
+    t = np.linspace(0.0, 1.0, 20)
+    experiments = [{"t": t, "x": 2.0 * t}, {"t": 2.0 * t, "z": 1.0 + 4.0 * t}]
+    result = ab.fit(builder.build(), "g.gain", experiments)
+    one = ab.fit(builder.build(), "g.gain", experiments[:1])
+    assert [signal.name for signal in result.signals] == ["x/y", "z/y"]
+    assert result.picture().height > 1.5 * one.picture().height
+    values = result._series("z/y", "fitted")
+    assert len(values) == 40 and np.isnan(values[:20]).all()
+    assert_allclose(values[20:], 1.0 + 4.0 * t, atol=1e-6)
+
+
 def test_missing_values_entries_and_units() -> None:
     builder = ab.DiagramBuilder("two")
     both = builder.add("both", Gain(gain=[1.0, 1.0]), builder.add("wave", SineWave(frequency=2.0)))
@@ -115,6 +141,9 @@ def test_missing_values_entries_and_units() -> None:
     random = np.random.default_rng(2)
     noisy = exact + random.normal(size=exact.shape) * (0.01, 0.3)
     noisy[10:30, 0] = np.nan
+    elements = {"x[0]": 0.01, "x[1]": 0.3}
+    known = ab.fit(builder.build(), "both.gain", {"t": t, "x": noisy}, noise=elements)
+    assert [signal.noise for signal in known.signals] == [0.01, 0.3]
     result = ab.fit(builder.build(), "both.gain", {"t": t, "x": noisy})
     assert result.parameters == ("both.gain[0]", "both.gain[1]")
     assert (np.abs(result.values - (1.5, -4.0)) < 3.5 * result.standard_errors).all()
@@ -228,6 +257,7 @@ def test_unsuitable_arguments_are_refused() -> None:
         (UnknownNameError, "no entry named", ("rate.gain[3]", data), {}),
         (InputError, "the parameter 'k' is named twice", (["k", "k"], data), {}),
         (InputError, "no parameter is named", ((), data), {}),
+        (InputError, "an integer number of evaluations", ("k", data), {"evaluations": 2.5}),
         (InputError, "there is no experiment", ("k", []), {}),
         (UnknownNameError, "no signal named 'z'", ("k", {"t": t, "z": t}), {}),
         (InputError, "no column is a measured signal", ("k", {"t": t}), {}),

@@ -26,8 +26,9 @@ _SETTLED = 1e-3
 class NonlinearFit:
     """The estimate of k parameters.
 
-    ``covariance`` (k, k) has NaN for parameters that are not determined (``unknown``). ``deviations`` (n,):
-    the standard deviation of each sensor. ``condition``: of the weighted derivatives with columns of length
+    ``covariance`` (k, k) has NaN for parameters that are not determined (``unknown``), and is infinite where
+    no residual is left to estimate the noise. ``deviations`` (n,): the standard deviation of each sensor.
+    ``condition``: of the weighted derivatives with columns of length
     1. ``stopped``: whether an interrupt or the number of evaluations ended the search.
     """
 
@@ -126,7 +127,7 @@ def nonlinear_fit(
         search.reweighted(new)
         if settled or stopped or one_sensor:
             break
-    return _summary(search, message, stopped=stopped)
+    return _summary(search, message, stopped=stopped, known_noise=deviations is not None)
 
 
 def _minimise(
@@ -173,7 +174,7 @@ def _deviations(found: tuple[list[Array], list[Array]], sigma: Array, scales: Ar
     return np.array(new)
 
 
-def _summary(search: _Search, message: str, *, stopped: bool) -> NonlinearFit:
+def _summary(search: _Search, message: str, *, stopped: bool, known_noise: bool) -> NonlinearFit:
     assert search.best is not None
     _, values, (residuals, derivatives) = search.best
     J = np.vstack([part / s for part, s in zip(derivatives, search.sigma.tolist())])
@@ -182,6 +183,9 @@ def _summary(search: _Search, message: str, *, stopped: bool) -> NonlinearFit:
     _, s, Vt = np.linalg.svd(J / scale, full_matrices=False)
     rank = int(np.sum(s > RANK_TOLERANCE * s.max(initial=0.0)))
     half = Vt[:rank].T / s[:rank] / scale[:, None]
+    freedom = sum(map(len, residuals)) - rank
+    if freedom < 1 and not known_noise:
+        half = np.full_like(half, np.inf)  # the residuals are 0 whatever the noise is
     known = np.sqrt(np.sum(Vt[:rank] ** 2, axis=0)) > 1.0 - 1e-6
     covariance = np.where(known & known[:, None], half @ half.T, np.nan)
     return NonlinearFit(
@@ -190,7 +194,7 @@ def _summary(search: _Search, message: str, *, stopped: bool) -> NonlinearFit:
         unknown=~known,
         deviations=search.sigma,
         condition=float(s[0] / s[rank - 1]) if rank else float("inf"),
-        degrees_of_freedom=sum(map(len, residuals)) - rank,
+        degrees_of_freedom=freedom,
         evaluations=search.count,
         message=message,
         stopped=stopped,

@@ -72,11 +72,11 @@ def fit(
     resolved = resolved_diagram(diagram, values)
     where = f"fit of '{resolved.name}'"
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
-    if not names or evaluations < 1:
+    if not names or evaluations < 1 or int(evaluations) != evaluations:
         raise InputError(
             "no parameter is named" if not names else f"evaluations = {evaluations}",
             where=where,
-            allowed="one or more parameters, and one or more evaluations",
+            allowed="one or more parameters, and an integer number of evaluations, 1 or more",
             fix="name the parameters to be fitted",
         )
     fitted = FittedParameters(resolved, compile_diagram(resolved).system, names, where)
@@ -186,7 +186,10 @@ class _Problem:
             return None
         found: list[float] = []
         aliases = {alias: path for run in self.runs for alias, path in run.aliases.items()}
-        given = {aliases.get(name, name): value for name, value in noise.items()}
+        given: dict[str, float] = {}
+        for name, value in noise.items():
+            head, bracket, index = name.rpartition("[") if name not in aliases else (name, "", "")
+            given[aliases.get(head, head) + bracket + index if head else name] = value
         for name in self.sensors:
             value = given.get(name, given.get(name.rpartition("[")[0], np.nan))
             if not 0.0 < value < np.inf:
@@ -205,7 +208,7 @@ class _Problem:
         derivatives: dict[str, list[Array]] = {name: [] for name in self.sensors}
         for run, (names, _), measured in zip(self.runs, self.columns, self.measured):
             try:
-                outputs, slopes = run.evaluate(theta)
+                outputs, sensitivities = run.evaluate(theta)
             except (SimulationError, DiagramError):
                 if self.first:
                     raise
@@ -214,7 +217,7 @@ class _Problem:
                 used = np.isfinite(measured[:, k])
                 if name in residuals:
                     residuals[name].append(measured[used, k] - outputs[used, k])
-                    derivatives[name].append(-slopes[used, k])
+                    derivatives[name].append(-sensitivities[used, k])
         self.first = False
         return (
             [np.concatenate(residuals[name]) for name in self.sensors],

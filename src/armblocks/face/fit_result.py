@@ -155,6 +155,10 @@ class FitResult(metaclass=ArgumentErrors):
                 "not identified, because the signals do not depend on them or only on combinations: "
                 + shortened_list(list(self.not_identified))
             )
+        if np.isinf(self.standard_errors).any():
+            found.append(
+                "the standard errors are unknown: give more measured values than parameters, or noise="
+            )
         if self.at_bounds:
             found.append("at a bound: " + shortened_list(list(self.at_bounds)))
         with np.errstate(invalid="ignore"):
@@ -170,21 +174,17 @@ class FitResult(metaclass=ArgumentErrors):
     def picture(self, width: float = FIGURE_WIDTH) -> Picture:
         """Measured and fitted signals over time, one panel for each signal; experiments in sequence."""
         names = list(dict.fromkeys(signal.name for signal in self.signals))[:_MOST_PANELS]
+        units = {signal.name: signal.unit for signal in self.signals}
         panels: list[Panel] = []
-        first = [signal for signal in self.signals if signal.name == names[0]]
-        time, breaks = with_gaps(np.concatenate([signal.time for signal in first]))
+        time, breaks = with_gaps(np.concatenate(list(self._times.values())))
         for name in names:
-            parts = [signal for signal in self.signals if signal.name == name]
-            lines = ("measured", "fitted", "residuals")
-            values = [np.concatenate([getattr(part, line) for part in parts]) for line in lines]
-            if len(values[0]) != len(time) - len(breaks):
-                continue  # not measured in all experiments
+            values = [self._series(name, line) for line in ("measured", "fitted", "residuals")]
             values = [np.insert(value, breaks, np.nan) if len(breaks) else value for value in values]
             traces = tuple(
                 Trace(label=label, values=value, index=k)
                 for k, (label, value) in enumerate(zip(("measured", "fitted", "residual"), values))
             )
-            panels.append(Panel(quantity=name, unit=parts[0].unit, traces=traces))
+            panels.append(Panel(quantity=name, unit=units[name], traces=traces))
         return time_chart(
             time,
             panels,
@@ -192,6 +192,16 @@ class FitResult(metaclass=ArgumentErrors):
             description="Measured and fitted signals and their differences.",
             width=width,
         )
+
+    @property
+    def _times(self) -> dict[int, Array]:
+        """The times of each experiment with a measured signal."""
+        return {signal.experiment: signal.time for signal in self.signals}
+
+    def _series(self, name: str, line: str) -> Array:
+        """The values of a signal in all experiments, NaN where it was not measured."""
+        parts = {signal.experiment: getattr(signal, line) for signal in self.signals if signal.name == name}
+        return np.concatenate([parts.get(k, np.full(len(time), np.nan)) for k, time in self._times.items()])
 
     def plot(self, *, save: str | PathLike[str] | None = None) -> Picture:
         """The picture of signals and residuals; ``save``: the ``.svg`` or ``.png`` file to write."""
