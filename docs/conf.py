@@ -30,19 +30,26 @@ pygments_dark_style = "github-dark"
 html_theme_options = {
     f"{theme}_css_variables": {
         name: PALETTE[Tone.ACCENT].of(theme)
-        for name in ("color-brand-primary", "color-brand-content", "color-brand-visited")
+        for name in (
+            "color-brand-primary",
+            "color-brand-content",
+            "color-brand-visited",
+        )
     }
     for theme in ("light", "dark")
 }
 html_show_sourcelink = False
 html_copy_source = False
 html_domain_indices = False  # modules are described on the pages of their classes
-html_show_search_summary = False  # browsers do not fetch summaries for pages on the disk
+html_show_search_summary = (
+    False  # browsers do not fetch summaries for pages on the disk
+)
 html_static_path = ["reference/static"]
 html_css_files = ["pictures.css"]
 
 smartquotes = False  # formulas contain straight quotes and double minus signs
-myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath"]
+myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist"]
+# No formulas in TeX: pages with them load MathJax from the network.
 myst_heading_anchors = 3
 
 autodoc_member_order = "bysource"

@@ -64,6 +64,15 @@ def test_the_wheel_contains_a_page_of_every_document_and_no_sources(wheel: Path)
         assert not [name for name in names if f"docs/{left_out}" in name]
 
 
+def test_the_pages_load_nothing_from_the_network(wheel: Path) -> None:
+    archive = zipfile.ZipFile(wheel)
+    attributes = r"""<(?!a\s)[^>]*(?:src|srcset|href)="(?:https?:)?//[^"]*\""""
+    loaded = re.compile(attributes + r"""|url\(["']?(?:https?:)?//""")
+    for name in archive.namelist():
+        if name.startswith("armblocks/shipped/docs/") and name.endswith((".html", ".css")):
+            assert not loaded.findall(archive.read(name).decode()), name
+
+
 def public_members(kind: type) -> Iterator[str]:
     """Methods and properties without an underscore, including those of public base classes."""
     for name, member in inspect.getmembers_static(kind):

@@ -166,7 +166,7 @@ class TorqueModel:
         certain = np.maximum(np.abs(values) - 3.0 * errors, 0.0)
         ratios = np.where(shares > 0.0, (certain / (shares @ scale))[:, None], 0.0)
         # The ten units of a body keep their proportions.
-        of_bodies = ratios[:, :first].reshape(-1, len(self.links), 10).max(axis=(0, 2), initial=1.0)
+        of_bodies = ratios[:, :first].reshape(len(ratios), len(self.links), 10).max(axis=(0, 2), initial=1.0)
         scale[:first] *= np.repeat(of_bodies, 10)
         alone = (np.abs(values) + 3.0 * errors)[:, None] / np.where(shares > 0.0, shares, np.inf)
         scale[first:] = np.maximum(scale[first:], _MOTOR_SHARE * alone[:, first:].max(axis=0))
