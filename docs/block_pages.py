@@ -86,7 +86,9 @@ def block_page(kind: type[Block]) -> str:
     diagram = ab.block_example(kind)
     name = kind.type_name()
     family = BLOCKS.family_of(kind)
-    name_in_studio = f"Name in the studio: **{prose(kind.title)}**. " if other_title(kind) else ""
+    name_in_studio = (
+        f"Name in the studio: **{prose(kind.title)}**. " if other_title(kind) else ""
+    )
     lines = [
         # Not in the table of contents, because the theme would list all blocks on the page of each block.
         "---",
@@ -108,8 +110,12 @@ def block_page(kind: type[Block]) -> str:
     ]
     others = [other for other in BLOCKS.families[family] if other is not kind]
     if others:
-        links = ", ".join(f"[{other.type_name()}]({other.type_name()}.md)" for other in others)
-        text = f"Other blocks of the family {family}: {links}. [All blocks](../blocks.md)."
+        links = ", ".join(
+            f"[{other.type_name()}]({other.type_name()}.md)" for other in others
+        )
+        text = (
+            f"Other blocks of the family {family}: {links}. [All blocks](../blocks.md)."
+        )
         lines += ["## See also", "", text, ""]
     return "\n".join(lines)
 
@@ -118,7 +124,9 @@ def symbol(kind: type[Block], page: str) -> str:
     """The block's face as SVG."""
     picture = block_picture(example_block(kind))
     size = f' style="width:{picture.width:.0f}px"'
-    return svg_inline(picture, f"{page}-{kind.type_name()}").replace("<svg ", f"<svg{size} ", 1)
+    return svg_inline(picture, f"{page}-{kind.type_name()}").replace(
+        "<svg ", f"<svg{size} ", 1
+    )
 
 
 def docstring(kind: type[Block]) -> list[str]:
@@ -145,10 +153,16 @@ def prose(text: str) -> str:
 
 def table(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
     """A Markdown table, followed by an empty line."""
-    headings, cells = list(headings), [[cell.replace("\n", " ") for cell in row] for row in rows]
+    headings, cells = (
+        list(headings),
+        [[cell.replace("\n", " ") for cell in row] for row in rows],
+    )
     # An empty column, such as the units of ports without units, is omitted.
     shown_columns = [k for k in range(len(headings)) if any(row[k] for row in cells)]
-    headings, cells = [headings[k] for k in shown_columns], [[row[k] for k in shown_columns] for row in cells]
+    headings, cells = (
+        [headings[k] for k in shown_columns],
+        [[row[k] for k in shown_columns] for row in cells],
+    )
     body = ["| " + " | ".join(row) + " |" for row in cells]
     return ["| " + " | ".join(headings) + " |", "|" + "---|" * len(headings), *body, ""]
 
@@ -161,11 +175,21 @@ def port_table(block: Block) -> list[str]:
         ("recorded", block.record_ports()),
     )
     rows = [
-        (f"`{port.name}`", side, shape_text(port), unit_text(port.unit), prose(port.doc))
+        (
+            f"`{port.name}`",
+            side,
+            shape_text(port),
+            unit_text(port.unit),
+            prose(port.doc),
+        )
         for side, ports in sides
         for port in ports
     ]
-    return ["## Ports", "", *table(("port", "side", "shape", "unit", "meaning"), rows)] if rows else []
+    return (
+        ["## Ports", "", *table(("port", "side", "shape", "unit", "meaning"), rows)]
+        if rows
+        else []
+    )
 
 
 def shape_text(port: Port) -> str:
@@ -193,7 +217,10 @@ def parameter_table(kind: type[Block]) -> list[str]:
     return [
         "## Parameters",
         "",
-        *table(("parameter", "allowed values", "unit", "default", "tunable", "meaning"), rows),
+        *table(
+            ("parameter", "allowed values", "unit", "default", "tunable", "meaning"),
+            rows,
+        ),
     ]
 
 
@@ -204,14 +231,21 @@ def allowed(rule: Parameter) -> str:
     words = rule.describe().removesuffix(", finite")
     if rule.kind is ParameterKind.ARRAY:
         shapes = " or ".join(
-            ("number", "vector", "matrix", "table of three axes", "table of four axes")[n]
+            ("number", "vector", "matrix", "table of three axes", "table of four axes")[
+                n
+            ]
             for n in rule.dimensions
         )
         words = ", ".join([shapes, *words.split(", ")[1:]])
     words = words.removeprefix("a ").removeprefix("an ")
-    infinite = not rule.finite and rule.kind in (ParameterKind.NUMBER, ParameterKind.ARRAY)
+    infinite = not rule.finite and rule.kind in (
+        ParameterKind.NUMBER,
+        ParameterKind.ARRAY,
+    )
     words = f"{words}, may be infinite" if infinite else words
-    return re.sub("([<>]=?) ", "\\1\N{NO-BREAK SPACE}", words)  # no line break between sign and number
+    return re.sub(
+        "([<>]=?) ", "\\1\N{NO-BREAK SPACE}", words
+    )  # no line break between sign and number
 
 
 def unit_text(unit: str) -> str:
@@ -227,7 +261,9 @@ def default_text(rule: Parameter) -> str:
     if rule.required:
         return ""
     if isinstance(rule.default, Diagram):
-        return f"a diagram of {' and '.join(f'`{name}`' for name in rule.default.blocks)}"
+        return (
+            f"a diagram of {' and '.join(f'`{name}`' for name in rule.default.blocks)}"
+        )
     if callable(rule.default):
         return f"`{getattr(rule.default, '__name__', repr(rule.default))}`"
     return f"`{literal(rule.default)}`"
@@ -240,7 +276,9 @@ def literal(value: object) -> str:
     if isinstance(value, float) and len(repr(value)) > 8:
         for divisor in (1, 2, 4):
             if abs(value) == math.pi / divisor:
-                return ("-" if value < 0 else "") + ("pi" if divisor == 1 else f"pi/{divisor}")
+                return ("-" if value < 0 else "") + (
+                    "pi" if divisor == 1 else f"pi/{divisor}"
+                )
     return repr(value)
 
 
@@ -255,17 +293,30 @@ def behaviour(diagram: Diagram) -> list[str]:
         *(("discrete state", state) for state in block.discrete_states(shapes)),
         *(("mode", state) for state in block.modes(shapes)),
     ]
-    rows = [(f"`{state.name}`", role, unit_text(state.unit), prose(state.doc)) for role, state in states]
+    rows = [
+        (f"`{state.name}`", role, unit_text(state.unit), prose(state.doc))
+        for role, state in states
+    ]
     rows += [
-        (f"`{guard.name}`", f"event {DIRECTIONS[guard.direction]}", "", prose(guard.doc))
+        (
+            f"`{guard.name}`",
+            f"event {DIRECTIONS[guard.direction]}",
+            "",
+            prose(guard.doc),
+        )
         for guard in block.guards(shapes)
     ]
     lines: list[str] = []
     if rows:
-        lines = ["## States and events", "", *table(("name", "kind", "unit", "meaning"), rows)]
+        lines = [
+            "## States and events",
+            "",
+            *table(("name", "kind", "unit", "meaning"), rows),
+        ]
     if block.sampled:
         text = (
-            "The block is evaluated only at the ticks of its clock; its outputs are held between the ticks."
+            "The block is evaluated only at the ticks of its clock. "
+            "Its outputs are held between the ticks."
         )
         lines += [text, ""]
     if block.time_derivatives:
@@ -277,7 +328,11 @@ def behaviour(diagram: Diagram) -> list[str]:
     return lines
 
 
-DIRECTIONS = {1: "at an upward zero crossing", -1: "at a downward zero crossing", 0: "at a zero crossing"}
+DIRECTIONS = {
+    1: "at an upward zero crossing",
+    -1: "at a downward zero crossing",
+    0: "at a zero crossing",
+}
 
 
 def worked_example(kind: type[Block], diagram: Diagram) -> list[str]:
@@ -285,7 +340,9 @@ def worked_example(kind: type[Block], diagram: Diagram) -> list[str]:
     result = ab.simulate(diagram)
     figures = list(view_figures(diagram, result, FIGURE_WIDTH))
     if any(view.kind is ViewKind.ROBOT for _, view in diagram_views(diagram)):
-        figures += [next(motion_figures(motion, "")) for motion in motions(diagram, result)]
+        figures += [
+            next(motion_figures(motion, "")) for motion in motions(diagram, result)
+        ]
     drawing = diagram_picture(diagram, result)
     lines = ["## Example", "", prose(caption(kind)), ""]
     lines += [figure_html(figure) for figure in figures]
@@ -327,10 +384,14 @@ def style_sheet() -> str:
 
     Pictures in separate files contain the colours of both themes and follow ``color-scheme`` of the page.
     """
-    light, dark = (f"color-scheme:{theme};{theme_variables(theme)}" for theme in ("light", "dark"))
+    light, dark = (
+        f"color-scheme:{theme};{theme_variables(theme)}" for theme in ("light", "dark")
+    )
     return (
         f"body{{{light}}}body[data-theme=dark]{{{dark}}}"
-        f"@media(prefers-color-scheme:dark){{body:not([data-theme=light]){{{dark}}}}}" + page_rules() + RULES
+        f"@media(prefers-color-scheme:dark){{body:not([data-theme=light]){{{dark}}}}}"
+        + page_rules()
+        + RULES
     )
 
 

@@ -38,7 +38,12 @@ def digest() -> str:
     """A hash of all sources of the pages."""
     sources_hash = hashlib.sha256()
     for path in _sources():
-        sources_hash.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+        sources_hash.update(
+            path.relative_to(ROOT).as_posix().encode()
+            + b"\0"
+            + path.read_bytes()
+            + b"\0"
+        )
     return sources_hash.hexdigest()
 
 
@@ -55,17 +60,26 @@ def build() -> None:
     """Build the pages with warnings as errors. Raises ``SystemExit`` with the reason if the build fails."""
     print("   build the documentation (about a minute)", flush=True, file=sys.stderr)
     STAMP.unlink(missing_ok=True)
-    shutil.rmtree(SITE, ignore_errors=True)  # Sphinx does not remove the pages of removed documents
+    shutil.rmtree(
+        SITE, ignore_errors=True
+    )  # Sphinx does not remove the pages of removed documents
     before = digest()
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html"]
     # In a build of a wheel, armblocks itself is not installed.
     paths = [str(ROOT / "src"), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in paths if path)}
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(path for path in paths if path),
+    }
     # A new folder for intermediate data: data of an earlier build may come from another version of the code.
     with tempfile.TemporaryDirectory() as doctrees:
         command += ["-d", doctrees, str(DOCS), str(SITE)]
         completed = subprocess.run(
-            command, cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, stdout=sys.stderr
+            command,
+            cwd=ROOT,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=sys.stderr,
         )
     if completed.returncode != 0:
         raise SystemExit(

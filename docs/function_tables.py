@@ -13,7 +13,11 @@ def function_tables() -> str:
         lines += [f"### {group}", "", "| | |", "|---|---|"]
         for name, function in TABLE.items():
             if function.group == group:
-                call = f"{name}({function.arguments})" if function.max_arguments else name
-                lines.append(f"| `{call}` | {function.meaning.replace('|', chr(92) + '|')} |")
+                call = (
+                    f"{name}({function.arguments})" if function.max_arguments else name
+                )
+                lines.append(
+                    f"| `{call}` | {function.meaning.replace('|', chr(92) + '|')} |"
+                )
         lines.append("")
     return "\n".join(lines)

@@ -79,12 +79,16 @@ def public_names() -> str:
         value = getattr(ab, name)
         if not inspect.ismodule(value):
             role = "class" if inspect.isclass(value) else "func"
-            lines.append(f"| {{py:{role}}}`~armblocks.{name}` | {prose(_first_sentence(value))} |")
+            lines.append(
+                f"| {{py:{role}}}`~armblocks.{name}` | {prose(_first_sentence(value))} |"
+            )
     return "\n".join(lines) + "\n"
 
 
 def _first_sentence(value: object) -> str:
-    paragraph = inspect.cleandoc(value.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
+    paragraph = (
+        inspect.cleandoc(value.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
+    )
     return re.split(r"(?<=[.:]) (?=[A-Z])|::$", paragraph)[0].rstrip(":")
 
 
@@ -95,8 +99,17 @@ def solver_table() -> str:
     for tableau in TABLEAUX:
         aliases = ", ".join(f"`{alias}`" for alias in tableau.aliases)
         step = "adaptive" if tableau.adaptive else "fixed"
-        kind = "explicit" if isinstance(tableau, ButcherTableau) else "for stiff systems"
-        cells = (f"`{tableau.name}`", aliases, str(tableau.order), step, kind, tableau.title)
+        kind = (
+            "explicit" if isinstance(tableau, ButcherTableau) else "for stiff systems"
+        )
+        cells = (
+            f"`{tableau.name}`",
+            aliases,
+            str(tableau.order),
+            step,
+            kind,
+            tableau.title,
+        )
         lines.append("| " + " | ".join(cells) + " |")
     names: dict[str, list[str]] = {}
     for tableau in TABLEAUX:

@@ -22,7 +22,9 @@ def simplified(picture: Picture) -> Picture:
 
 def _simplified_mark(mark: Mark) -> Mark:
     if isinstance(mark, Group):
-        return replace(mark, marks=tuple(_simplified_mark(inner) for inner in mark.marks))
+        return replace(
+            mark, marks=tuple(_simplified_mark(inner) for inner in mark.marks)
+        )
     if isinstance(mark, Polyline):
         points = np.asarray(mark.points, dtype=np.float64)
         if len(points) > MIN_POINTS and np.isfinite(points).all():
@@ -45,7 +47,11 @@ def selected_points(points: NDArray[np.float64]) -> NDArray[np.bool_]:
         inner = points[first + 1 : last] - points[first]
         chord = points[last] - points[first]
         squared = chord @ chord
-        along = np.clip(inner @ chord / squared, 0.0, 1.0) if squared else np.zeros(len(inner))
+        along = (
+            np.clip(inner @ chord / squared, 0.0, 1.0)
+            if squared
+            else np.zeros(len(inner))
+        )
         distances = np.linalg.norm(inner - along[:, None] * chord, axis=1)
         farthest = int(distances.argmax())
         if distances[farthest] > TOLERANCE:

@@ -29,7 +29,9 @@ ALIASES = {"Array": "Array", "ArrayLike": "ArrayLike", "ComplexArray": "ComplexA
 
 def shorten_annotations() -> None:
     """Replace the types of NumPy arrays by ``Array`` in the annotations of loaded armblocks modules."""
-    TypeAliasForwardRef.__repr__ = lambda alias: alias.name  # Sphinx prints this inside Mapping[...]
+    TypeAliasForwardRef.__repr__ = lambda alias: (
+        alias.name
+    )  # Sphinx prints this inside Mapping[...]
     for function in _functions():
         for name, text in function.__annotations__.items():
             if isinstance(text, str):
@@ -49,14 +51,23 @@ def _functions() -> Iterator[Callable[..., object]]:
             for value in list(vars(module).values()):
                 members = vars(value).values() if inspect.isclass(value) else (value,)
                 for member in members:
-                    function = getattr(member, "fget", None) or getattr(member, "func", None)
+                    function = getattr(member, "fget", None) or getattr(
+                        member, "func", None
+                    )
                     function = function or getattr(member, "__func__", None) or member
-                    if inspect.isfunction(function) and function.__module__.startswith("armblocks"):
+                    if inspect.isfunction(function) and function.__module__.startswith(
+                        "armblocks"
+                    ):
                         yield function
 
 
 def readable_signature(
-    _app: object, kind: str, _name: str, value: Any, _options: object, *signature: str | None
+    _app: object,
+    kind: str,
+    _name: str,
+    value: Any,
+    _options: object,
+    *signature: str | None,
 ) -> tuple[str | None, ...]:
     """Signature of a class or function for the reference; that of a dataclass shows its fields.
 
@@ -86,7 +97,11 @@ def _fields(dataclass: Any) -> str:
 def _default(value: object) -> str:
     """The default as Python code if it is short, else an ellipsis."""
     text = repr(value)
-    return text if len(text) <= 30 and not text.startswith("<") and "object at" not in text else "..."
+    return (
+        text
+        if len(text) <= 30 and not text.startswith("<") and "object at" not in text
+        else "..."
+    )
 
 
 def arm_page() -> str:
@@ -94,8 +109,13 @@ def arm_page() -> str:
     methods: dict[str, list[str]] = {}
     for name, member in vars(NativeFunctions).items():
         if isinstance(member, cached_property) and not name.startswith("_"):
-            call = getattr(arm_functions, str(member.func.__annotations__["return"])).__call__
-            names = [part.replace(annotation=inspect.Parameter.empty) for part in _parameters(call)]
+            call = getattr(
+                arm_functions, str(member.func.__annotations__["return"])
+            ).__call__
+            names = [
+                part.replace(annotation=inspect.Parameter.empty)
+                for part in _parameters(call)
+            ]
             text = inspect.cleandoc(member.func.__doc__ or "")
             text = f"Returns {text.partition(' → ')[2]}"
             methods[name] = [
@@ -112,4 +132,8 @@ def arm_page() -> str:
 
 
 def _parameters(call: Callable[..., object]) -> list[inspect.Parameter]:
-    return [part for name, part in inspect.signature(call).parameters.items() if name != "self"]
+    return [
+        part
+        for name, part in inspect.signature(call).parameters.items()
+        if name != "self"
+    ]

@@ -14,7 +14,12 @@ from robot_poses import pose_of
 
 import armblocks as ab
 from armblocks.dynamics import trace_link_poses
-from armblocks.formats.robot_facts import MassOrigin, RobotFacts, shipped_facts, shipped_summary
+from armblocks.formats.robot_facts import (
+    MassOrigin,
+    RobotFacts,
+    shipped_facts,
+    shipped_summary,
+)
 from armblocks.pictures.svg import svg_file
 from armblocks.rendering import arm_picture
 from armblocks.robot import Robot
@@ -58,9 +63,14 @@ def robot_pages() -> Iterator[tuple[str, str]]:
         for name in ab.list_robots():
             robot = ab.load_robot(name).robot
             reaches[name] = computed_reach(robot)
-            picture = arm_picture(robot, pose_of(name, robot), width=SIZE[0], height=SIZE[1])
+            picture = arm_picture(
+                robot, pose_of(name, robot), width=SIZE[0], height=SIZE[1]
+            )
             yield f"static/robots/{name}.svg", svg_file(picture)
-            yield f"robots/{name}.md", "\n".join(_robot_page(name, robot, reaches[name]))
+            yield (
+                f"robots/{name}.md",
+                "\n".join(_robot_page(name, robot, reaches[name])),
+            )
     yield "robots.md", "\n".join(_gallery(reaches))
 
 
@@ -91,16 +101,31 @@ def computed_reach(robot: Robot) -> float:
 
 
 def _gallery(reaches: dict[str, float]) -> Iterator[str]:
-    yield from ("# Shipped robots", "", f"{len(reaches)} robots are shipped with armblocks.", INTRODUCTION)
+    yield from (
+        "# Shipped robots",
+        "",
+        f"{len(reaches)} robots are shipped with armblocks.",
+        INTRODUCTION,
+    )
     makers = {name: shipped_summary(name).manufacturer or OTHER for name in reaches}
-    names = sorted(reaches, key=lambda name: (makers[name] == OTHER, makers[name].casefold(), name))
+    names = sorted(
+        reaches, key=lambda name: (makers[name] == OTHER, makers[name].casefold(), name)
+    )
     for maker, group in groupby(names, key=lambda name: makers[name]):
         yield from (f"## {prose(maker)}", "", '<div class="robot-list">', "")
         for name in group:
             yield from _card(name, shipped_facts(name), reaches[name])
         yield from ("</div>", "")
     yield from ("## All robots", "")
-    headings = ("robot", "joints", "payload, kg", "reach, m", "masses", "licence", "sources")
+    headings = (
+        "robot",
+        "joints",
+        "payload, kg",
+        "reach, m",
+        "masses",
+        "licence",
+        "sources",
+    )
     yield from table(headings, [_row(name, reaches[name]) for name in sorted(reaches)])
 
 
@@ -137,14 +162,21 @@ def _row(name: str, reach: float) -> tuple[str, ...]:
 def _robot_page(name: str, robot: Robot, reach: float) -> Iterator[str]:
     facts = shipped_facts(name)
     maker = f" ({robot.manufacturer})" if robot.manufacturer else ""
-    title = prose(f"{robot.name}{maker}: {robot.comment}" if robot.comment else f"{robot.name}{maker}")
+    title = prose(
+        f"{robot.name}{maker}: {robot.comment}"
+        if robot.comment
+        else f"{robot.name}{maker}"
+    )
     yield from ("---", "orphan: true", "---", "", f"# {name}", "", f"{title}.", "")
     yield from (
         f'<figure class="robot"><img src="../../_static/robots/{name}.svg" width="{SIZE[0]:g}" '
         f'height="{SIZE[1]:g}" alt="{escape(robot.name)}"></figure>',
         "",
     )
-    yield from (f"{robot.n} joints: {robot.joint_letters} (R revolute, P prismatic).", "")
+    yield from (
+        f"{robot.n} joints: {robot.joint_letters} (R revolute, P prismatic).",
+        "",
+    )
     lines = [f"- Reach of the tool frame from axis 1, computed: {reach:g} m"]
     if facts.payload is not None:
         lines.append(f"- Payload: {facts.payload:g} kg")
@@ -193,9 +225,13 @@ def _limits(robot: Robot) -> Iterator[str]:
         rows.append(
             (
                 f"`{joint}`",
-                f"{low:g} … {high:g}{unit_symbols[unit]}" if np.isfinite([low, high]).all() else "",
+                f"{low:g} … {high:g}{unit_symbols[unit]}"
+                if np.isfinite([low, high]).all()
+                else "",
                 f"{speed:.4g}{unit_symbols[unit]}/s" if np.isfinite(speed) else "",
-                f"{torque:g} {'N m' if unit == 'rad' else 'N'}" if np.isfinite(torque) else "",
+                f"{torque:g} {'N m' if unit == 'rad' else 'N'}"
+                if np.isfinite(torque)
+                else "",
             )
         )
     if any(any(row[1:]) for row in rows):

@@ -75,7 +75,9 @@ _POSES: dict[str, tuple[float, ...]] = {
     "xarm5": (0.5, 0.3, -1.2, 0.9, 0.0),
     "xarm6": (0.5, 0.2, -1.2, 0.0, 0.9, 0.0),
     "xarm7": (0.5, 0.4, 0.0, 1.3, 0.0, 0.9, 0.0),
-    **dict.fromkeys(("ur10", "ur10e", "ur16e", "ur20", "ur3", "ur3e", "ur5", "ur5e"), _UR),
+    **dict.fromkeys(
+        ("ur10", "ur10e", "ur16e", "ur20", "ur3", "ur3e", "ur5", "ur5e"), _UR
+    ),
 }
 
 

@@ -25,7 +25,9 @@ RUNS = {
 
 def controller_figure() -> str:
     """HTML of the chart. Executes the programs of the tutorial up to the section on margins."""
-    page, heading, _ = TUTORIAL.read_text(encoding="utf-8").partition("## Stability margins")
+    page, heading, _ = TUTORIAL.read_text(encoding="utf-8").partition(
+        "## Stability margins"
+    )
     if not heading:
         raise ValueError(f"{TUTORIAL.name} has no section on margins")
     variables: dict[str, Any] = {}
@@ -42,4 +44,7 @@ def controller_figure() -> str:
         builder.name_signal(source, label)
     builder.add("angles", Scope(inputs=len(sources)), *sources.values())
     chart = ab.simulate(builder.build(), stop_time=3.0)
-    return "".join(figure_html(figure) for figure in view_figures(builder.build(), chart, FIGURE_WIDTH))
+    return "".join(
+        figure_html(figure)
+        for figure in view_figures(builder.build(), chart, FIGURE_WIDTH)
+    )

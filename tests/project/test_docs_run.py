@@ -57,7 +57,7 @@ INLINE = re.compile(r"`(armblocks [^`\n]+)`")
 def commands(page: Path) -> list[str]:
     """Lines of examples, and code inside sentences and tables, that begin with ``armblocks``."""
     text = page.read_text(encoding="utf-8")
-    lines = "".join(TEXT.findall(text)).splitlines()
+    lines = "".join(TEXT.findall(text)).replace("\\\n", " ").splitlines()
     return [line for line in lines if line.startswith("armblocks ")] + INLINE.findall(text)
 
 
@@ -74,6 +74,12 @@ def test_commands_of_the_documents_exist_with_their_options() -> None:
                 command.make_parser(type(context)(command)).parse_args(words)
             except Exception as error:
                 pytest.fail(f"{page.name}: {line}: {error}")
+
+
+def test_examples_fit_into_the_column_of_a_page() -> None:
+    for page in (path for path in PAGES if path.suffix == ".md"):
+        for code in re.findall(r"^```.*?^```$", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL):
+            assert [line for line in code.splitlines() if len(line) > 88] == [], page.name
 
 
 def test_the_readme_begins_with_the_two_commands() -> None:
