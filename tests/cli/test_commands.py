@@ -227,5 +227,5 @@ def test_run_writes_a_film(invoke: Callable[..., Result], refusal: Callable[...,
         "run", "kr180model", "--stop-time", "0.1", "--no-figures", "--film", "run.gif", "--out", "report"
     )
     assert result.exit_code == 0, result.output
-    assert "film: run.gif" in result.output and Path("run.gif").read_bytes().startswith(b"GIF89a")
-    assert "no format of films named '.avi'" in refusal("run", "kr180model", "--film", "run.avi")
+    assert "video: run.gif" in result.output and Path("run.gif").read_bytes().startswith(b"GIF89a")
+    assert "no format of videos named '.avi'" in refusal("run", "kr180model", "--film", "run.avi")

@@ -1,4 +1,4 @@
-"""Pictures and films of arms as files: content, sizes, refusals, and interruption."""
+"""Pictures and videos of arms as files: content, sizes, refusals, and interruption."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def test_a_failing_encoder_is_an_error_with_its_reason(
         raise OSError("no space left\nsecond line")
 
     monkeypatch.setattr(imageio_ffmpeg, "write_frames", lambda *a, **k: (broken() for _ in range(2)))
-    with pytest.raises(FormatError, match=r"ffmpeg cannot write the film \(no space left\)"):
+    with pytest.raises(FormatError, match=r"ffmpeg cannot write the video \(no space left\)"):
         write_film(tmp_path / "a.mp4", lambda k: np.zeros((8, 8, 3), np.uint8), 2, 25)
     assert not list(tmp_path.iterdir())
 
@@ -202,7 +202,7 @@ def test_too_many_arms_are_refused(tmp_path: Path) -> None:
         builder.add(f"plot{k}", ab.blocks.RobotPlot(robot=puma), q)
     diagram = builder.build()
     result = ab.simulate(diagram, stop_time=0.1)
-    with pytest.raises(InputError, match=r"the run has 5 arms.*at most 4 arms in a film"):
+    with pytest.raises(InputError, match=r"the run has 5 arms.*at most 4 arms in a video"):
         ab.write_film(tmp_path / "x.gif", diagram, result)
 
 
@@ -234,7 +234,7 @@ def test_pictures_refuse_by_name(puma: ab.Arm, call: dict[str, object], message:
         ({"dt": [0.0, 0.2]}, r"dt has the shape \(2,\)"),
         ({"rate": 100}, r"rate = 100.*0\.1 to 60 frames per second"),
         ({"speed": 0}, r"speed = 0.*2 plays the motion twice as fast"),
-        ({"dt": 1000.0}, r"the film has \d+ frames.*at most 1500 frames in \.gif files"),
+        ({"dt": 1000.0}, r"the video has \d+ frames.*at most 1500 frames in \.gif files"),
         ({"dt": 1000.0, "save": "a.mp4"}, r"at most 15000 frames in \.mp4 files"),
         ({"size": (2000, 100)}, "64 to 1920 px on each side"),
         ({"save": "a.avi"}, r"there is no format of pictures named '\.avi'.*\.gif"),
@@ -258,7 +258,7 @@ def test_quaternions_of_zeros_and_several_rows_for_sliders_are_refused() -> None
 def test_film_files_have_bounded_frames(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="the frames have 5000 x 2 pixels"):
         write_film(tmp_path / "a.gif", lambda k: np.zeros((2, 5000, 3), np.uint8), 1, 25)
-    with pytest.raises(UnknownNameError, match=r"there is no format of films named '\.avi'"):
+    with pytest.raises(UnknownNameError, match=r"there is no format of videos named '\.avi'"):
         write_film(tmp_path / "a.avi", lambda k: np.zeros((2, 2, 3), np.uint8), 1, 25)
     with pytest.raises(FormatError, match="does not exist"):
         write_film(tmp_path / "none" / "a.gif", lambda k: np.zeros((2, 2, 3), np.uint8), 1, 25)

@@ -59,7 +59,10 @@ def test_the_region_of_two_links_is_the_annulus_of_the_closed_form() -> None:
     )
     assert found.maps["manipulability"].most[found.counts > 0].max() == pytest.approx(0.28, rel=1e-4)
     assert found.reach == pytest.approx(1.1, rel=1e-3)
-    assert found.notes == ("j1 has no limits and makes one turn", "j2 has no limits and makes one turn")
+    assert found.notes == (
+        "j1 has no limits and is sampled over one turn",
+        "j2 has no limits and is sampled over one turn",
+    )
     assert found.axes == "trans"
     assert found.reached([[0.7, 0.5, 0.0], [0.1, 0.1, 0.0], [3.0, 0.0, 0.0]]).tolist() == [True, False, False]
     assert np.isnan(found.value([3.0, 0.0, 0.0], "manipulability"))

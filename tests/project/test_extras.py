@@ -124,8 +124,8 @@ def test_the_core_runs_without_the_extras_and_names_missing_libraries(tmp_path: 
         "widget": ("anywidget", "notebook", "widgets in notebooks"),
         "xacro": ("xacro", "xacro", "xacro files"),
         "sympy": ("sympy", "symbolic", "expressions of SymPy"),
-        "gif": ("PIL", "film", "GIF films"),
-        "mp4": ("imageio_ffmpeg", "film", "MP4 films"),
+        "gif": ("PIL", "film", "GIF videos"),
+        "mp4": ("imageio_ffmpeg", "film", "MP4 videos"),
     }
     assert message.keys() == expected.keys()
     for name, (library, extra, use) in expected.items():

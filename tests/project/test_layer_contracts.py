@@ -27,7 +27,7 @@ VIOLATIONS = {
     ),
     "Only cli imports typer and rich": ("report", "from rich.table import Table", "rich"),
     "Only pictures imports matplotlib": ("face", "import matplotlib.pyplot", "matplotlib"),
-    "Only pictures imports the encoders of films": ("face", "import PIL.Image", "PIL"),
+    "Only pictures imports the encoders of videos": ("face", "import PIL.Image", "PIL"),
     "Only algebra imports sympy": ("face", "import sympy", "sympy"),
     "Only export, sweeps.files and analysis import pandas, pyarrow and scipy": (
         "simulation",

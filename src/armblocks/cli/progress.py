@@ -68,7 +68,7 @@ class RunProgress:
 
 
 class FrameProgress(RunProgress):
-    """Displays the progress of a film: called with the number of written frames, and of all frames."""
+    """Displays the progress of a video: called with the number of written frames, and of all frames."""
 
     def __call__(self, frame: float, count: float, _: float = 0.0) -> None:
         self._show(f"frame {frame:.0f} of {count:.0f}", frame / count)

@@ -31,7 +31,7 @@ class DataFormat(StrEnum):
 
 FilmFile = Annotated[
     Path | None,
-    typer.Option(help="Write a film of the arms in this .mp4 or .gif file; needs the extra film."),
+    typer.Option(help="Write a video of the arms to this .mp4 or .gif file; needs the extra film."),
 ]
 StateFile = Annotated[
     Path | None, typer.Option(help="Save the final state in this .npz file, for --from-state.")
@@ -115,7 +115,7 @@ def run(
     print_motions(diagram, result, console)
     print_files(files, console)
     if film is not None:
-        console.print(f"film: {_film(film, diagram, result)}", highlight=False)
+        console.print(f"video: {_film(film, diagram, result)}", highlight=False)
     if result.log is not None:
         console.print(f"all {result.log.rows} rows: {result.log.path}", highlight=False)
     if open_report:

@@ -278,7 +278,7 @@ class Arm(NativeFunctions):
         """Show the arm at ``q`` (nq,), or a motion ``q`` (N, nq), with a slider for each joint.
 
         In a notebook the result is a widget; elsewhere the 3-D page opens in the browser, and the call
-        returns at once. ``block`` waits until the page is closed. The result has ``q``, the coordinates at
+        returns at once. ``block`` waits until the page is closed. ``q`` of the result are the coordinates at
         the sliders. ``save``: write a file instead, ``.png``, ``.svg`` or ``.pdf``, and return its path; a
         motion is drawn as its last pose, its first pose (pale) and the path of the tool. ``theme``:
         ``"light"``, ``"dark"``, or by default the theme of the viewer. ``size``: width and height, px (files,
@@ -307,8 +307,8 @@ class Arm(NativeFunctions):
         """Play a motion: ``q`` (N, nq) with ``dt`` s between rows, or at times ``dt`` (N,), or a trajectory.
 
         The view is a widget in a notebook, else a browser page, as for :meth:`plot`. The default of ``dt`` is
-        0.05 s. ``save``: write a film instead, ``.mp4`` or ``.gif``, and return its path; ``.png`` and
-        ``.svg`` show the path of the tool. Films need the extra ``film``. ``rate``: frames per second.
+        0.05 s. ``save``: write a video instead, ``.mp4`` or ``.gif``, and return its path; ``.png`` and
+        ``.svg`` show the path of the tool. Videos need the extra ``film``. ``rate``: frames per second.
         ``speed`` 2 plays twice as fast. ``progress(done, all)`` is called after each frame. Ctrl-C leaves an
         existing file unchanged.
         """

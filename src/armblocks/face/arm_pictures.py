@@ -1,4 +1,4 @@
-"""Pictures and films of arms as files, without a browser: ``save=`` of ``Arm.plot`` and ``Arm.animate``."""
+"""Pictures and videos of arms as files, without a browser: ``save=`` of ``Arm.plot`` and ``Arm.animate``."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ PICTURE_SIZE = (640, 480)
 FILM_SIZE = (960, 720)
 """Default width and height, px."""
 MIN_SIDE, MAX_PICTURE_SIDE, MAX_FILM_SIDE = 64, 1600, 1920
-"""Limits of width and height, px. A picture has two pixels for each px, a film one pixel."""
+"""Limits of width and height, px. A picture has two pixels for each px, a video has one."""
 MAX_PATH_POINTS = 2000
 """Maximum number of points of the tool's path in a picture."""
 MAX_ROWS = 200_000
@@ -80,7 +80,8 @@ class ShownArm(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Appearance:
-    """How a picture or film is drawn: theme, ``size`` in px, azimuth and elevation of the camera, degrees."""
+    """The appearance of a picture or video: theme, ``size`` in px, azimuth and elevation of the camera,
+    degrees."""
 
     theme: Theme | None = None
     size: tuple[int, int] | None = None
@@ -242,7 +243,7 @@ def save_animation(
     speed: float,
     progress: FilmProgress | None,
 ) -> Path:
-    """Write a motion as a film, or as one picture with the path of the tool."""
+    """Write a motion as a video, or as one picture with the path of the tool."""
     where = f"animate of robot '{arm.name}'"
     target = Path(path)
     if target.suffix.lower() not in FILM_SUFFIXES:
@@ -283,7 +284,7 @@ def write_arm_film(
 
 
 def checked_rate(rate: float, speed: float, where: str) -> None:
-    """Check the frames per second and the speed of a film. Raises ``InputError``."""
+    """Check the frames per second and the speed of a video. Raises ``InputError``."""
     if not 0.1 <= rate <= 60.0:
         raise InputError(
             f"rate = {rate:g}", where=where, allowed="0.1 to 60 frames per second", fix="give rate=25"

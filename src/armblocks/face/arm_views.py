@@ -83,7 +83,7 @@ def animate(
     speed: float,
     progress: FilmProgress | None,
 ) -> ArmView | Path:
-    """Play or film a motion, see :meth:`Arm.animate`."""
+    """Play a motion, or write it to a file, see :meth:`Arm.animate`."""
     where = f"animate of robot '{arm.name}'"
     if isinstance(q, JointTrajectory):
         q, dt = q.q, q.t if dt is None else dt

@@ -34,8 +34,8 @@ class Excitation(metaclass=ArgumentErrors):
     """A periodic motion for identification, at rest at both ends.
 
     ``condition``: condition number of the regressor of the base parameters along the motion, with columns of
-    length 1 and torques in units of their limits; near 10 is very good, above 100 poor. ``evaluations``: of
-    motions. ``stopped``: whether Ctrl-C ended the search.
+    length 1 and torques in units of their limits; near 10 is very good, above 100 poor. ``evaluations``:
+    number of evaluated motions. ``stopped``: whether Ctrl-C ended the search.
     """
 
     trajectory: JointTrajectory = field(repr=False)
@@ -65,8 +65,8 @@ def excitation(
 
     Each joint moves by a Fourier series with ``harmonics`` terms of the frequency 1 / ``duration``, at rest
     (speed and acceleration 0) at start and end, within the position limits of the robot and the limits of
-    ``speed`` (rad/s or m/s), ``acceleration`` and ``torque``, by default those of the robot. A seeded random
-    search minimises the condition number of the regressor of the base parameters, friction included.
+    ``speed`` (rad/s or m/s), ``acceleration`` and ``torque``, by default the limits of the robot. A seeded
+    random search minimises the condition number of the regressor of the base parameters, friction included.
     ``progress(evaluations, condition)`` is called at each improvement; Ctrl-C ends the search with the best
     motion so far. ``dt`` (s): about the time between samples, a fraction of the duration. Collisions are not
     checked: look at ``arm.animate`` first.
@@ -98,7 +98,7 @@ def excitation(
             "no motion within the torque limits was found",
             where=where,
             allowed="limits that hold the arm in its range and accelerate it",
-            fix="raise the limits of torque, lower those of speed and acceleration, or try more evaluations",
+            fix="raise the torque limits, lower the speed and acceleration limits, or try more evaluations",
         )
     times = np.linspace(0.0, period, max(round(period / step), 1) + 1, dtype=np.float64)
     q, qd, qdd = search.motion(best, times)

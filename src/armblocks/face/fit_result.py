@@ -48,7 +48,7 @@ class FittedSignal(metaclass=ArgumentErrors):
 
     @property
     def explained(self) -> float:
-        """How much of the deviation from the mean is explained, in % (the normalised RMS fit of MATLAB)."""
+        """The explained part of the deviation from the mean, in % (MATLAB's normalised RMS fit)."""
         used = np.isfinite(self.measured)
         measured, residuals = self.measured[used], self.residuals[used]
         size = float(np.linalg.norm(measured - measured.mean())) if used.any() else 0.0

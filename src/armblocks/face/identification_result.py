@@ -31,13 +31,13 @@ _GROUPING_WIDTH = 60
 class IdentificationResult(metaclass=ArgumentErrors):
     """The identified parameters of an arm. ``print`` shows them as a table.
 
-    ``parameters``: the names of the b base parameters; ``groupings``: the sums of parameters of links and
-    motors that they are. ``values`` (b,), ``covariance`` (b, b); parameters in ``not_identified`` are NaN,
-    because the motion of the log does not determine them. ``prior`` (b,): the values of the description.
-    ``condition``: condition number of the weighted regressor with columns of length 1.
+    ``parameters``: the names of the b base parameters; ``groupings``: each base parameter as a sum of
+    parameters of links and motors. ``values`` (b,), ``covariance`` (b, b); parameters in ``not_identified``
+    are NaN, because the motion of the log does not determine them. ``prior`` (b,): the values of the
+    description. ``condition``: condition number of the weighted regressor with columns of length 1.
 
-    ``robot``: a description with these base parameters as near as physically consistent bodies allow; its
-    base parameters are ``consistent_values`` (b,). Combinations that the torques do not determine stay near
+    ``robot``: a description with physically consistent bodies whose base parameters are nearest to the
+    estimate; they are ``consistent_values`` (b,). Combinations that the torques do not determine stay near
     the description that was given.
 
     ``time`` (N,) s; ``tau``, ``fitted`` (N, n): measured and fitted torques of the used samples. ``noise``
@@ -114,7 +114,7 @@ class IdentificationResult(metaclass=ArgumentErrors):
 
     @property
     def errors(self) -> Array:
-        """Root mean square of each joint's residuals (n,), in % of that of its measured torque."""
+        """RMS of each joint's residuals (n,), in % of the RMS of its measured torque."""
         size = np.sqrt(np.mean(self.tau**2, axis=0))
         return 100.0 * np.sqrt(np.mean(self.residuals**2, axis=0)) / np.where(size > 0.0, size, np.inf)
 

@@ -31,7 +31,7 @@ _PART = 20_000
 _ROBUST_ROUNDS = 30
 _KEPT = 1.12
 """Cut-off frequency before decimation, in units of half the new sample rate: neighbouring samples of white
-noise are then independent. Torques and regressor are folded alike, so that the estimate has no bias."""
+noise are then independent. Torques and regressor have the same aliasing, so that the estimate has no bias."""
 
 
 @interrupts.kept()
@@ -60,16 +60,16 @@ def identify(
     regressor alike and keeps every k-th sample, so that the noise of the kept samples is independent and
     the standard errors are right.
 
-    Estimated are the *base parameters*: the combinations of the parameters that have an effect on the
+    The estimates are *base parameters*: the combinations of the parameters that have an effect on the
     torques. ``links``: only these links have unknown mass, centre and inertia (all links by default).
     ``friction``: ``"asymmetric"`` estimates viscous friction B and Coulomb friction Tc+ and Tc- of each
     joint, ``"coulomb"`` B and a symmetric Tc, ``"viscous"`` B; ``"none"`` keeps the friction of the
     description. ``rotor_inertia``: whether the inertia of the rotors is estimated. ``payload``: a known body
-    at the tool during the measurement, a :class:`Payload` or kg. Samples of a joint that moves with less
-    than ``min_speed`` (rad/s or m/s) have no effect, because static friction is not in the model.
+    at the tool during the measurement, a :class:`Payload` or kg. Samples of a joint that moves with less than
+    ``min_speed`` (rad/s or m/s) have no effect, because static friction is not in the model.
 
     The torque of each joint has its own unknown noise, from which the weights follow (iterated weighted least
-    squares). ``robust``: Huber's weights, for torques with outliers. Springs and gravity are those of the
+    squares). ``robust``: Huber's weights, for torques with outliers. Springs and gravity are taken from the
     description.
 
     Raises InputError for unsuitable data, UnknownNameError for unknown links and columns, RobotError for

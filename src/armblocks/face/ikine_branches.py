@@ -214,7 +214,7 @@ def configuration_of(form: ClosedForm, letters: object) -> int:
             f"configuration={letters!r}",
             where=where,
             allowed="l or r (left, right), u or d (elbow up, down), n or f (wrist not flipped, flipped)",
-            fix="write for example configuration='lun'; missing letters are those of 'lun'",
+            fix="write for example configuration='lun'; missing letters are taken from 'lun'",
         )
     side, elbow, wrist = (found[0] if found else default for found, default in zip(chosen, "lun"))
     second, third = chain.axes[1:3]

@@ -34,7 +34,7 @@ FREE_RESTARTS = 10
 FLAT = 1e-3
 """The nearest pose is found if the gradient, relative to error and Jacobian, is smaller than this."""
 BORDER = 0.01
-"""Smallest size of the Jacobian of permitted motions, relative to that of all joints, in this comparison."""
+"""Smallest size of the Jacobian of permitted motions here, relative to the Jacobian of all joints."""
 NEAR = 1e-6
 """Error (m, rad) below which the search has ended near a solution."""
 SLACK = 1e-9
@@ -48,7 +48,7 @@ class _Ranges(NamedTuple):
     high: Array
 
     def excess(self, q: Array) -> Array:
-        """By how much the coordinates (nq,) are outside."""
+        """The distances (nq,) of the coordinates beyond these limits."""
         return np.maximum(np.maximum(self.low - q, q - self.high) - SLACK, 0.0)
 
 
@@ -148,7 +148,7 @@ class ClosedLoopCall:
         return q, MAX_STEPS
 
     def closed(self, q: Array) -> Array:
-        """The configuration near ``q`` that satisfies the constraints as far as the method reaches it."""
+        """The configuration near ``q`` that satisfies the constraints, or the last one of the iteration."""
         return self._mechanism.descended(q)
 
     def tangents(self, q: Array) -> Array:
@@ -189,7 +189,7 @@ class ClosedLoopCall:
         return not ranges.excess(q).any() and not dependent_excess(self._robot, q[np.newaxis]).any()
 
     def limit_excess(self, q: Array) -> Array:
-        """By how much coordinates exceed the limits of their joints."""
+        """The distances of coordinates beyond the limits of their joints."""
         return self._limits.excess(q)
 
     @property
@@ -203,7 +203,7 @@ class ClosedLoopCall:
         return tuple(entry.name for entry in self._robot.positions)
 
     def _equations(self, q: Array, T: Array) -> tuple[Array, Array]:
-        """What a step K dq has to be: pose error and negative residuals of the closures; and K."""
+        """Right-hand side (pose error, negative residuals of closures) of ``K dq = …``, and the matrix K."""
         e, J = self.error(q, T)
         residuals, A = self._mechanism.equations(q)
         return np.concatenate((e, -residuals)), np.vstack((J, A))

@@ -111,7 +111,7 @@ class Reasons:
         return self.arm.search.solve(targets, starts, settings, prepared.bounds, prepared.table)
 
     def _accept(self, rows: NDArray[np.intp], new: Solutions, which: NDArray[np.bool_]) -> None:
-        """Replace the results of ``rows`` by those of another search, and add its counts."""
+        """Replace the results of ``rows`` by the results of another search, and add its counts."""
         self.found.q[rows] = new.q[which]
         self.found.numbers[rows] = new.numbers[which]
         self.found.counts[rows, Count.STEPS] += new.counts[which, Count.STEPS]

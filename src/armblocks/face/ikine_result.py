@@ -114,7 +114,7 @@ class IkineResult(metaclass=ArgumentErrors):
         return "\n".join(lines)
 
     def _direction(self) -> str:
-        """The largest component of the lost direction, in words."""
+        """The sign and the axis of the largest component of the lost direction, such as ``-x``."""
         k = int(np.argmax(np.abs(self.lost_direction)))
         return f"{'-' if self.lost_direction[k] < 0.0 and k < 3 else ''}{AXES[k]}"
 

@@ -40,7 +40,7 @@ _TORQUES = {
     "kN": 1e3,
 }
 _FEWEST = 20
-"""Segments with fewer samples are left out, because a filter has nothing to work with."""
+"""Segments with fewer samples are omitted, because they are too short for a filter."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

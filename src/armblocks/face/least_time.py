@@ -29,7 +29,7 @@ _ROUNDING = 1e-12
 _QUARTERS = np.array([0.25, 0.75])
 _SMALL, _ACCEPTED = 8e-4, 2e-2
 """Excess over a limit between grid points, relative to the limit: above the first number the limits are
-corrected, above the second one the motion is an error."""
+corrected, above the second one an error is raised."""
 _ROUNDS, _CORRECTION = 8, 1.3
 """Maximum number of corrections, and the multiple of the excess by which each one reduces the limits."""
 
@@ -64,7 +64,7 @@ def least_time(
     :class:`Payload`, or a mass (kg) at the tool. ``grid``: least number of segments of the path; ``dt``: time
     between samples, s.
 
-    Torques are those of ``arm.rne``: rigid bodies, payload, rotor inertia, gravity, viscous and Coulomb
+    Torques are computed as by ``arm.rne``: rigid bodies, payload, rotor inertia, gravity, viscous and Coulomb
     friction of the motion. Source: Pham and Pham, A new approach to time-optimal path parameterization based
     on reachability analysis, IEEE Trans. Robotics 2018; viscous friction and the limits between grid points
     are added by iteration. The acceleration jumps at each segment of the grid. Strong viscous friction can
@@ -119,7 +119,7 @@ def motion_limits(
     acceleration: ArrayLike | None = None,
     torque: ArrayLike | None = None,
 ) -> MotionLimits:
-    """The limits of a motion, by default those of the robot."""
+    """The limits of a motion, by default the limits of the robot."""
 
     def given(name: str, value: ArrayLike | None, default: Array) -> Array:
         return default if value is None else joint_limits(name, value, arm.n, where, infinite=True)

@@ -155,8 +155,8 @@ def frequency_response(
 ) -> NDArray[np.complex128]:
     """The response (N, ny, nu) of a diagram's linear system at angular frequencies (N,) in rad/s.
 
-    Dead time is exact, ``exp(-j w T)``, also inside loops. Arguments and errors are those of
-    :func:`linearize`; dead time together with sampled blocks raises ``InputError``.
+    Dead time is exact, ``exp(-j w T)``, also inside loops. Arguments and errors as for :func:`linearize`;
+    dead time together with sampled blocks raises ``InputError``.
     """
     check_settings(settings, frequency_response)
     resolved = resolved_diagram(diagram, parameters)
@@ -211,7 +211,7 @@ class _PreparedLinearisation:
 
 
 def _units(system: HybridSystem, path: str) -> tuple[str, ...]:
-    """Units of the scalars of an input: those of its signal or parameter."""
+    """Units of the scalars of an input: the units of its signal or parameter."""
     slot = system.parameters[path]
     point, _, name = path.rpartition(".")
     signal = f"{point}/y"

@@ -173,11 +173,11 @@ def simulate(
     :class:`SimulationOptions`. ``parameters`` changes parameters of blocks, ``{"jtraj.tmax": 5.0}``; tunable
     parameters need no new compilation. ``progress(time, fraction, real_time_factor)`` is called repeatedly
     during a long run. ``initial_state``: another run's ``final_state``, or the file that its ``save`` wrote;
-    the run continues from there to ``stop_time``. Without other changes the result is exactly that of one
-    longer run. An operating point, such as that of ``trim``, is also valid: the run begins at its time.
-    ``log``: a ``.parquet`` or ``.csv`` file to which all signals, or the ``log_signals``, are written during
-    the run. Memory use is then independent of the duration, and the result holds a subset of rows with all
-    extremes.
+    the run continues from there to ``stop_time``. Without other changes the result equals the result of one
+    longer run exactly. An operating point, such as the result of ``trim``, is also valid: the run begins at
+    its time. ``log``: a ``.parquet`` or ``.csv`` file to which all signals, or the ``log_signals``, are
+    written during the run. Memory use is then independent of the duration, and the result holds a subset of
+    rows with all extremes.
 
     Raises ``InputError`` for a setting out of range, ``UnknownNameError`` for an unknown argument,
     ``SimulationError`` (with the ``partial`` result) if the run fails.
@@ -205,7 +205,7 @@ def begin(
 ) -> DiagramRun:
     """Create a run of a diagram that can be paused, inspected and tuned; ``advance`` starts it.
 
-    Arguments and errors are those of :func:`simulate`.
+    Arguments and errors as for :func:`simulate`.
     """
     check_settings(settings, begin)
     model = diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)

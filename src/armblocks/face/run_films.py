@@ -1,4 +1,4 @@
-"""Films of runs: the arms of a diagram in motion."""
+"""Videos of runs: the arms of a diagram in motion."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from armblocks.robot.geometry import link_frames
 from armblocks.simulation import SimulationResult
 
 MAX_ARMS = 4
-"""Maximum number of arms in a film."""
+"""Maximum number of arms in a video."""
 
 
 def write_film(
@@ -38,12 +38,12 @@ def write_film(
     view: tuple[float, float] | None = None,
     progress: FilmProgress | None = None,
 ) -> Path:
-    """Write a film of the arms of a run, side by side, as a ``.mp4`` or ``.gif`` file; returns the path.
+    """Write a video of the arms of a run, side by side, as a ``.mp4`` or ``.gif`` file; returns the path.
 
-    The arms are those of the report: one for each signal of joint coordinates, at most four. ``rate``: frames
-    per second. ``speed`` 2 plays the run twice as fast. ``size``: width and height, px. ``view``: azimuth
-    and elevation of the camera, degrees. ``progress(done, all)`` is called after each frame. The file is
-    replaced when the film is complete; Ctrl-C leaves an existing file unchanged.
+    The video shows the arms of the report: one for each signal of joint coordinates, at most four. ``rate``:
+    frames per second. ``speed`` 2 plays the run twice as fast. ``size``: width and height, px. ``view``:
+    azimuth and elevation of the camera, degrees. ``progress(done, all)`` is called after each frame. The file
+    is replaced when the video is complete; Ctrl-C leaves an existing file unchanged.
 
     Raises InputError if the diagram has no moving arm and for values out of range, UnknownNameError for
     another suffix, MissingLibraryError without the extra ``film``, FormatError if the file cannot be written.
@@ -52,7 +52,7 @@ def write_film(
 
     check_type(diagram, Diagram, "a Diagram", where="write_film")
     check_type(result, SimulationResult, "the result of simulate", where="write_film")
-    where = f"film of '{diagram.name}'"
+    where = f"video of '{diagram.name}'"
     look = Appearance.checked(theme, size, view, where)
     target = Path(path)
     rate = exact_rate(target, rate) if rate > 0 else rate
@@ -70,8 +70,8 @@ def write_film(
         raise InputError(
             f"the run has {counted(len(arms), 'arm')}",
             where=where,
-            allowed=f"at most {MAX_ARMS} arms in a film",
-            fix="make a film of each arm with Arm.animate",
+            allowed=f"at most {MAX_ARMS} arms in a video",
+            fix="write a video of each arm with Arm.animate",
         )
     times = frame_times(float(result.time[0]), float(result.time[-1]), rate, speed)
     check_film(target, len(times), sides)

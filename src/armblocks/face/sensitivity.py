@@ -42,7 +42,7 @@ class SensitivityResult(metaclass=ArgumentErrors):
     outputs: tuple[str, ...]
     parameters: tuple[str, ...]
     slots: Signature = field(repr=False)
-    """The parameters with their shapes, also those of which only entries were chosen."""
+    """The parameters with their shapes, also if only some entries of a parameter were chosen."""
 
     @property
     def time(self) -> Array:

@@ -30,7 +30,7 @@ _NAMES = frozenset(RunSettings.__annotations__)
 
 
 class _DiagramDefault:
-    """Default of a setting in signatures: the value of the diagram."""
+    """The default in signatures for the value of the diagram."""
 
     def __repr__(self) -> str:
         return "<the diagram's>"

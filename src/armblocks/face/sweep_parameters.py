@@ -138,7 +138,7 @@ class RunParameters:
             raise _of_run(error, run) from None
 
     def _check_values(self) -> None:
-        """Check the values of all fast columns: each by its rule, and those of a block together."""
+        """Check the values of fast columns: each value by its rule, the values of a block together."""
         blocks: dict[str, list[str]] = {}
         for name in self._fast:
             blocks.setdefault(_block_of(name), []).append(name)

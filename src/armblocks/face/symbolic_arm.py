@@ -23,8 +23,8 @@ class SymbolicArm(metaclass=ArgumentErrors):
     ``qdd1``, for another name ``name_d`` and ``name_dd``; ``symbols`` (k,) of lengths, masses, inertias and
     gravity, which :meth:`with_symbols` and :func:`symbolic_dh` introduce. ``names`` lists all names.
 
-    The methods return a :class:`SymbolicExpression`. The equations are those of :class:`Arm`, with the
-    same frames, units, friction and springs.
+    The methods return a :class:`SymbolicExpression`. The equations are the equations of :class:`Arm`, with
+    the same frames, units, friction and springs.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class SymbolicArm(metaclass=ArgumentErrors):
     # ---- symbols -----------------------------------------------------------------------------------------
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of all symbols: those of q, qd, qdd, then those of the user."""
+        """The names of all symbols: q, qd, qdd, then the symbols of the user."""
         return self._equations.names
 
     @property

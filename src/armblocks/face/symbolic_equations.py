@@ -46,7 +46,7 @@ class SymbolicEquations:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of all symbols: q, qd, qdd, then those of the user."""
+        """The names of all symbols: q, qd, qdd, then the symbols of the user."""
         return tuple(name for names in self.names_of_inputs for name in names)
 
     @cached_property
@@ -68,7 +68,7 @@ class SymbolicEquations:
 
     @cached_property
     def inputs(self) -> tuple[SX, ...]:
-        """The symbols: the columns q, qd, qdd and those of the user."""
+        """The symbols: the columns q, qd, qdd and the symbols of the user."""
         return tuple(
             SX(vertcat(*map(SX.sym, names))) if names else SX(0, 1) for names in self.names_of_inputs
         )

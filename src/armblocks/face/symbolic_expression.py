@@ -28,8 +28,8 @@ class SymbolicExpression(metaclass=ArgumentErrors):
 
     ``casadi``: the expression as traced, an ``SX`` in natural shape (a vector is a column), for CasADi's own
     functions. ``shape``: (4, 4), (6, n), (n,) or () of a scalar. All other forms are simplified: products of
-    sines and cosines of parallel axes become those of the sum of the angles, and common factors are taken
-    out. Numbers have 12 digits there. ``T[0, 3]`` is an entry.
+    sines and cosines of parallel axes become sines and cosines of the sum of the angles, and common factors
+    are taken out. Numbers then have 12 digits. ``T[0, 3]`` is an entry.
 
     ``str`` and the notebook have the short form of textbooks, ``l1 c1 + l2 c12`` with ``c12 = cos(q1 + q2)``
     by the numbers of the joints.
@@ -105,7 +105,7 @@ class SymbolicExpression(metaclass=ArgumentErrors):
         """The expression in SymPy: a scalar, or a ``Matrix`` (a vector is a column).
 
         Needs the extra ``symbolic``. The symbols are real and have the names of ``SymbolicArm.names``.
-        Integers and halves are exact, also those of angles of 90 degrees; other numbers have 15 digits. An
+        Integers and halves are exact, also from angles of 90 degrees; other numbers have 15 digits. An
         expression whose expansion needs more than 200 000 products is not simplified.
         """
         from armblocks.algebra import sympy_export

@@ -29,7 +29,8 @@ FRICTION: dict[str, tuple[str, ...]] = {
 
 INERTIAL = ("m", "mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Iyz", "Ixz")
 _OF_MOTORS = ("Jm", "B", "Tc", "Tc+", "Tc-")
-# Parameters of a link that come first remain; others are combined with them where only a sum has an effect.
+# Where only a sum of parameters has an effect, the first one in this order remains and the others are added
+# to it.
 _PREFERRED = ("B", "Tc", "Tc+", "Tc-", "Izz", "Ixx", "Ixy", "Iyz", "Ixz", "mx", "my", "Jm", "Iyy", "mz", "m")
 _SEED = 20261127
 _STATES = 60
@@ -141,7 +142,7 @@ class TorqueModel:
         return base, effect > 1e-12 * np.maximum(effect.max(axis=0), 1e-300)
 
     def _preference(self, index: int) -> tuple[int, int]:
-        """Links near the base come first, motors last, so that parameters are added to those of a parent."""
+        """Links near the base come first, motors last: parameters are added to parameters of the parent."""
         quantity = self.names[index].rpartition(".")[2]
         link = index // 10 if index < 10 * len(self.links) else len(self.links)
         return link, _PREFERRED.index(quantity)

@@ -112,7 +112,7 @@ def ascending(name: str, value: ArrayLike, count: int, where: str) -> Array:
 
 
 def sample_times(t: ArrayLike | int, where: str, *, step: float | None = None) -> Array:
-    """Times from 0, or those of a number of samples: 0 to 1, or multiples of ``step``."""
+    """Times from 0; for a number of samples, times from 0 to 1 or multiples of ``step``."""
     count = sample_count(t)
     if count is not None:
         if count < 2:

@@ -225,7 +225,7 @@ def trajectory_report(
 ) -> TrajectoryReport:
     """The report of a trajectory of ``arm``: cycle time, peaks and limits, the binding limit at each time.
 
-    The limits are those of :func:`~armblocks.least_time`; torques are those of ``arm.rne`` with the
+    The limits are defined as for :func:`~armblocks.least_time`; torques are computed by ``arm.rne`` with the
     ``payload``. In a cycle of :func:`~armblocks.pick_and_place` the payload is at the tool only in the loaded
     phases. Raises InputError for a trajectory with another number of joints.
     """

@@ -95,7 +95,7 @@ def trim(
 
 
 def _slot_name(layout: Signature, name: str, kind: str, system: HybridSystem) -> str:
-    """The name of a slot: the given name, or that of the only slot of the named block."""
+    """The name of a slot: the given name, or the name of the only slot of the named block."""
     if name in layout.ranges:
         return name
     separator = "." if kind == "parameter" else "/"

@@ -1,6 +1,6 @@
-"""Films: frames of equal size, encoded as GIF (by Pillow) or as MP4 (by ffmpeg).
+"""Videos: frames of equal size, encoded as GIF (by Pillow) or as MP4 (by ffmpeg).
 
-A film is written frame by frame to a temporary file, which is renamed when the film is complete. Only a few
+A video is written frame by frame to a temporary file, which is renamed when the video is complete. Only a few
 frames are in memory. After an error or Ctrl-C, an existing file of that name is unchanged.
 """
 
@@ -42,10 +42,10 @@ _PALETTE_SAMPLES = 5
 
 
 def film_suffix(path: str | Path) -> str:
-    """The suffix of a film in lower case. Raises ``UnknownNameError`` for other suffixes."""
+    """The suffix of a video in lower case. Raises ``UnknownNameError`` for other suffixes."""
     suffix = Path(path).suffix.lower()
     if suffix not in FILM_SUFFIXES:
-        raise UnknownNameError("format of films", suffix, FILM_SUFFIXES, where=str(path))
+        raise UnknownNameError("format of videos", suffix, FILM_SUFFIXES, where=str(path))
     return suffix
 
 
@@ -62,11 +62,11 @@ def check_film(path: str | Path, count: int, size: tuple[int, int]) -> None:
     Raises ``MissingLibraryError``, ``InputError``, and ``UnknownNameError`` for another suffix.
     """
     suffix = film_suffix(path)
-    with from_extra("film", f"{suffix[1:].upper()} films"):
+    with from_extra("film", f"{suffix[1:].upper()} videos"):
         importlib.import_module("PIL.Image" if suffix == ".gif" else "imageio_ffmpeg")
     if count > MAX_FRAMES[suffix]:
         raise InputError(
-            f"the film has {count} frames",
+            f"the video has {count} frames",
             where=str(path),
             allowed=f"at most {MAX_FRAMES[suffix]} frames in {suffix} files",
             fix="give a lower rate=, a higher speed=, or write an .mp4 file"
@@ -89,7 +89,7 @@ def write_film(
     rate: float,
     progress: FilmProgress | None = None,
 ) -> Path:
-    """Write a film of the frames ``frame(0)`` to ``frame(count - 1)`` with ``rate`` frames per second.
+    """Write a video of the frames ``frame(0)`` to ``frame(count - 1)`` with ``rate`` frames per second.
 
     The suffix ``.gif`` or ``.mp4`` selects the format. H.264 requires even sizes: if the size of MP4 frames
     is odd, a row or column is removed. Raises as :func:`check_film`, and ``FormatError`` if the file cannot
@@ -150,7 +150,7 @@ def _mp4(file: GrowingFile, first: Pixels, rate: float) -> Generator[None, Pixel
     except OSError as error:
         reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
         raise FormatError(
-            f"ffmpeg cannot write the film ({reason})",
+            f"ffmpeg cannot write the video ({reason})",
             where=str(file.path),
             fix="check the free space, or write a .gif file",
         ) from error
@@ -214,6 +214,6 @@ def _changed(before: NDArray[np.uint8] | None, after: NDArray[np.uint8]) -> tupl
 def frame_times(begin: float, end: float, rate: float, speed: float) -> NDArray[np.float64]:
     """The times (s) of the frames from ``begin`` to ``end``, both included.
 
-    ``rate``: frames per second of the film, which is played ``speed`` times as fast as the motion.
+    ``rate``: frames per second of the video, which is played ``speed`` times as fast as the motion.
     """
     return np.linspace(begin, end, max(1, round((end - begin) / speed * rate) + 1))

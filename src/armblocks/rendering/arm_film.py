@@ -1,4 +1,4 @@
-"""Pictures of moving arms: the frames of a film, and a motion as one picture."""
+"""Pictures of moving arms: the frames of a video, and a motion as one picture."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _Array = NDArray[np.float64]
 FRAMED_POSES = 60
 """Maximum number of poses from which the camera of a motion is placed."""
 FILM_RASTER_SCALE = 1.0
-"""Rendered pixels of the bodies per px of a frame: films have one pixel per px."""
+"""Rendered pixels of the bodies per px of a frame: videos have one pixel per px."""
 _NARROW = 420.0
 """Frames narrower than this, px, show the time without the position of the tool."""
 
@@ -130,7 +130,7 @@ class MotionView:
 
 @dataclass(frozen=True, eq=False)
 class FilmView:
-    """The frames of a film: one panel for each motion, side by side, at the same time."""
+    """The frames of a video: one panel for each motion, side by side, at the same time."""
 
     views: tuple[MotionView, ...]
 
@@ -143,7 +143,7 @@ class FilmView:
         *,
         view: tuple[float, float] = (AZIMUTH, ELEVATION),
     ) -> FilmView:
-        """A film of ``width`` x ``height`` px; the motions share the width."""
+        """A video of ``width`` x ``height`` px; the motions share the width."""
         panel_width = width // len(motions)
         return cls(
             tuple(

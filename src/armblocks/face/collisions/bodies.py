@@ -21,7 +21,7 @@ Indices = NDArray[np.intp]
 SIDES = 24
 """Sides of the prism around a cylinder, which is larger than the cylinder by at most 0.9 % of its radius."""
 MAX_POINTS = 120
-"""Maximum number of points of a hull; of more, those are used that are extreme in uniform directions."""
+"""Maximum number of points of a hull; otherwise only points extreme in uniform directions are used."""
 _CORNERS = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 
 

@@ -36,15 +36,16 @@ def collisions(
     """The least distance of every two bodies along a motion, and when they first touch.
 
     Bodies are the base, the links and the ``obstacles`` (:class:`Box`, :class:`Sphere`, :class:`Cylinder`,
-    :class:`Plane`). The shapes of a link are those of its file, each one as its convex hull; a link without
-    shapes has the castings of its drawing. ``motion``: a trajectory, or configurations (nq,) or (N, nq), of
-    which only these are checked. Bodies touch where their distance is at most ``margin`` (m). The hull of a
-    mesh with more than 120 vertices may be too small: it has only those extreme in 120 directions.
+    :class:`Plane`). Each shape in the file of a link is replaced by its convex hull. A link without shapes
+    has the castings of its drawing. ``motion``: a trajectory, or configurations (nq,) or (N, nq), of which
+    only these are checked. Bodies touch where their distance is at most ``margin`` (m). The hull of a mesh
+    with more than 120 vertices may be too small: it has only those extreme in 120 directions.
 
-    Links that a joint or a closure connects are not compared with each other, nor the base with obstacles,
-    nor pairs that touch in almost all configurations (such as the links of a wrist), nor the pairs of names
-    in ``ignore``; the result lists them. Between two samples of a trajectory no body moves by more than about
-    ``resolution`` (m), so that only shorter contacts are missed. Times of contacts are located by bisection.
+    Four kinds of pairs are not compared: links that a joint or a closure connects, the base and an obstacle,
+    pairs that touch in almost all configurations (such as the links of a wrist), and the pairs of names in
+    ``ignore``. The result lists these pairs. Between two samples of a trajectory no body moves by more than
+    about ``resolution`` (m), so that only shorter contacts are missed. Times of contacts are located by
+    bisection.
 
     Raises UnknownNameError for an unknown name in ``ignore``, InputError for motions of another robot.
     """
@@ -155,7 +156,7 @@ def _times(scene: Scene, path: JointTrajectory, step: float) -> Array:
 def _inside_pieces(path: JointTrajectory, first: Array) -> Array:
     """The ends and quarters of the pieces of a motion that are shorter than two of the ``first`` times.
 
-    A motion there and back between two of the first times would otherwise seem to be a rest.
+    Without them, a motion that returns between two of the first times would look like a rest.
     """
     knots = np.unique(path.rows()[:, 0])
     knots = knots[:: math.ceil(len(knots) / MAX_SAMPLES)]

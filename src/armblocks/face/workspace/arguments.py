@@ -102,7 +102,7 @@ def _assumed(
         )
     turn = 2.0 * math.pi
     start = low if math.isfinite(low) else high - turn if math.isfinite(high) else -math.pi
-    notes.append(f"{name} has no limits and makes one turn")
+    notes.append(f"{name} has no limits and is sampled over one turn")
     return start, start + turn
 
 
@@ -134,7 +134,7 @@ def checked_measures(measures: str | Sequence[str], where: str) -> tuple[str, ..
 
 
 def checked_axes(axes: str | None, n: int, where: str) -> str:
-    """The rows of the Jacobian: by default all of them for six joints or more, else those of translation."""
+    """The rows of the Jacobian: by default all rows for six joints or more, else the rows of translation."""
     chosen = ("all" if n >= 6 else "trans") if axes is None else axes
     axis_rows(chosen, where)
     return chosen

@@ -20,7 +20,7 @@ Counts = NDArray[np.int64]
 Statistic = Literal["most", "least", "mean"]
 
 UNITS = {"manipulability": "", "singularity": "", "condition": "", "limits": "", "payload": "kg"}
-"""The measures and their units; those of ``"manipulability"`` and ``"singularity"`` depend on the joints."""
+"""The measures and their units; empty: the unit depends on the joints."""
 STATISTICS = ("most", "least", "mean")
 AXES = ("x", "y", "z")
 
