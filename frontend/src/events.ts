@@ -28,7 +28,7 @@ import {
 const wireKey = (wire: Wire) => `${wire.source} -> ${wire.target}`
 
 function withChange(document: OpenDocument, state: DocumentState, change: ChangeOf<'diagram'>): OpenDocument {
-  const { sheet, settings } = change
+  const { sheet, settings, scope_trigger: scopeTrigger } = change
   const blocks = { ...document.blocks }
   for (const [name, block] of Object.entries(sheet.blocks)) {
     if (block) blocks[name] = block
@@ -44,6 +44,7 @@ function withChange(document: OpenDocument, state: DocumentState, change: Change
     ...document,
     state,
     settings,
+    scopeTrigger,
     blocks,
     name: document.inside.length ? document.name : state.title,
     wires: [...document.wires.filter((wire) => !removed.has(wireKey(wire))), ...sheet.wires_added],
@@ -121,7 +122,7 @@ function opened<Kind extends DocumentKind>(
 
 function diagramOpened({ state, in_front }: EventOf<'opened'>, content: ContentOf<'diagram'>): void {
   const { document, run } = useStudio.getState()
-  const { sheet, inside, settings } = content
+  const { sheet, inside, settings, scope_trigger: scopeTrigger } = content
   const isShown = document?.state.document === state.document
   // Without a shown diagram, the next one is shown behind the robot editor.
   if (!isShown && !in_front && document) return
@@ -134,6 +135,7 @@ function diagramOpened({ state, in_front }: EventOf<'opened'>, content: ContentO
     state,
     inside,
     settings,
+    scopeTrigger,
     ...sheet,
     outerComment: content.outer_comment,
     findings: isShown ? document.findings : [],

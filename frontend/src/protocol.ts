@@ -146,6 +146,7 @@ export interface Change {
     | RenameParameterSet
     | RenamePose
     | SaveParameterSet
+    | SetScopeTrigger
     | SetSettings
     | UpdatePose;
 }
@@ -555,6 +556,27 @@ export interface SaveParameterSet {
   };
   all_parameters?: boolean;
   replace?: boolean;
+}
+/**
+ * Set the trigger of the scopes; ``None`` restores the default, which is off.
+ */
+export interface SetScopeTrigger {
+  kind: "scope_trigger";
+  trigger: ScopeTriggerSettings | null;
+}
+/**
+ * The trigger of the scopes, see :class:`~armblocks.diagram.ScopeTrigger`.
+ */
+export interface ScopeTriggerSettings {
+  on: boolean;
+  signal: string;
+  element: number;
+  edge: "rising" | "falling" | "either";
+  level: number;
+  mode: "normal" | "auto" | "single";
+  span: number;
+  position: number;
+  hold_off: number;
 }
 /**
  * Change run settings, by the names of ``SimulationOptions``; ``None`` restores the default.
@@ -1051,6 +1073,7 @@ export interface DiagramChange {
   settings: {
     [k: string]: boolean | number | string | null;
   };
+  scope_trigger: ScopeTriggerSettings | null;
   outer_comment: OuterComment | null;
   renamed?: {
     [k: string]: string;
@@ -1308,6 +1331,7 @@ export interface DiagramContent {
   settings: {
     [k: string]: boolean | number | string | null;
   };
+  scope_trigger: ScopeTriggerSettings | null;
   run: string | null;
   outer_comment: OuterComment | null;
 }

@@ -13,6 +13,7 @@ import type {
   Finding,
   OuterComment,
   Recovery,
+  ScopeTriggerSettings,
   SheetBlock,
   SheetNote,
   Tunable,
@@ -28,6 +29,8 @@ export interface OpenDocument {
   state: DocumentState
   /** The run settings, by the names of `SimulationOptions`. */
   settings: Record<string, boolean | number | string | null>
+  /** The trigger of the scopes; null: the default. */
+  scopeTrigger: ScopeTriggerSettings | null
   /** Names of the subsystems that lead to the displayed sheet. */
   inside: string[]
   name: string

@@ -1,3 +1,5 @@
+import type { ScopeTriggerSettings } from '../protocol'
+
 /** Directions in which a signal crosses the trigger level. */
 export type Edge = 'rising' | 'falling' | 'either'
 
@@ -41,26 +43,22 @@ export function settingsOf(trigger: TriggerSettings): TriggerSettings {
   return { on, channel, element, edge, level, mode, span, position, holdOff }
 }
 
-const EDGES: unknown[] = ['rising', 'falling', 'either'] satisfies Edge[]
-const MODES: unknown[] = ['normal', 'auto', 'single'] satisfies Mode[]
+/** Whether two triggers have the same settings. */
+export const isSameTrigger = (one: TriggerSettings, other: TriggerSettings): boolean =>
+  (Object.keys(INITIAL_TRIGGER) as (keyof TriggerSettings)[]).every((name) => one[name] === other[name])
 
-/** Whether data that the browser stored are valid settings of a trigger. */
-export function isTriggerSettings(stored: unknown): stored is TriggerSettings {
-  if (typeof stored !== 'object' || stored === null) return false
-  const { on, channel, element, edge, level, mode, span, position, holdOff } = stored as TriggerSettings
-  return (
-    typeof on === 'boolean' &&
-    typeof channel === 'string' &&
-    [element, level, span, position, holdOff].every(Number.isFinite) &&
-    Number.isInteger(element) &&
-    element >= 0 &&
-    EDGES.includes(edge) &&
-    MODES.includes(mode) &&
-    span > 0 &&
-    position >= 0 &&
-    position <= 1 &&
-    holdOff >= 0
-  )
+/** The settings of the trigger of a diagram; a diagram without a trigger has the initial settings. */
+export function fromMessage(message: ScopeTriggerSettings | null): TriggerSettings {
+  if (!message) return INITIAL_TRIGGER
+  const { signal: channel, hold_off: holdOff, ...others } = message
+  return { ...others, channel, holdOff }
+}
+
+/** The trigger of a diagram with these settings. */
+export function toMessage(settings: TriggerSettings): ScopeTriggerSettings | null {
+  if (isSameTrigger(settings, INITIAL_TRIGGER)) return null
+  const { channel: signal, holdOff: hold_off, ...others } = settingsOf(settings)
+  return { ...others, signal, hold_off }
 }
 
 interface Samples {

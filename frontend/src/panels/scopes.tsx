@@ -3,7 +3,7 @@ import type { Panel } from '../panel'
 import { useStudio } from '../store'
 
 const Scopes = deferred(async () => {
-  await import('../scopes/stored_triggers')
+  await import('../scopes/document_trigger')
   return (await import('../scopes/scopes')).Scopes
 }, 'Loading the scopes …')
 

@@ -1,10 +1,11 @@
 import { describe, expect, it } from 'vitest'
 import {
+  fromMessage,
   INITIAL_TRIGGER,
-  isTriggerSettings,
-  settingsOf,
+  isSameTrigger,
   shownTimes,
   shownTrigger,
+  toMessage,
   TriggerDetector,
   type Edge,
   type Mode,
@@ -136,31 +137,28 @@ describe('the window of a triggered scope', () => {
   })
 })
 
-describe('stored settings', () => {
-  it('are read as they were written, without the displayed trigger', () => {
-    const settings = { ...INITIAL_TRIGGER, on: true, channel: 'rne/tau', element: 2, level: -1.5, span: 0.1 }
+describe('the trigger of a diagram', () => {
+  it('has the settings that were sent, without the displayed trigger', () => {
+    const settings = { ...INITIAL_TRIGGER, on: true, channel: 'rne/tau', element: 2, level: -1.5, holdOff: 2 }
     const trigger = { ...settings, chosen: 3, armedAt: 1, count: 5, index: 3, at: 0.2 }
-    const written: unknown = JSON.parse(JSON.stringify(settingsOf(trigger)))
-    expect(written).toEqual(settings)
-    expect(isTriggerSettings(written)).toBe(true)
+    expect(toMessage(trigger)).toEqual({
+      on: true,
+      signal: 'rne/tau',
+      element: 2,
+      edge: 'rising',
+      level: -1.5,
+      mode: 'normal',
+      span: 1,
+      position: 0.5,
+      hold_off: 2,
+    })
+    expect(fromMessage(toMessage(trigger))).toEqual(settings)
+    expect(isSameTrigger(settings, trigger)).toBe(true)
+    expect(isSameTrigger(settings, { ...settings, holdOff: 0 })).toBe(false)
   })
 
-  it.each([
-    null,
-    'on',
-    [],
-    {},
-    { ...INITIAL_TRIGGER, on: 1 },
-    { ...INITIAL_TRIGGER, channel: null },
-    { ...INITIAL_TRIGGER, element: 0.5 },
-    { ...INITIAL_TRIGGER, element: -1 },
-    { ...INITIAL_TRIGGER, edge: 'up' },
-    { ...INITIAL_TRIGGER, mode: '' },
-    { ...INITIAL_TRIGGER, level: NaN },
-    { ...INITIAL_TRIGGER, span: 0 },
-    { ...INITIAL_TRIGGER, position: 1.1 },
-    { ...INITIAL_TRIGGER, holdOff: -1 },
-  ])('are ignored if they are invalid: %j', (stored) => {
-    expect(isTriggerSettings(stored)).toBe(false)
+  it('is not stored while all settings are the initial ones', () => {
+    expect(toMessage({ ...INITIAL_TRIGGER })).toBeNull()
+    expect(fromMessage(null)).toEqual(INITIAL_TRIGGER)
   })
 })

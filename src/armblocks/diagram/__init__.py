@@ -53,6 +53,7 @@ from armblocks.diagram.port import (
     ViewKind,
 )
 from armblocks.diagram.sampling import sample_time_parameter
+from armblocks.diagram.scope_trigger import ScopeTrigger
 from armblocks.diagram.shape_rules import broadcast
 from armblocks.diagram.shapes import DiagramShapes, infer_shapes
 from armblocks.diagram.structure import (
@@ -116,6 +117,7 @@ __all__ = [
     "PortContent",
     "PortRef",
     "ResettableSubsystem",
+    "ScopeTrigger",
     "Shapes",
     "Signals",
     "SlotKind",

@@ -18,6 +18,7 @@ from armblocks.diagram.names import check_block_name, check_signal_names, folded
 from armblocks.diagram.parameter import Parameter, Value
 from armblocks.diagram.parameter_sets import check_set_name, checked_set, set_location
 from armblocks.diagram.port import PortRef
+from armblocks.diagram.scope_trigger import ScopeTrigger
 from armblocks.diagram.structure import (
     DiagramBlock,
     Inport,
@@ -102,6 +103,7 @@ class DiagramBuilder(metaclass=ArgumentErrors):
         self._bends: dict[Connection, tuple[float, ...]] = {}
         self._notes: dict[str, Note] = {}
         self._bookmarks: dict[str, Bookmark] = {}
+        self._scope_trigger: ScopeTrigger | None = None
         self._logged: dict[PortRef, None] = {}
         self._commented: dict[str, Comment] = {}
         self._signal_names: dict[PortRef, str] = {}
@@ -255,6 +257,10 @@ class DiagramBuilder(metaclass=ArgumentErrors):
         check_bookmark_name(name, self._bookmarks, f"diagram '{self.name}'")
         self._bookmarks[name] = part
 
+    def trigger_scopes(self, trigger: ScopeTrigger) -> None:
+        """Set the trigger of the scopes: the studio shows the times about a crossing of a level."""
+        self._scope_trigger = trigger
+
     def log(self, source: Source) -> None:
         """Log an output without a Scope: reports and the studio show its traces.
 
@@ -329,6 +335,7 @@ class DiagramBuilder(metaclass=ArgumentErrors):
             bends=self._bends,
             notes=self._notes,
             bookmarks=self._bookmarks,
+            scope_trigger=self._scope_trigger,
             settings=self.settings,
             extras=self._extras,
             description=self.description,

@@ -17,6 +17,7 @@ from armblocks.diagram.mask import Scope, checked_mask, values_of
 from armblocks.diagram.names import check_signal_names
 from armblocks.diagram.parameter import Parameter, Value
 from armblocks.diagram.port import PortRef
+from armblocks.diagram.scope_trigger import ScopeTrigger
 from armblocks.equations import SimulationOptions
 from armblocks.errors import ArmblocksError, DiagramError, UnknownNameError, counted
 from armblocks.lazy_exports import display_method
@@ -171,6 +172,8 @@ class Diagram(metaclass=ArgumentErrors):
     :mod:`armblocks.diagram.parameter_sets`."""
     bookmarks: Mapping[str, Bookmark] = field(default_factory=dict[str, Bookmark])
     """Parts of this sheet by name, see :mod:`armblocks.diagram.bookmarks`."""
+    scope_trigger: ScopeTrigger | None = None
+    """The trigger of the scopes of the studio; ``None`` for the default, which is off."""
     shares: Mapping[str, str] = field(default_factory=dict[str, str])
     """For a flat diagram: blocks that share the parameters of the block of the given name."""
     _cache: dict[str, object] = field(

@@ -111,9 +111,9 @@ def diagram_difference(before: Diagram, after: Diagram) -> DiagramDifference:
 
     Compared are blocks with their types, parameters and comments, connections, logged outputs, settings,
     descriptions and the text of annotations, including subsystems. Not compared are the layout, the
-    bookmarks, the name of the diagram (a file without one is named after the file) and unknown keys of a
-    file. A removed and an added block count as one renamed block if type, parameters and all connections
-    agree. The connected blocks may be renamed too.
+    bookmarks, the trigger of the scopes, the name of the diagram (a file without one is named after the file)
+    and unknown keys of a file. A removed and an added block count as one renamed block if type, parameters
+    and all connections agree. The connected blocks may be renamed too.
     """
     for diagram in (before, after):
         check_type(diagram, Diagram, "a Diagram", where="diagram_difference")

@@ -74,6 +74,7 @@ def _as_diagram(net: Netlist) -> Diagram:
         bends={},
         notes={},
         bookmarks={},
+        scope_trigger=None,
         extras={},
         gates=net.gates,
         mask=(),

@@ -24,6 +24,7 @@ for the outermost diagram under ``parameters`` of the document.
 :mod:`armblocks.diagram.parameter_sets`. Each is checked by the rule of its parameter.
 
 ``bookmarks`` has parts of the sheet by name, ``{"motor": {"height": 90, "width": 160, "x": 0, "y": 40}}``.
+``scope_trigger`` has the trigger of the scopes, see :class:`~armblocks.diagram.ScopeTrigger`.
 
 A commented block has ``"commented": "out"`` or ``"through"``, see
 :mod:`armblocks.diagram.comments`.

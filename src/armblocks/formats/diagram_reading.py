@@ -21,7 +21,12 @@ from armblocks.diagram.parameter_sets import check_value_count, settable_paramet
 from armblocks.equations import SimulationOptions
 from armblocks.errors import ArmblocksError, UnknownNameError
 from armblocks.formats.json_document import Node
-from armblocks.formats.layout_json import Layout, bookmark_from_json, connection_from_json
+from armblocks.formats.layout_json import (
+    Layout,
+    bookmark_from_json,
+    connection_from_json,
+    scope_trigger_from_json,
+)
 from armblocks.formats.located_errors import located
 from armblocks.formats.mask_json import mask_parameter_from_json
 from armblocks.formats.parameter_json import is_diagram, parameter_from_json, plain_value, with_infinities
@@ -40,6 +45,7 @@ INNER_KEYS = (
     "parameter_sets",
     "layout",
     "bookmarks",
+    "scope_trigger",
     "settings",
 )
 """The keys of a diagram inside another one."""
@@ -101,6 +107,9 @@ class DiagramReader:
         for key, entry in (members["bookmarks"].members() if "bookmarks" in members else {}).items():
             with located(entry):
                 builder.bookmark(key, bookmark_from_json(entry))
+        if "scope_trigger" in members:
+            with located(members["scope_trigger"]):
+                builder.trigger_scopes(scope_trigger_from_json(members["scope_trigger"]))
         if "parameter_sets" in members:
             self._add_parameter_sets(builder, members["parameter_sets"])
         with located(node):

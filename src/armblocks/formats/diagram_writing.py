@@ -57,6 +57,7 @@ class DiagramWriter:
             ),
             **({"parameter_sets": _parameter_sets(diagram)} if diagram.parameter_sets else {}),
             **({"bookmarks": bookmarks_to_json(diagram)} if diagram.bookmarks else {}),
+            **({"scope_trigger": dataclasses.asdict(diagram.scope_trigger)} if diagram.scope_trigger else {}),
             "layout": layout_to_json(diagram, layout_extras),
             "settings": {**extras.get("settings", {}), **settings},
         }

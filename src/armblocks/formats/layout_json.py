@@ -1,7 +1,8 @@
-"""The layout of a diagram as JSON: positions of blocks, routes of connections, notes, and bookmarks.
+"""The layout of a diagram as JSON: positions of blocks, routes, notes, bookmarks, the trigger of scopes.
 
 The key of an entry is the name of the block, the text of the connection, or for notes a name that begins with
-``/``. Entries of other programs are preserved among the extras. Bookmarks are a separate object.
+``/``. Entries of other programs are preserved among the extras. Bookmarks and the trigger are
+separate objects.
 """
 
 from __future__ import annotations
@@ -20,11 +21,13 @@ from armblocks.diagram import (
     Note,
     Placement,
     PortRef,
+    ScopeTrigger,
 )
 from armblocks.formats.json_document import Node, closed_members
 from armblocks.formats.unknown_members import Extras, members_of, split_extras
 
 _BOOKMARK = tuple(field.name for field in dataclasses.fields(Bookmark))
+_TRIGGER = {field.name: field.default for field in dataclasses.fields(ScopeTrigger)}
 _PLACEMENT = {field.name: field.default for field in dataclasses.fields(Placement)}
 _CONNECTION = re.compile(r"([^/]+)/([^/]+?) -> ([^/]+)/([^/]+)")
 
@@ -41,6 +44,29 @@ def bookmark_from_json(node: Node) -> Bookmark:
     """The part of the sheet of a bookmark; raises ``FormatError`` and ``DiagramError``."""
     members = closed_members(node, _BOOKMARK, _BOOKMARK)
     return Bookmark(**{name: member.number() for name, member in members.items()})
+
+
+def _index(node: Node) -> int:
+    number = node.number()
+    if number != int(number):
+        raise node.error(f"the value is {number:g}", allowed="an integer")
+    return int(number)
+
+
+def scope_trigger_from_json(node: Node) -> ScopeTrigger:
+    """The trigger of the scopes; raises ``FormatError`` and ``DiagramError``."""
+    values: dict[str, object] = {}
+    for name, member in closed_members(node, _TRIGGER).items():
+        match _TRIGGER[name]:
+            case bool():
+                values[name] = member.boolean()
+            case str():
+                values[name] = member.text()
+            case int():
+                values[name] = _index(member)
+            case _:
+                values[name] = member.number()
+    return ScopeTrigger(**values)  # pyright: ignore[reportArgumentType]
 
 
 def bookmarks_to_json(diagram: Diagram) -> dict[str, object]:

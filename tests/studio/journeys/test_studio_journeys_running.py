@@ -351,7 +351,7 @@ def test_a_triggered_scope_shows_the_window_about_each_crossing(opened: Opened) 
     expect(bar).to_have_count(0)
 
 
-def test_each_document_has_its_trigger_also_after_a_reload(opened: Opened) -> None:
+def test_the_trigger_is_saved_with_its_model_and_can_be_undone(opened: Opened, studio: Studio) -> None:
     page = opened(lag_model("untriggered"))
     page = opened(lag_model("with trigger"))
     run(page)
@@ -384,6 +384,28 @@ def test_each_document_has_its_trigger_also_after_a_reload(opened: Opened) -> No
         expect(bar.get_by_role("textbox", name=field)).to_have_value(text)
     expect(bar.get_by_role("combobox", name="Edge")).to_have_value("either")
     expect(bar.get_by_role("combobox", name="Mode")).to_have_value("auto")
+    expect(bar.locator(".shown-trigger")).to_contain_text(at)
+
+    # The letters typed into a field are one undo step, and undo restores the field.
+    bar.get_by_role("textbox", name="Level").fill("0.5")
+    bar.get_by_role("textbox", name="Level").press_sequentially("625")
+    page.locator(".react-flow__node").first.focus()
+    page.keyboard.press("Control+z")
+    expect(bar.get_by_role("textbox", name="Level")).to_have_value("0.5")
+    page.keyboard.press("Control+s")
+
+    def stored() -> ab.diagram.ScopeTrigger | None:
+        return ab.load_diagram(studio.folder / "with trigger.json").scope_trigger
+
+    expected = ab.diagram.ScopeTrigger(
+        signal="lag/y", edge="either", level=0.5, mode="auto", span=0.25, position=0.25, hold_off=2.0
+    )
+    wait_until(page, lambda: stored() == expected)
+    # Renamed blocks do not lose the trigger.
+    page.locator('.react-flow__node[data-id="lag"]').focus()
+    page.keyboard.press("F2")
+    page.keyboard.type("slow")
+    page.keyboard.press("Enter")
     expect(bar.locator(".shown-trigger")).to_contain_text(at)
     page.get_by_role("button", name="Trigger", exact=True).click()
     expect(bar).to_have_count(0)

@@ -137,6 +137,21 @@ def add_bookmark(s: Sheet) -> do.DiagramEdit:
     return do.AddBookmark(name=s.pick(BOOKMARK_NAMES), part=part, replace=s.rng.random() < 0.3)
 
 
+def scope_trigger(s: Sheet) -> do.DiagramEdit:
+    settings = do.ScopeTriggerSettings(
+        on=s.rng.random() < 0.5,
+        signal=s.pick(s.outputs),
+        element=s.rng.randrange(3),
+        edge=s.pick(("rising", "falling", "either")),
+        level=s.rng.random(),
+        mode=s.pick(("normal", "auto", "single")),
+        span=s.rng.random() + 0.1,
+        position=s.rng.random(),
+        hold_off=s.rng.random(),
+    )
+    return do.SetScopeTrigger(trigger=s.pick((settings, settings, None)))
+
+
 MAKERS: dict[type[do.DiagramEdit], Callable[[Sheet], do.DiagramEdit]] = {
     do.AddBlocks: add,
     do.PasteBlocks: paste,
@@ -177,6 +192,7 @@ MAKERS: dict[type[do.DiagramEdit], Callable[[Sheet], do.DiagramEdit]] = {
         name=s.pick(s.diagram.bookmarks), to=s.pick((*BOOKMARK_NAMES, "Left"))
     ),
     do.RemoveBookmark: lambda s: do.RemoveBookmark(name=s.pick(s.diagram.bookmarks)),
+    do.SetScopeTrigger: scope_trigger,
     do.SetSettings: lambda s: do.SetSettings(values={"stop_time": s.rng.random() + 0.1}),
     do.Describe: lambda s: do.Describe(text=s.pick(("words", "other words"))),
 }
@@ -186,7 +202,7 @@ FREQUENT_EDITS = (
     *(do.AddBookmark, do.AddBookmark, do.RenameBookmark),
     *(do.SaveParameterSet, do.SaveParameterSet, do.SaveParameterSet),
     *(do.ApplyParameterSet, do.ApplyParameterSet, do.RenameParameterSet, do.RenameParameterSet),
-    do.RemoveSetParameter,
+    *(do.SaveParameterSet, do.ApplyParameterSet, do.ApplyParameterSet, do.RemoveSetParameter),
 )
 """Edits that are chosen more often, because they are seldom valid: tuned values need a model that can run,
 and most edits of parameter sets and bookmarks need an existing one."""

@@ -50,7 +50,7 @@ def changed_aspects(before: Diagram, after: Diagram, path: Aspect = ()) -> set[A
     for name in before.parameter_sets.keys() | after.parameter_sets.keys():
         if before.parameter_sets.get(name) != after.parameter_sets.get(name):
             aspects.add((*path, "/", f"parameter set {name}"))
-    for field in ("name", "description", "settings", "extras", "mask"):
+    for field in ("name", "description", "settings", "extras", "mask", "scope_trigger"):
         if getattr(before, field) != getattr(after, field):
             aspects.add((*path, "/", field))
     return aspects

@@ -16,6 +16,7 @@ from armblocks.studio.sheet.edits import EDITS, EditContext
 from armblocks.studio.sheet.nesting import check_editable, inside, with_inside
 from armblocks.studio.sheet.parameter_sets import with_consistent_sets
 from armblocks.studio.sheet.parameter_values import ResolveRobot
+from armblocks.studio.sheet.scope_triggers import with_consistent_trigger
 
 
 class Document(Edited[Diagram]):
@@ -68,9 +69,8 @@ class Document(Edited[Diagram]):
         check_editable(self.diagram, request.inside)
         sheet = EDITS.applied(edit, inside(self.diagram, request.inside), self._context)
         after = with_inside(self.diagram, request.inside, sheet)
-        return Outcome(
-            title, with_consistent_sets(self.diagram, after, edit, request.inside), request.gesture
-        )
+        after = with_consistent_sets(self.diagram, after, edit, request.inside)
+        return Outcome(title, with_consistent_trigger(self.diagram, after), request.gesture)
 
     def aspects(self, before: Diagram, after: Diagram) -> set[Aspect]:
         """Return the aspects in which two diagrams differ."""

@@ -67,11 +67,12 @@ from armblocks.studio.protocol.messages.sheet_edits import (
     SetMask,
     SetNotes,
     SetParameters,
+    SetScopeTrigger,
     SetSettings,
     SheetNote,
     Wire,
 )
-from armblocks.studio.sheet import bookmarks, parameter_sets
+from armblocks.studio.sheet import bookmarks, parameter_sets, scope_triggers
 from armblocks.studio.sheet.clipping import ReadDiagram, leaves_horizontally, pasted, reader
 from armblocks.studio.sheet.grounding import grounded
 from armblocks.studio.sheet.mask_edits import with_mask
@@ -435,6 +436,7 @@ def _break_link(edit: BreakLink, diagram: Diagram, _: EditContext) -> Diagram:
 EDITS.on(AddBookmark, bookmarks.addition_title)(bookmarks.added)
 EDITS.on(RenameBookmark, lambda edit: f"rename the bookmark {edit.name}")(bookmarks.renamed)
 EDITS.on(RemoveBookmark, lambda edit: f"remove the bookmark {edit.name}")(bookmarks.removed)
+EDITS.on(SetScopeTrigger, lambda edit: "change the trigger of the scopes")(scope_triggers.with_trigger)
 
 
 # -- the whole model -----------------------------------------------------------------------------------------

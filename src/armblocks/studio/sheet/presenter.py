@@ -24,6 +24,7 @@ from armblocks.studio.sheet.lines import LinesOfSheets, changed_lines
 from armblocks.studio.sheet.nesting import inside, linked_part
 from armblocks.studio.sheet.open_documents import OpenDocument, OpenDocuments
 from armblocks.studio.sheet.renames import path_after, renamed_paths
+from armblocks.studio.sheet.scope_triggers import trigger_settings
 
 CHECK_DELAY_SECONDS = 0.15
 """Delay of the background check after the last edit, s."""
@@ -96,6 +97,7 @@ class DiagramPresenter(Presenter[OpenDocument]):
             inside=list(place),
             sheet=drawn_sheet,
             settings=dataclasses.asdict(diagram.settings),
+            scope_trigger=trigger_settings(diagram),
             run=self._runs.run_key(open_file.key),
             outer_comment=outer_comment(diagram, place),
         )
@@ -115,6 +117,7 @@ class DiagramPresenter(Presenter[OpenDocument]):
         return DiagramChange(
             sheet=sheet_change(old, new, changed_lines(old_lines, new_lines)),
             settings=dataclasses.asdict(diagram.settings),
+            scope_trigger=trigger_settings(diagram),
             outer_comment=outer_comment(diagram, place),
             renamed=renamed_paths(before, diagram),
         )

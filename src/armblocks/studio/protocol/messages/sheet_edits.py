@@ -340,6 +340,27 @@ class SetSettings(ModelEdit):
     values: dict[str, bool | float | str | None]
 
 
+class ScopeTriggerSettings(Message):
+    """The trigger of the scopes, see :class:`~armblocks.diagram.ScopeTrigger`."""
+
+    on: bool
+    signal: Annotated[str, Field(max_length=10_000)]
+    element: Annotated[int, Field(ge=0, le=1_000_000)]
+    edge: Literal["rising", "falling", "either"]
+    level: float
+    mode: Literal["normal", "auto", "single"]
+    span: Annotated[float, Field(gt=0)]
+    position: Annotated[float, Field(ge=0, le=1)]
+    hold_off: Annotated[float, Field(ge=0)]
+
+
+class SetScopeTrigger(ModelEdit):
+    """Set the trigger of the scopes; ``None`` restores the default, which is off."""
+
+    kind: Literal["scope_trigger"] = "scope_trigger"
+    trigger: ScopeTriggerSettings | None
+
+
 class Describe(DiagramEdit):
     """Change the model's one-line description."""
 

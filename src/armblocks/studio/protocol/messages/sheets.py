@@ -8,7 +8,15 @@ from pydantic import Field
 
 from armblocks.studio.protocol.message import Event, Message, Request
 from armblocks.studio.protocol.messages.documents import Content, ContentChange
-from armblocks.studio.protocol.messages.sheet_edits import Place, Px, SetMask, SheetNote, SheetPart, Wire
+from armblocks.studio.protocol.messages.sheet_edits import (
+    Place,
+    Px,
+    ScopeTriggerSettings,
+    SetMask,
+    SheetNote,
+    SheetPart,
+    Wire,
+)
 
 
 class SheetPort(Message):
@@ -193,6 +201,7 @@ class DiagramContent(Content):
     inside: list[str]
     sheet: Sheet
     settings: dict[str, bool | float | str | None]
+    scope_trigger: ScopeTriggerSettings | None
     run: str | None
     outer_comment: OuterComment | None
 
@@ -203,6 +212,7 @@ class DiagramChange(ContentChange):
     kind: Literal["diagram"] = "diagram"
     sheet: SheetChange
     settings: dict[str, bool | float | str | None]
+    scope_trigger: ScopeTriggerSettings | None
     outer_comment: OuterComment | None
     renamed: dict[str, str] = Field(default_factory=dict[str, str])
     """Paths of blocks that the change has renamed: old to new, from the top sheet."""
