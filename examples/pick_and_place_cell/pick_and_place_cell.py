@@ -1,10 +1,10 @@
-"""From a URDF file to a pick-and-place cycle in the least time, its drives, and a film.
+"""From a URDF file to a pick-and-place cycle in the least time, its drives, and a video.
 
     python pick_and_place_cell.py OUT [--film]
 
 writes into the folder OUT: the motion against its limits (``motion.svg``), the comparison of the drives
 (``sizing/sizing.html``), the reachable region with the payload capacity (``workspace.svg``), and with
-``--film`` the film ``cycle.mp4`` (extra ``film``).
+``--film`` the video ``cycle.mp4`` (extra ``film``).
 """
 
 from __future__ import annotations
