@@ -94,7 +94,7 @@ def all_equations(block: Block, shapes: Shapes) -> Function:
     """Return all values of the block's equations as a function of t, x, u, e and p."""
     features = features_of(block, shapes)
     states = (*features.states, *features.discrete, *features.modes, *features.conditions, *features.delays)
-    rates = [Slot(f"{name}'", shapes[name]) for name in features.differentiated_inputs]
+    rates = [Slot(f"{name}'", shapes[name.rstrip("'")]) for name in features.differentiated_inputs]
     arguments = [
         [Slot(state.name, state.shape) for state in states],
         [Slot(name, shape) for name, shape in shapes.items()] + rates,
@@ -311,7 +311,9 @@ def compares_variables(group: Group, equations: BlockEquations, shapes: Shapes) 
     if not {slot.kind for slot in group.slots} & {SlotKind.OUTPUT, SlotKind.DERIVATIVE}:
         return False
     sizes = {state.name: math.prod(state.shape) for state in (*equations.states, *equations.discrete)}
-    sizes |= {f"{name}{prime}": math.prod(shape) for name, shape in shapes.items() for prime in ("", "'")}
+    sizes |= {
+        f"{name}{prime}": math.prod(shape) for name, shape in shapes.items() for prime in ("", "'", "''")
+    }
     names = (*group.states, *group.discrete, *group.inputs, *group.events)
     offsets = [0, *itertools.accumulate(sizes[name] for name in names)]
     parts = dict(zip(names, vertsplit(group.z, offsets))) if names else {}

@@ -97,6 +97,7 @@ def examples() -> Mapping[str, Any]:
                 name="s", first=ab.Attachment(), second=ab.Attachment(link="a"), stiffness=1.0, length=0.2
             ),
             ab.Coupling(name="c", terms=(("a", 1.0), ("b", 2.0))),
+            ab.PrescribedMotion(name="c", joint="a"),
             arm.assemble(),
             arm.parametric(["link1"]),
             arm.symbolic,

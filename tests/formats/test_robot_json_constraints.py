@@ -12,7 +12,7 @@ import pytest
 from armblocks import formats
 from armblocks.errors import FormatError
 from armblocks.formats.robot_json import read_robot, write_robot
-from armblocks.robot import CONSTRAINT_TYPES, Coupling, Robot
+from armblocks.robot import CONSTRAINT_TYPES, Coupling, PrescribedMotion, Robot
 from mechanisms_for_tests import CLOSURES, four_bar, random_mechanism
 
 SCHEMA = json.loads((Path(formats.__file__).parent / "schema" / "robot.schema.json").read_bytes())
@@ -20,9 +20,9 @@ SCHEMA = json.loads((Path(formats.__file__).parent / "schema" / "robot.schema.js
 
 def robots() -> list[Robot]:
     coupling = Coupling(name="gear", terms=(("rocker", 2.0), ("crank", -1.0)), constant=0.25)
-    loop = four_bar()
+    loop, drive = four_bar(), PrescribedMotion(name="drive", joint="crank")
     return [
-        replace(loop, constraints=(*loop.constraints, coupling)),
+        replace(loop, constraints=(*loop.constraints, coupling, drive)),
         *(random_mechanism(seed)[0] for seed in range(len(CLOSURES))),
     ]
 

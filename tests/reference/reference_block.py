@@ -97,7 +97,7 @@ class BlockNumbers:
         ends = {
             "x": {s.name: s.shape for s in (*self.states, *self.discrete, *self.lines, *self.modes)}
             | {mode.before: mode.shape for mode in self.remembered},
-            "u": {**shapes, **{f"{u}'": shapes[u] for u in block.differentiated_inputs}},
+            "u": {**shapes, **{f"{u}'": shapes[u.rstrip("'")] for u in block.differentiated_inputs}},
             "e": {guard.name: guard.shape for guard in self.guards},
             "p": {rule.name: shape_of(block.parameter_value(rule.name)) for rule in block.inputs_of_the_run()}
             | ({"T": ()} if block.sampled else {}),

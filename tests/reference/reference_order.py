@@ -84,6 +84,8 @@ class EvaluationOrder:
         pending += [("modes", n, "") for n, b in self.blocks.items() if b.modes]
         for name, block in self.blocks.items():
             for key in {k for entry in block.expressions for k in block.needs(*entry)}:
+                if key.endswith("''"):
+                    raise UnsupportedError(f"'{name}' reads a second derivative")
                 if key.startswith("u:") and key.endswith("'"):
                     pending.append(self._rate_of(name, key[2:-1]))
         while pending:

@@ -154,6 +154,7 @@ NOT_COVERED = {
     "ArmPlant": "sticking_reference covers it, and it is slow here",
     "CalledPythonFunction": "Python is called at ticks",
     "FromFile": "reads a table by index",
+    "PositionDrivenArm": "reads a second derivative",
     "Trajectory": "reads a table by index",
 }
 TRIALS = ((0.05, 11), (0.01, 11), (0.0005, 4))

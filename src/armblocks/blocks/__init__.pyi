@@ -141,6 +141,8 @@ from armblocks.blocks.robots.basic import Jacob0 as Jacob0
 from armblocks.blocks.robots.basic import Jacobe as Jacobe
 from armblocks.blocks.robots.basic import Rne as Rne
 from armblocks.blocks.robots.basic import RobotPlot as RobotPlot
+from armblocks.blocks.robots.driven_arm import AccelerationDrivenArm as AccelerationDrivenArm
+from armblocks.blocks.robots.driven_arm import PositionDrivenArm as PositionDrivenArm
 from armblocks.blocks.robots.drives import DcMotor as DcMotor
 from armblocks.blocks.robots.drives import MotorWinding as MotorWinding
 from armblocks.blocks.robots.inverse_kinematics import DifferentialIkine as DifferentialIkine

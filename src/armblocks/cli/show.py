@@ -148,6 +148,8 @@ def _print_constraints(robot: Robot, console: Console) -> None:
         first, second = (name or "(base)" for name in closure.links)
         text = f"{closure.name}: {closure.title} between {first} and {second}"
         console.print(text, highlight=False, markup=False)
+    for joint in robot.prescribed_joints:
+        console.print(f"{joint}: prescribed motion", highlight=False, markup=False)
     if robot.closures:
         from armblocks.face.assembly import assemble
 

@@ -94,7 +94,9 @@ class Block(ABC, metaclass=ArgumentErrors, methods=False):
     following_modes: ClassVar[bool] = False
     """Whether all modes are functions of the present signals, and all guards only locate their changes."""
     differentiated_inputs: ClassVar[tuple[str, ...]] = ()
-    """Inputs whose exact time derivative the equations read, as ``u["name'"]``."""
+    """Inputs whose exact time derivative the equations read, as ``u["name'"]``.
+
+    The entry ``"name'"`` stands for the second derivative, ``u["name''"]``."""
     example: ClassVar[WorkedExample] = WorkedExample()
     """The worked example; by default the block gets inputs that fit its ports."""
 

@@ -189,7 +189,7 @@ def _trace(structure: _Structure) -> BlockEquations:
         "x": [Slot(state.name, state.shape) for state in features.states],
         "z": [Slot(state.name, state.shape) for state in (*features.discrete, *delayed, *features.modes)],
         "u": [Slot(name, shape) for name, shape in features.inputs.items()]
-        + [Slot(f"{name}'", features.inputs[name]) for name in features.differentiated_inputs],
+        + [Slot(f"{name}'", features.inputs[name.rstrip("'")]) for name in features.differentiated_inputs],
         "e": [Slot(guard.name, guard.shape) for guard in features.guards],
         "p": list(tunable_slots(structure.block)),
     }

@@ -83,7 +83,7 @@ class Network:
         group = self.equations[node.block].groups[node.group]
         for order in range(node.order + 1):
             for port in group.inputs:
-                ref = self.diagram.source(node.block, port.removesuffix("'"))
+                ref = self.diagram.source(node.block, port.rstrip("'"))
                 yield self.input(node.block, port, order).node, tuple(str(entry) for entry in self.route(ref))
             if order:
                 for state in group.states:

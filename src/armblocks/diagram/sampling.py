@@ -170,7 +170,7 @@ def _moving_outputs(block: Block, equations: BlockEquations, moving: Collection[
             outputs.add(port.name)
             continue
         group = equations.groups[index]
-        inputs = {name.removesuffix("'") for name in group.inputs}
+        inputs = {name.rstrip("'") for name in group.inputs}
         if group.timed or group.states or delayed & set(group.discrete) or inputs & set(moving):
             outputs.add(port.name)
     return outputs

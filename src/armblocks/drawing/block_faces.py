@@ -77,7 +77,8 @@ def _has_special_drawing(block: Block) -> bool:
     return isinstance(
         block,
         kinds.Product | kinds.Scope | kinds.XYGraph | kinds.JTraj | kinds.RobotPlot | kinds.Fkine
-        | kinds.ForwardDynamics | kinds.ArmPlant | kinds.Switch | kinds.ManualSwitch | kinds.MultiportSwitch
+        | kinds.ForwardDynamics | kinds.ArmPlant | kinds.PositionDrivenArm
+        | kinds.AccelerationDrivenArm | kinds.Switch | kinds.ManualSwitch | kinds.MultiportSwitch
         | kinds.StopSimulation,
     )  # fmt: skip
 
@@ -127,7 +128,10 @@ def face(block: Block, area: FaceArea, trend: Trend | None, *, flipped: bool = F
             return display(area, block.inputs, trend)
         case kinds.StopSimulation():
             return stop_marks(area)
-        case kinds.RobotPlot() | kinds.Fkine() | kinds.ForwardDynamics() | kinds.ArmPlant():
+        case (
+            kinds.RobotPlot() | kinds.Fkine() | kinds.ForwardDynamics() | kinds.ArmPlant()
+            | kinds.PositionDrivenArm() | kinds.AccelerationDrivenArm()
+        ):  # fmt: skip
             caption = "" if isinstance(block, kinds.RobotPlot) else block.title
             return _robot(area, block.robot, caption)
         case _:

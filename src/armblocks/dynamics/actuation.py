@@ -1,5 +1,7 @@
 """Inverse dynamics of robots with constraints: the torques of the joints that have a motor.
 
+Joints with prescribed motions count as joints with a motor.
+
 Motors and constraints together exert the torques of the tree, ``tau_tree = tau + J' λ``. ``Z' tau = 0`` holds
 for the directions Z in which no motor moves: the joints without a motor. These equations determine the
 multipliers λ. Source: Featherstone, *Rigid Body Dynamics Algorithms*, 8.12 (inverse dynamics of closed
@@ -23,6 +25,7 @@ from armblocks.dynamics.constrained import (
     nan_unless_consistent,
     symmetric_solver,
 )
+from armblocks.dynamics.joint_entries import entries_of
 from armblocks.dynamics.joint_motion import entries
 from armblocks.dynamics.mechanism import RANK_TOLERANCE, Array, mechanism
 from armblocks.equations import TracedFunction, flatten
@@ -106,6 +109,7 @@ def directions_without_motor(robot: Robot) -> Array:
     has one entry 1) unless a motor is at a joint that depends on several coordinates without motors.
     """
     driven = {k for k, motor in enumerate(robot.motors) if motor is not None}
+    driven |= {*entries_of(robot, robot.prescribed_joints).speeds}
     rows = [joint.factors for joint in robot.coupled_joints if joint.link.motor is not None]
     while single := [{*row} - driven for row in rows if len({*row} - driven) == 1]:
         driven |= set[int]().union(*single)
@@ -127,9 +131,10 @@ def _check_actuation(
     functions = mechanism(robot)
     dof, motors = robot.nv - len(relations), robot.nv - free_directions.shape[1]
     where = f"robot '{robot.name}'"
+    drives = "motors or prescribed motions" if robot.prescribed_joints else "motors"
     if motors != dof:
         raise RobotError(
-            f"the joints with motors have {counted(motors, 'degree', 'degrees')} of freedom, the mechanism "
+            f"the joints with {drives} have {counted(motors, 'degree', 'degrees')} of freedom, the mechanism "
             f"has {dof}",
             where=where,
             allowed="as many motors as degrees of freedom, so that the torques exist and are unique",
@@ -139,7 +144,7 @@ def _check_actuation(
     s = np.linalg.svd(J, compute_uv=False)
     if len(s) and s.min() <= RANK_TOLERANCE * s.max():
         raise RobotError(
-            "the joints with motors do not determine the other joints",
+            f"the joints with {drives} do not determine the other joints",
             where=where,
             allowed="motors whose joints fix the mechanism when they are locked",
             fix="move a motor to a joint that can still move while the others are locked",

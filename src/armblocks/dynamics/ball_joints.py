@@ -151,6 +151,35 @@ def normalised(robot: Robot, q: Sequence[Scalar]) -> list[Scalar]:
     return result
 
 
+def motion_of_rates(
+    robot: Robot, q: Sequence[Scalar], rates: Sequence[Scalar], second_rates: Sequence[Scalar]
+) -> tuple[list[Scalar], list[Scalar]]:
+    """``qd`` and ``qdd`` (n,) from the first and second time derivatives of ``q`` (nq,), of any length.
+
+    For a quaternion Q of any length, ``w = 2 vec(Q* Q') / |Q|²``, and its derivative.
+    """
+    speeds: list[Scalar] = []
+    accelerations: list[Scalar] = []
+    position = 0
+    for joint in robot.joints:
+        for motion in joint.motions:
+            part = slice(position, position + len(motion.positions))
+            position = part.stop
+            if isinstance(motion, AxisMotion):
+                speeds += rates[part]
+                accelerations += second_rates[part]
+                continue
+            Q, rate = q[part], rates[part]
+            conjugate = (Q[0], -Q[1], -Q[2], -Q[3])
+            square = Q[0] * Q[0] + Q[1] * Q[1] + Q[2] * Q[2] + Q[3] * Q[3]
+            growth = 2.0 * (Q[0] * rate[0] + Q[1] * rate[1] + Q[2] * rate[2] + Q[3] * rate[3])
+            w = [2.0 * value / square for value in _product(conjugate, rate)[1:]]
+            second = _product(conjugate, second_rates[part])[1:]
+            speeds += w
+            accelerations += [(2.0 * a - growth * b) / square for a, b in zip(second, w)]
+    return speeds, accelerations
+
+
 def rotation_vector(quaternion: Sequence[Scalar]) -> Vector:
     """The rotation vector (rad), of length at most π, of a quaternion w x y z of any length but zero."""
     return scale(2.0, _logarithm(_moderate(quaternion)))

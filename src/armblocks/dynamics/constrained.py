@@ -33,6 +33,7 @@ from armblocks.dynamics.reduction import (
 )
 from armblocks.dynamics.rnea import Wrench, rnea
 from armblocks.dynamics.springs import spring_torques
+from armblocks.errors import RobotError
 from armblocks.robot.robot import Robot
 from armblocks.robot.tree import KinematicTree
 from armblocks.spatial.vectors import Scalar
@@ -237,6 +238,7 @@ def constrained_motion(
     ``on_bodies``: see :func:`armblocks.dynamics.rnea.rnea`. ``loads``: the symbols on which the inertias of
     ``tree`` and ``on_bodies`` depend.
     """
+    check_no_prescribed_motion(robot)
     relations = independent_relations(robot, near)
     # The bias of the relations is a derivative with respect to q at constant speeds: both are symbols.
     at, speeds = SX.sym("q", robot.nq), SX.sym("qd", robot.nv)
@@ -248,6 +250,18 @@ def constrained_motion(
     (qd,) = consistent.call([q, qd, *loads], True, False)
     qdd, multipliers = motion.call([q, qd, tau, *loads], True, False)
     return ConstrainedMotion(q, qd, qdd, multipliers)
+
+
+def check_no_prescribed_motion(robot: Robot) -> None:
+    """Raise RobotError for a robot with prescribed motions, whose accelerations torques do not determine."""
+    if robot.prescribed_joints:
+        raise RobotError(
+            f"the motion of joint '{robot.prescribed_joints[0]}' is prescribed: torques do not determine it",
+            where=f"robot '{robot.name}'",
+            allowed="robots without prescribed motions",
+            fix="use arm.hybrid_dynamics or the blocks PositionDrivenArm and AccelerationDrivenArm, or "
+            "remove the constraint",
+        )
 
 
 def restoring_rates(robot: Robot, q: SX, qd: SX, motion: ConstrainedMotion) -> tuple[SX, SX]:

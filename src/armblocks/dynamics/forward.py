@@ -51,25 +51,28 @@ def forward_dynamics(
     return qdd
 
 
-def check_accelerations_exist(tree: KinematicTree) -> None:
+def check_accelerations_exist(tree: KinematicTree, speeds: Sequence[int] | None = None) -> None:
     """Raise RobotError that names the joint if the inertia at a joint is zero for all q.
 
     The criterion is a pivot of the factored inertia matrix (the inertia at the joint while all distal joints
-    are free) that is not positive at several random positions.
+    are free) that is not positive at several random positions. ``speeds``: the joints that accelerate freely,
+    as indices in the speeds of the tree; by default all joints.
     """
-    if tree.n == 0:
+    rows = [i for i, body in enumerate(tree.bodies) if speeds is None or body.speed in speeds]
+    if not rows:
         return
     q = SX.sym("q", tree.robot.nq)
     M = crba(tree, joint_motions(tree, q))
     evaluate = Function("M", [q], [horzcat(*(vertcat(*(SX(entry) for entry in row)) for row in M))])
     random = np.random.default_rng(0)
-    has_inertia = np.zeros(tree.n, dtype=bool)
+    has_inertia = np.zeros(len(rows), dtype=bool)
     for _ in range(RANDOM_POSITIONS):
-        numbers = np.asarray(evaluate(random.uniform(-np.pi, np.pi, tree.robot.nq)).full())
+        of_all = np.asarray(evaluate(random.uniform(-np.pi, np.pi, tree.robot.nq)).full())
+        numbers = of_all[np.ix_(rows, rows)]
         has_inertia |= _pivots(numbers) > PIVOT_TOLERANCE * np.abs(np.diag(numbers))
     if has_inertia.all():
         return
-    joint = tree.bodies[int(np.argmin(has_inertia))].link
+    joint = tree.bodies[rows[int(np.argmin(has_inertia))]].link
     raise RobotError(
         f"joint '{joint}' has no inertia to accelerate: the inertia matrix is singular at every position",
         where=f"robot '{tree.robot.name}', link '{joint}'",

@@ -14,6 +14,7 @@ from casadi import SX, dot, if_else, logic_and, logic_or, mtimes, sign, vertcat
 from numpy.typing import NDArray
 
 from armblocks.dynamics.base_parameters import base_parameter_tree
+from armblocks.dynamics.constrained import check_no_prescribed_motion
 from armblocks.dynamics.crba import FactoredInertia, SquareMatrix, crba
 from armblocks.dynamics.forward import check_accelerations_exist
 from armblocks.dynamics.joint_motion import entries, joint_motions
@@ -28,7 +29,8 @@ from armblocks.robot.robot import Robot
 
 TORQUE_TOLERANCE = 1e-9
 """A torque against the sliding direction is significant if it exceeds this fraction of the friction."""
-_GENERIC_PAYLOAD = SX([1.0, 0.1, 0.2, 0.3, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+GENERIC_PAYLOAD = SX([1.0, 0.1, 0.2, 0.3, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+"""A payload with which an inertia that every payload leaves singular is found."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +116,7 @@ class JointEquations:
         self, robot: Robot, q: SX, qd: SX, wrench: SX | None = None, payload: SX | None = None
     ) -> None:
         tree = base_parameter_tree(robot)
-        check_accelerations_exist(tree if payload is None else with_payload(tree, _GENERIC_PAYLOAD))
+        check_accelerations_exist(tree if payload is None else with_payload(tree, GENERIC_PAYLOAD))
         on_bodies = None if wrench is None else tip_wrench(tree, wrench)
         if payload is not None:
             tree = with_payload(tree, payload)
@@ -183,6 +185,7 @@ def equations_at(
     robot: Robot, q: SX, qd: SX, wrench: SX | None, payload: SX | None, near: Array | None
 ) -> JointEquations | MechanismEquations:
     """The equations of motion at a state; ``near``: see :class:`MechanismEquations`."""
+    check_no_prescribed_motion(robot)
     if robot.constraints:
         return MechanismEquations(robot, q, qd, wrench, payload, near)
     return JointEquations(robot, q, qd, wrench, payload)

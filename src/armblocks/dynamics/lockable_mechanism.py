@@ -24,6 +24,7 @@ from armblocks.dynamics.constrained import (
     MAX_RESIDUAL,
     POSITION_STEPS,
     assembled_coordinates,
+    check_no_prescribed_motion,
     independent_relations,
     symmetric_solver,
 )
@@ -50,7 +51,8 @@ class MechanismEquations:
     """``M(q) qdd + bias(q, qd) = torque + J' multipliers`` at one state that satisfies the constraints.
 
     ``bias`` includes gravity, springs, velocity terms and the ``wrench``; ``M`` and ``bias`` include the
-    ``payload``. Couplings are eliminated. ``near``: coordinates near which the closures are assembled.
+    ``payload``. ``J`` (m, n): of the independent relations; ``J_bias``: ``dJ/dt qd`` (m, 1). Couplings are
+    eliminated. ``near``: coordinates near which the closures are assembled.
     """
 
     def __init__(
@@ -80,13 +82,13 @@ class MechanismEquations:
         if loads:
             parts = Function("loaded", [at, speeds, *loads], parts).call([at, speeds, *symbols], True, False)
         evaluate = Function("equations", [at, speeds, *symbols], parts)
-        self.bias, self.M, self._J, self._J_bias = evaluate.call([q, qd, *loads], True, False)
+        self.bias, self.M, self.J, self.J_bias = evaluate.call([q, qd, *loads], True, False)
 
     def motion(self, torque: SX, free: SX) -> tuple[SX, SX]:
         """``qdd`` (n,), exactly 0 for locked joints, and the torque that holds each locked joint (n,)."""
-        qdd, multipliers = self._solve(torque - self.bias, free, -self._J_bias)
+        qdd, multipliers = self._solve(torque - self.bias, free, -self.J_bias)
         holding = torque - self.bias - mtimes(self.M, qdd)
-        return qdd, holding + mtimes(self._J.T, multipliers) if self._J.shape[0] else holding
+        return qdd, holding + mtimes(self.J.T, multipliers) if self.J.shape[0] else holding
 
     def speeds_after_impact(self, qd: SX, stopping: SX) -> SX:
         """Speeds after an impact that stops some joints (1) and leaves the others free (0).
@@ -94,12 +96,12 @@ class MechanismEquations:
         Impulses act at the joints that stop and at the closures.
         """
         stopped = -stopping * qd
-        change, _ = self._solve(-mtimes(self.M, stopped), 1.0 - stopping, -mtimes(self._J, qd + stopped))
+        change, _ = self._solve(-mtimes(self.M, stopped), 1.0 - stopping, -mtimes(self.J, qd + stopped))
         return if_else(stopping, 0.0, qd + change)
 
     def _solve(self, right: SX, free: SX, rates: SX) -> tuple[SX, SX]:
         """``x`` with ``M x = right + J' multipliers`` for the free joints, ``J x = rates``; 0 if locked."""
-        n, m = self.M.shape[0], self._J.shape[0]
+        n, m = self.M.shape[0], self.J.shape[0]
         masked = SX(self.M)
         for i in range(n):
             for j in range(n):
@@ -109,7 +111,7 @@ class MechanismEquations:
         x = SX(vertcat(*solve(entries(right * free))))
         if not m:
             return x, SX(0, 1)
-        J = _free_columns(self._J, free)
+        J = _free_columns(self.J, free)
         responses = [SX(vertcat(*solve(entries(J[i, :].T)))) for i in range(m)]
         A = SX(m, m)
         for k, response in enumerate(responses):
@@ -176,8 +178,10 @@ def _inertia_matrix(tree: KinematicTree, M: SquareMatrix) -> SX:
 def check_lockable(robot: Robot, lockable: Sequence[int], near: Array | None, where: str) -> None:
     """Raise RobotError unless each set of the ``lockable`` joints (indices in qd) can be locked.
 
-    Otherwise the forces of friction and stops would be statically indeterminate.
+    Otherwise the forces of friction and stops would be statically indeterminate. Raises RobotError for
+    prescribed motions, too.
     """
+    check_no_prescribed_motion(robot)
     if not robot.closures or not lockable:
         return
     relations = list(independent_relations(robot, near))

@@ -44,6 +44,7 @@ from armblocks.dynamics.kinematics import body_poses, constant_pose, frame_pose
 from armblocks.dynamics.loads import tip_loads, tip_wrench, with_payload
 from armblocks.dynamics.mechanism import Array
 from armblocks.dynamics.pose_error import trace_pose_error_in_tool, trace_pose_error_in_world
+from armblocks.dynamics.prescribed_motion import trace_hybrid_dynamics, trace_hybrid_dynamics_loaded
 from armblocks.dynamics.reduction import (
     reduced_columns,
     tree_coordinates,
@@ -421,6 +422,7 @@ FRAMED = ("fkine", "jacob0", "jacobe", "pose_error_in_world", "pose_error_in_too
 ASSEMBLED = (
     *("rne", "rne_loaded", "gravload", "accel", "accel_loaded"),
     *("joint_wrenches", "joint_wrenches_loaded"),
+    *("hybrid_dynamics", "hybrid_dynamics_loaded"),
 )
 """The functions that take ``near``, because they depend on the independent relations of closures."""
 TRACES: Mapping[str, Callable[..., TracedFunction]] = {
@@ -443,6 +445,8 @@ TRACES: Mapping[str, Callable[..., TracedFunction]] = {
     "friction": trace_friction,
     "accel": trace_accel,
     "accel_loaded": trace_accel_loaded,
+    "hybrid_dynamics": trace_hybrid_dynamics,
+    "hybrid_dynamics_loaded": trace_hybrid_dynamics_loaded,
     "kinetic_energy": trace_kinetic_energy,
     "potential_energy": trace_potential_energy,
     "centre_of_mass": trace_centre_of_mass,

@@ -86,6 +86,23 @@ class MotionFunction(Protocol):
     ) -> Array: ...
 
 
+class HybridFunction(Protocol):
+    """``f(q, qd, tau, qdd)``, with an optional wrench (6,) or (N, 6) and payload; two results."""
+
+    def __call__(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        tau: ArrayLike,
+        qdd: ArrayLike,
+        *,
+        wrench: ArrayLike | None = None,
+        payload: Payload | ArrayLike | None = None,
+        out: tuple[Array, Array] | None = None,
+        threads: int = 1,
+    ) -> tuple[Array, Array]: ...
+
+
 class DrivenStateFunction(Protocol):
     """``f(q, qd, tau)``, with an optional wrench (6,) or (N, 6) and payload."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import cast
 
 from armblocks.argument_errors import ArgumentErrors
 from armblocks.face.arm_functions import (
@@ -11,6 +12,7 @@ from armblocks.face.arm_functions import (
     DrivenStateFunction,
     FramedStateFunction,
     FrameFunction,
+    HybridFunction,
     IntegrateFunction,
     MotionFunction,
     SpeedFunction,
@@ -127,6 +129,18 @@ class NativeFunctions(metaclass=ArgumentErrors):
     def accel(self) -> DrivenStateFunction:
         """``accel(q, qd, tau)`` → qdd (n,) rad/s² or m/s²: accelerations under joint torques and friction."""
         return self._code.loaded("accel")
+
+    @cached_property
+    def hybrid_dynamics(self) -> HybridFunction:
+        """``hybrid_dynamics(q, qd, tau, qdd)`` → (qdd, tau), each (n,): motion with prescribed joints.
+
+        The joints of the robot's :class:`PrescribedMotion` constraints have the given accelerations
+        ``qdd``, all other joints the given torques ``tau``; the other entries of the arguments are not read.
+        The results are the accelerations of all joints, rad/s² or m/s², and the torques of all joints, N m or
+        N, among them those of the drives of the prescribed joints. ``wrench=`` and ``payload=`` as for
+        ``rne``. Raises RobotError without prescribed joints, and if their motions depend on each other.
+        """
+        return cast("HybridFunction", self._code.loaded("hybrid_dynamics"))
 
     @cached_property
     def gravload(self) -> ConfigurationFunction:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
 from armblocks.errors import FormatError, counted, warn
-from armblocks.robot import Closure, Coupling, Joint, JointLimits, Link, Robot, with_tip
+from armblocks.robot import Closure, Coupling, Joint, JointLimits, Link, PrescribedMotion, Robot, with_tip
 from armblocks.robot.shapes import Shape
 from armblocks.spatial import Transform
 
@@ -47,7 +47,7 @@ class Mimic(NamedTuple):
 
 
 def mimics_of(robot: Robot, format: str, closures: Collection[type[Closure]] = ()) -> dict[str, Mimic]:
-    """The joints that follow another one, by the name of their link.
+    """The joints that follow another one, by the name of their link; a warning for prescribed motions.
 
     Raises ``FormatError`` for closures of other types than ``closures``, and for couplings of one joint or of
     three or more.
@@ -55,6 +55,10 @@ def mimics_of(robot: Robot, format: str, closures: Collection[type[Closure]] = (
     mimics: dict[str, Mimic] = {}
     for constraint in robot.constraints:
         if type(constraint) in closures:
+            continue
+        if isinstance(constraint, PrescribedMotion):
+            what = f"the prescribed motion of joint '{constraint.joint}' is not part of the {format} file"
+            warn_of_loss(f"robot '{robot.name}', constraint '{constraint.name}'", what)
             continue
         if not (isinstance(constraint, Coupling) and len(constraint.terms) == 2):
             kind = "coupling" if isinstance(constraint, Coupling) else f"{constraint.title} closure"

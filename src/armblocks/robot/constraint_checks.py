@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armblocks.errors import RobotError, UnknownNameError
-from armblocks.robot.constraints import Constraint
+from armblocks.robot.constraints import Constraint, Coupling, PrescribedMotion
+from armblocks.robot.coordinate_map import dependent_joints
 from armblocks.robot.fields import check_parts
 from armblocks.robot.link import Link
 
@@ -26,6 +27,9 @@ def check_constraints(robot: str, links: Sequence[Link], constraints: Sequence[C
         for name in (*constraint.links, *constraint.joints):
             if name is not None and name not in joints:
                 raise UnknownNameError("link", name, joints, where=place)
+        if isinstance(constraint, PrescribedMotion):
+            _check_prescribed(constraint, links, constraints, place)
+            continue
         for name in constraint.joints:
             joint = joints[name]
             if joint.nv != 1:
@@ -35,3 +39,31 @@ def check_constraints(robot: str, links: Sequence[Link], constraints: Sequence[C
                     allowed="joints with one coordinate",
                     fix="couple joints of one degree of freedom, or close the loop by a closure",
                 )
+
+
+def _check_prescribed(
+    constraint: PrescribedMotion, links: Sequence[Link], constraints: Sequence[Constraint], place: str
+) -> None:
+    """Raise RobotError unless the joint moves, is independent and has only this prescribed motion."""
+    name = constraint.joint
+    others = [c for c in constraints if isinstance(c, PrescribedMotion) and c.joint == name]
+    coupling = dependent_joints([c for c in constraints if isinstance(c, Coupling)]).get(name)
+    if not next(link for link in links if link.name == name).joint.moves:
+        what, fix = f"joint '{name}' is fixed", "name a joint that moves, or leave the constraint out"
+    elif coupling is not None:
+        sources = ", ".join(f"'{joint}'" for joint, _ in coupling.terms[1:])
+        what = f"joint '{name}' already follows from coupling '{coupling.name}'"
+        fix = (
+            f"prescribe the joints on which it depends: {sources}" if sources else "leave the constraint out"
+        )
+    elif others[0] is not constraint:
+        what = f"constraint '{others[0].name}' already prescribes joint '{name}'"
+        fix = "leave one of them out"
+    else:
+        return
+    raise RobotError(
+        what,
+        where=place,
+        allowed="one prescribed motion for each joint that moves and that no coupling determines",
+        fix=fix,
+    )

@@ -13,7 +13,7 @@ from armblocks.errors import UnknownNameError
 from armblocks.lazy_exports import display_method
 from armblocks.robot.checks import check_robot
 from armblocks.robot.constraint_checks import check_constraints
-from armblocks.robot.constraints import Closure, Constraint, Coupling
+from armblocks.robot.constraints import Closure, Constraint, Coupling, PrescribedMotion
 from armblocks.robot.coordinate_map import CoordinateMap, coordinate_map, dependent_joints
 from armblocks.robot.coupled_limits import DependentJoint, dependent_joints_of, limits_with_couplings
 from armblocks.robot.fields import pose
@@ -105,6 +105,12 @@ class Robot(metaclass=ArgumentErrors):
     def closures(self) -> tuple[Closure, ...]:
         """The constraints that close loops."""
         return tuple(entry for entry in self.constraints if isinstance(entry, Closure))
+
+    @cached_property
+    def prescribed_joints(self) -> tuple[str, ...]:
+        """The joints whose motions are given, in the order of q."""
+        names = {entry.joint for entry in self.constraints if isinstance(entry, PrescribedMotion)}
+        return tuple(name for name in self.joint_names if name in names)
 
     @cached_property
     def uncoupled(self) -> Robot:

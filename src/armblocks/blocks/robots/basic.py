@@ -45,6 +45,7 @@ from armblocks.diagram import (
     shape_of,
 )
 from armblocks.diagram.signs import FaceSign, Words, graph
+from armblocks.dynamics.constrained import check_no_prescribed_motion
 from armblocks.errors import InputError, counted
 from armblocks.robot import Robot
 from armblocks.trajectories import Quintic
@@ -334,6 +335,7 @@ class ForwardDynamics(Block):
     def check(self) -> None:
         check_start(self, self.robot, "q0")
         check_joint_values(self, self.robot, "qd0")
+        check_no_prescribed_motion(self.robot)
         check_consistent_start(self, self.robot, "q0", "qd0")
 
     def output_rate(self, port: str) -> str | None:

@@ -7,6 +7,7 @@ from armblocks.robot.constraints.cylindrical_closure import CylindricalClosure
 from armblocks.robot.constraints.planar_closure import PlanarClosure
 from armblocks.robot.constraints.point_on_line import PointOnLine
 from armblocks.robot.constraints.point_on_plane import PointOnPlane
+from armblocks.robot.constraints.prescribed_motion import PrescribedMotion
 from armblocks.robot.constraints.prismatic_closure import PrismaticClosure
 from armblocks.robot.constraints.relations import (
     Distance,
@@ -38,6 +39,7 @@ __all__ = [
     "PlanarClosure",
     "PointOnLine",
     "PointOnPlane",
+    "PrescribedMotion",
     "PrismaticClosure",
     "Relation",
     "RevoluteClosure",
