@@ -364,8 +364,8 @@ export interface MaskParameter {
 /**
  * Move blocks and notes, or rotate blocks; one drag is one edit.
  *
- * User-drawn routes between blocks that move by the same amount move with them. ``wires`` are added and
- * those of ``instead`` removed, when a block is inserted into a wire or disconnected from its wires.
+ * User-drawn routes between blocks that move by the same amount move with them. ``wires`` are added and the
+ * wires of ``instead`` removed, when a block is inserted into a wire or disconnected from its wires.
  */
 export interface MoveBlocks {
   kind: "move";
@@ -546,7 +546,7 @@ export interface RenamePose {
  * Store values of parameters, by ``block.parameter``, under a name.
  *
  * ``all_parameters``: the model's values of the parameters that only other sets have are stored, too.
- * ``replace``: the values replace those of a set with this name, which must exist.
+ * ``replace``: the values replace the values of a set with this name, which must exist.
  */
 export interface SaveParameterSet {
   kind: "save_parameter_set";
@@ -867,10 +867,10 @@ export interface AskRobotTables {
   kind: "robot_tables";
 }
 /**
- * Return the lines of a sheet during a drag that differ from those of the document.
+ * Return the lines of a sheet during a drag that differ from the lines of the document.
  *
- * ``places``: positions of the dragged blocks. ``wires``: the displayed wires, if they differ from those of
- * the document. ``passed``: a block that lines do not avoid, because it may be inserted into one.
+ * ``places``: positions of the dragged blocks. ``wires``: the displayed wires, if they differ from the wires
+ * of the document. ``passed``: a block that lines do not avoid, because it may be inserted into one.
  */
 export interface RouteWires {
   kind: "route";
@@ -1717,7 +1717,7 @@ export interface TableColumn {
  * The configuration of an arm whose tool was dragged.
  *
  * ``q`` (nq,) and the ``poses`` (L+2, 4, 4) of base, links and tool. ``reached``: whether the tool has the
- * target; otherwise ``why`` says what stopped it. ``at_limit``: the coordinates at a limit. ``missing``: the
+ * target; otherwise ``why`` is the reason. ``at_limit``: the coordinates at a limit. ``missing``: the
  * directions that the joints cannot follow, such as ``turn about x``. ``tool``: the pose of the tool (16,).
  */
 export interface Reached {
@@ -1822,7 +1822,7 @@ export interface SceneBody {
  * ``frame`` is the joint frame in the frame of ``carrier``, ``moving`` the joint frame in the link frame,
  * both (16,) row by row; z is the joint axis. For a revolute joint, x of ``moving`` is rotated from x of
  * ``frame`` by q + ``offset``; for a prismatic joint, its origin is displaced by q + ``offset``. ``limits``
- * are in rad or m, ``radius`` (m) is that of the cylinder drawn at the joint.
+ * are in rad or m, ``radius`` (m): radius of the cylinder drawn at the joint.
  */
 export interface SceneJoint {
   name: string;

@@ -351,7 +351,7 @@ def test_gearboxes_of_sdf_couple_the_joints_of_their_bodies() -> None:
     turned = gear.format(reference).replace("0 0 -1", "0 1 0")
     text = f"<sdf version='1.11'><model name='m'>{''.join(parts)}{turned}</model></sdf>"
     read_sdf(text.encode(), "r.sdf", context)
-    assert "the axis of the gearbox is not that of the joint of 'c'" in [
+    assert "the axis of the gearbox differs from the axis of the joint of 'c'" in [
         finding.what for finding in context.findings
     ]
 

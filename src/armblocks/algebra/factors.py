@@ -25,7 +25,7 @@ def factored(value: Sum) -> tuple[Term, ...]:
 
 
 def atoms_of(terms: tuple[Term, ...]) -> Iterator[Atom]:
-    """All atoms of terms, also those of the arguments of calls."""
+    """All atoms of terms, also in the arguments of calls."""
     for term in terms:
         for atom, _ in term.monomial:
             yield atom

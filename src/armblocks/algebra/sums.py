@@ -97,7 +97,7 @@ class Sum:
         return Sum({key: (factor * a, abs(factor) * size) for key, (a, size) in self.terms.items()})
 
     def contracted(self) -> Sum:
-        """The sum with products of sines and cosines of two angles as those of their sum or difference.
+        """The sum with products of sines and cosines of two angles written with their sum or difference.
 
         ``cos a cos b - sin a sin b = cos(a + b)``, ``cos² a + sin² a = 1``, and the like, where both products
         occur with the same other factors and numbers.

@@ -78,7 +78,7 @@ def dead_time(
 ) -> DeadTime:
     """The delays that the equations ``readers`` depend on, directly or through other delays.
 
-    ``inputs`` are the derivatives of the inputs of all delays, ``readers`` those of the equations.
+    ``inputs`` are the derivatives of the inputs of all delays, ``readers`` the derivatives of the equations.
     """
     system = evaluated.system
     assert system.delays is not None

@@ -17,8 +17,8 @@ SWEEPS = 12
 def equilibrating_factors(matrix: Array) -> tuple[Array, Array]:
     """Powers of two for the rows and columns of a matrix (m, n), whose largest entries are then about 1.
 
-    Rows and columns of zeros have the factor 1. The method is that of Ruiz (Rutherford Appleton Laboratory,
-    RAL-TR-2001-034), in logarithms.
+    Rows and columns of zeros have the factor 1. Source: Ruiz (Rutherford Appleton Laboratory,
+    RAL-TR-2001-034), here in logarithms.
     """
     logarithms = np.full(matrix.shape, -np.inf)
     logarithms[matrix != 0.0] = np.log2(np.abs(matrix[matrix != 0.0]))

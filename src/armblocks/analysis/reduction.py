@@ -75,7 +75,7 @@ def minimal(system: SystemT) -> SystemT:
 def on_path(system: SystemT) -> SystemT:
     """The system with only the states on a path from an input to an output.
 
-    The paths are those of the graph of the nonzero matrix entries.
+    Paths refer to the graph of the nonzero matrix entries.
     """
     links = system.A != 0.0
 

@@ -33,8 +33,8 @@ QUANTITIES = ("amplitude", "power density")
 class SignalSpectrum:
     """``values`` (m, k) of k signals at ``frequency`` (m,) Hz, from 0 to half of ``sample_rate`` Hz.
 
-    For the ``quantity`` ``"amplitude"`` the unit is that of the signal, for ``"power density"`` its square
-    per Hz. The values are averages over ``segments`` segments of ``length`` samples.
+    The ``quantity`` ``"amplitude"`` has the unit of the signal, ``"power density"`` its square per Hz. The
+    values are averages over ``segments`` segments of ``length`` samples.
     """
 
     quantity: str

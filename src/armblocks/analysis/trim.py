@@ -3,13 +3,14 @@
 The unknowns are the states that are not given, the discrete states of clocks, the outputs of delays, the
 unknowns of implicit equations, and the free parameters. The equations are: the derivatives of all non-moving
 states are 0, ticks change no state, outputs of delays equal their inputs, the implicit equations hold, and
-the chosen signals have their required values. Steps are those of Levenberg and Marquardt (Moré, Lecture Notes
-in Mathematics 630, 1978, 105-116), limited to the bounds of the unknowns. Equations and unknowns are scaled
-by the rows and columns of the Jacobian, so that their units have no effect. The search ends when the
-equations hold to their rounding errors, or when a step is within the rounding errors of the unknowns. If
-there are several solutions, the result is one near the start. The modes are updated at the solution, and the
-iteration is repeated. If this fails, the modes are updated at every step. This is necessary, for example, for
-a table whose first segment, extended as a straight line, reaches zero only far beyond the last segment.
+the chosen signals have their required values. Steps follow the method of Levenberg and Marquardt (Moré,
+Lecture Notes in Mathematics 630, 1978, 105-116), limited to the bounds of the unknowns. Equations and
+unknowns are scaled by the rows and columns of the Jacobian, so that their units have no effect. The search
+ends when the equations hold to their rounding errors, or when a step is within the rounding errors of the
+unknowns. If there are several solutions, the result is one near the start. The modes are updated at the
+solution, and the iteration is repeated. If this fails, the modes are updated at every step. This is
+necessary, for example, for a table whose first segment, extended as a straight line, reaches zero only far
+beyond the last segment.
 """
 
 from __future__ import annotations

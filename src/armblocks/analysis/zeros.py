@@ -32,7 +32,8 @@ MAX_GROWTH = 100.0
 class ZeroPencil(NamedTuple):
     """``det(M - s N) = 0`` at the zeros; ``tolerance`` is the size of the rounding errors of M.
 
-    ``large`` is ``None``, or a matrix whose large eigenvalues are more accurate than those of the pencil.
+    ``large`` is ``None``, or a matrix whose large eigenvalues are more accurate than the eigenvalues of the
+    pencil.
     """
 
     M: Array
@@ -47,7 +48,7 @@ class ZeroPencil(NamedTuple):
 
         if self.large is None:
             return eigenvalues(self.M)
-        # The errors are relative to the norm: small zeros are those of the pencil, large ones those of the
+        # The errors are relative to the norm: small zeros are taken from the pencil, large zeros from the
         # matrix.
         small, large = (
             found[np.argsort(np.abs(found))] for found in (eigvals(self.M, self.N), eigvals(self.large))

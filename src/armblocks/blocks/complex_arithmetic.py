@@ -39,7 +39,7 @@ def quotient(dividend: complex, divisor: complex) -> complex:
 
 
 def square_root(z: complex) -> complex:
-    """The square root with a non-negative real part; its imaginary part has the sign of that of ``z``."""
+    """The square root with a non-negative real part; its imaginary part has the sign of ``z.imag``."""
     if z == 0.0:
         return complex(0.0, z.imag)
     large = math.sqrt((abs(z.real) + magnitude(z)) / 2.0)

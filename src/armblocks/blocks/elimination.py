@@ -1,8 +1,8 @@
 """Linear equations with symbols: Gaussian elimination with pivots that are chosen at run time.
 
 Every row exchange is a conditional expression in the traced equations, so that the result is as accurate as
-that of a numerical library for every value of the signals. The elimination takes about n^3 operations for an
-(n, n) matrix. It suits the sizes of arms and controllers, not hundreds of unknowns.
+the result of a numerical library for every value of the signals. The elimination takes about n^3 operations
+for an (n, n) matrix. It suits the sizes of arms and controllers, not hundreds of unknowns.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """A grid of cubic cells that grows with its samples; counting is native code.
 
 The grid keeps for each cell the number of its samples, and for each value the sum, the largest and the
-smallest value. Its memory is that of the box of the visited cells; the samples themselves are not kept.
+smallest value. It needs memory for the box of the visited cells; the samples themselves are not kept.
 """
 
 from __future__ import annotations

@@ -49,7 +49,7 @@ def parse_assignments(texts: Sequence[str]) -> dict[str, Value]:
 
 
 def chosen_parameters(diagram: Diagram, set_name: str | None, texts: Sequence[str] | None) -> dict[str, Any]:
-    """Values by ``block.parameter``: those of a parameter set of the diagram, then those of ``--set``.
+    """Values by ``block.parameter``: first from a parameter set of the diagram, then from ``--set``.
 
     Raises ``UnknownNameError`` for an unknown set, and as
     :func:`~armblocks.diagram.parameter_sets.checked_set` and :func:`parse_assignments`.

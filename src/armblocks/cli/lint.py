@@ -62,7 +62,7 @@ def lint(
         target = _target(Path(robot), output, in_place=in_place, force=force)
         corrected = correct_robot(robot, name=name, packages=packages, arguments=arguments)
         _write(robot, target, corrected, console)
-        # The lines of the remaining findings are those of the copy.
+        # The line numbers of the remaining findings refer to the copy.
         findings = [
             replace(found, file=str(target)) if corrected.changes and found.file == robot else found
             for found in corrected.remaining

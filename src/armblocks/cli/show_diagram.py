@@ -55,7 +55,7 @@ def _add_subsystems(tree: Tree, diagram: Diagram) -> None:
         branch = tree.add(Text.assemble(label, "  ", _count(inner)))
         if values := _values(block):
             branch.add(Text(values))
-        if not inner.link:  # the content is that of the library
+        if not inner.link:  # the library has the content
             _add_subsystems(branch, inner)
 
 

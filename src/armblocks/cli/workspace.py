@@ -40,7 +40,7 @@ def workspace(
     ] = None,
     seed: Annotated[int, typer.Option(help="Selects the sequence of configurations.")] = 0,
     threads: Annotated[
-        int | None, typer.Option(help="Number of threads; by default that of the CPUs.")
+        int | None, typer.Option(help="Number of threads; by default the number of CPUs.")
     ] = None,
     out: Annotated[
         Path | None,

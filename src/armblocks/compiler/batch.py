@@ -140,8 +140,8 @@ def _add_block(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
         body.do("ret void")
     else:
         # The function is inlined into the loop, so that LLVM computes values of shared inputs before the
-        # first iteration. Its parameters are not "noalias": those of the loop are, and inlining would
-        # otherwise add metadata to every access.
+        # first iteration. Its parameters are not "noalias", unlike the parameters of the loop; otherwise
+        # inlining would add metadata to every access.
         result, inlined = "i1", "alwaysinline"
         declared = [(kind.split()[0], argument) for kind, argument in declared]
         body.do(f"ret i1 {'false' if undecided is None else body.let(f'icmp ne i{lanes} {undecided}, 0')}")

@@ -98,7 +98,7 @@ class _PythonObjects:
         self.require(numbers & ((value.int32(ARRAY_FLAGS) & flags) == flags))
 
     def require_extents(self, dimensions: Integers, shape: Shape) -> None:
-        """Continue only if the dimensions are those of ``shape``."""
+        """Continue only if the dimensions equal ``shape``."""
         for axis, extent in enumerate(shape):
             self.require(dimensions[axis] == extent)
 

@@ -1,8 +1,8 @@
 """A slow interpreter of tapes in NumPy, the reference for compiled code.
 
-It shares only the tape with the code generator: arithmetic is NumPy's, and elementary functions are
-those of NumPy or the C library. Tapes without elementary functions give the same bits as compiled code when
-``fused`` is true, because fused multiply-adds are then rounded once, as the hardware does.
+It shares only the tape with the code generator: arithmetic is NumPy's, and elementary functions come from
+NumPy or the C library. Tapes without elementary functions give the same bits as compiled code when ``fused``
+is true, because fused multiply-adds are then rounded once, as the hardware does.
 """
 
 from __future__ import annotations

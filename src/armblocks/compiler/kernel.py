@@ -49,8 +49,8 @@ def compile_function(traced: TracedFunction) -> Kernel:
 class Kernel:
     """``outputs = kernel(*inputs)`` in native code.
 
-    ``name``, ``inputs`` and ``outputs`` are those of the traced function. Results do not depend on the number
-    of samples or threads.
+    ``name``, ``inputs`` and ``outputs`` are copied from the traced function. Results do not depend on the
+    number of samples or threads.
     """
 
     def __init__(
@@ -132,7 +132,7 @@ class Kernel:
     def columns(self, *arrays: ArrayLike, out: object = None, threads: int = 1) -> Any:
         """Evaluate a batch into arrays of column layout: ``(*shape, N)`` for each output.
 
-        The inputs are those of a call; at least one must have a sample axis. An input ``(N, n)`` that is the
+        Inputs as for a call; at least one must have a sample axis. An input ``(N, n)`` that is the
         transpose of a C-contiguous ``(n, N)`` array is read in place too.
         """
         return self._run(arrays, out, threads, columns=True)

@@ -15,7 +15,7 @@ MAX_STACK_BYTES = 128 * 1024
 class WorkSpace:
     """Rows of one double for each lane of a body, aligned to the size of a row; not initialised.
 
-    The memory must be freed in the same body. ``address`` is that of the first row.
+    The memory must be freed in the same body. ``address``: the address of the first row.
     """
 
     def __init__(self, body: Body, rows: int) -> None:

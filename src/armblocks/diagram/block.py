@@ -86,7 +86,7 @@ class Block(ABC, metaclass=ArgumentErrors, methods=False):
     inputs of this one. Outputs do not read ``p["T_next"]``."""
     called: ClassVar[bool] = False
     """Whether a sampled block calls Python before each of its ticks. :meth:`call` takes the discrete states
-    ``port?`` of the inputs at the tick and returns those of the outputs."""
+    ``port?`` of the inputs at the tick and returns the discrete states of the outputs."""
     virtual: ClassVar[bool] = False
     """Whether the block represents connections only: it has no equations and is removed before tracing."""
     broadcast_parameters: ClassVar[tuple[str, ...]] = ()
@@ -173,7 +173,7 @@ class Block(ABC, metaclass=ArgumentErrors, methods=False):
         return (cls.__doc__ or "").strip().splitlines()[0]
 
     def own_parameters(self) -> tuple[Parameter, ...]:
-        """The parameters of this block: those of its type and, for a subsystem, those of its mask."""
+        """The parameters of this block: of its type and, for a subsystem, of its mask."""
         return self.parameters()
 
     def parameter_value(self, name: str) -> Value:
@@ -312,7 +312,7 @@ class Block(ABC, metaclass=ArgumentErrors, methods=False):
     # -- equations ---------------------------------------------------------------------------------------
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        """Value of every output port (except those of ``time_derivatives``)."""
+        """Value of every output port, except the ports of ``time_derivatives``."""
         return {}
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:

@@ -1,4 +1,4 @@
-"""The features of a block inside a conditional subsystem: those of the block, gated by its control.
+"""The features of a block inside a conditional subsystem, gated by its control.
 
 While the control is off, continuous and sampled states keep their values. At a restart all states are reset
 to their initial values. When the control turns on, modes become consistent with the present values, as at the
@@ -36,9 +36,10 @@ _CONTROL_GUARD = "?turned"
 def conditional(features: Features, gate: Collection[str], *, clocked: bool, ticking: bool) -> Features:
     """The features of a block with these hidden inputs.
 
-    ``clocked``: the block is active at the ticks of a clock. ``ticking``: the equations are those of a tick,
-    where a restart acts before all equations. At an event a restart acts through the resets, one iteration
-    after the control has changed. The hidden state ``?done`` prevents a second restart after that of a tick.
+    ``clocked``: the block is active at the ticks of a clock. ``ticking``: the equations are evaluated at a
+    tick, where a restart acts before all equations. At an event a restart acts through the resets, one
+    iteration after the control has changed. The hidden state ``?done`` prevents a second restart after a
+    restart at a tick.
     """
     own = with_hidden_inputs(features, gate)
     if ELAPSED in gate and features.reads_next_period:
@@ -287,7 +288,7 @@ def with_consistent_modes(features: Features) -> Features:
 
 
 def _plain(values: Signals) -> dict[str, SX]:
-    """The values without those of hidden names."""
+    """The values of all names that are not hidden."""
     return {name: value for name, value in values.items() if not name.startswith("?")}
 
 

@@ -269,9 +269,9 @@ def _renamings(before: Diagram, after: Diagram) -> dict[str, str]:
     """Later names of blocks by earlier names (colour refinement).
 
     A block that only one diagram has starts with a colour of its content. Each round refines its colour by
-    those of its neighbours. A block that both diagrams have keeps a unique colour. Blocks of equal colour in
-    both diagrams are the same block. Where several blocks have equal colours, one pair is matched and
-    refinement continues; any choice is valid.
+    the colours of its neighbours. A block that both diagrams have keeps a unique colour. Blocks of equal
+    colour in both diagrams are the same block. Where several blocks have equal colours, one pair is matched
+    and refinement continues; any choice is valid.
     """
     removed = {
         name: hash(_content(block)) for name, block in before.blocks.items() if name not in after.blocks

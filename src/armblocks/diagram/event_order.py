@@ -131,7 +131,7 @@ class _Graph:
 def _read_inside_subsystems(network: Network, excluded: set[str]) -> dict[str, list[Node]]:
     """For each control of a conditional subsystem, the nodes outside that the blocks inside read.
 
-    A control acts on all blocks inside. Its events therefore follow those of all blocks that they read.
+    A control acts on all blocks inside. Its events therefore follow the events of all blocks that they read.
     """
     read_by_control: dict[str, list[Node]] = {}
     for control, block in network.diagram.blocks.items():
@@ -172,9 +172,10 @@ def _read_by_groups(network: Network, name: str, kinds: set[SlotKind], excluded:
 class _Places:
     """The places of vertices in the order of an instant, from all paths to them.
 
-    ``rank``: the largest number of counted vertices on a path; loops count once. ``level``: that of a tick.
-    ``event``: the place of an event, the number of levels of ticks before it and its rank among the events
-    after them. ``reads_events``: whether a counted vertex is on a path. The ticks ``early`` have level 0.
+    ``rank``: the largest number of counted vertices on a path; loops count once. ``level``: the level of a
+    tick. ``event``: the place of an event, the number of levels of ticks before it and its rank among the
+    events after them. ``reads_events``: whether a counted vertex is on a path. The ticks ``early`` have level
+    0.
     """
 
     def __init__(

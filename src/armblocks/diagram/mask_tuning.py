@@ -33,8 +33,10 @@ class DependentParameters:
 
 
 def mask_parameters(diagram: Diagram) -> Mapping[str, tuple[Diagram, Parameter]]:
-    """The parameters of masks of a hierarchy by path, ``servo.kp`` or ``kp``, with the diagrams that declare
-    them; without those of commented subsystems."""
+    """The mask parameters of a hierarchy by path, ``servo.kp`` or ``kp``, with their diagrams.
+
+    Commented subsystems are omitted.
+    """
     return {
         f"{path}.{rule.name}" if path else rule.name: (level, rule)
         for path, level in active_levels(levels_of(diagram)).items()
@@ -100,7 +102,7 @@ def added_parameter(diagram: Diagram, path: str) -> AddedParameter:
 def with_mask_parameters(system: HybridSystem, diagram: Diagram, names: Iterable[str]) -> HybridSystem:
     """The equations of a diagram with the mask parameters among ``names`` as parameters.
 
-    A name may be that of one entry: ``servo.gains[1]``. Raises as :func:`added_parameter`.
+    A name may be the name of one entry: ``servo.gains[1]``. Raises as :func:`added_parameter`.
     """
     parameters = mask_parameters(diagram)
     wholes = (name if name in parameters else name.rpartition("[")[0] for name in names)

@@ -90,7 +90,7 @@ class Network:
                     yield self.state_rate(node.block, state, order).node, (f"{node.block}/{state}'",)
 
     def roots(self) -> Iterator[Node]:
-        """The required nodes: all groups and derivative ports; at a tick, only those of sampled blocks."""
+        """The required nodes: all groups and derivative ports, at a tick only of sampled blocks."""
         for name, block in self.diagram.blocks.items():
             clocked = self.diagram.clocked(name)
             if clocked and not self.ticking:

@@ -2,7 +2,7 @@
 
 ``diagram.parameter_sets["stiff"]`` maps paths, ``"controller/pid.kp"``, ``"controller.kp"`` or ``"kp"`` as in
 :func:`~armblocks.diagram.with_parameters`, to values. The diagram itself keeps its own values; sets of inner
-diagrams are stored, but only those of the outermost diagram can be applied.
+diagrams are stored, but only sets of the outermost diagram can be applied.
 """
 
 from __future__ import annotations

@@ -67,7 +67,7 @@ class Sampling:
 
 
 def resolve_sampling(diagram: Diagram, equations: Mapping[str, BlockEquations]) -> Sampling:
-    """Find the clock of every sampled block; ``equations`` are those of all other blocks.
+    """Find the clock of every sampled block; ``equations``: the equations of all other blocks.
 
     A block with sample time -1 inherits the clock of the sampled blocks upstream, through blocks without
     states. Of several clocks it inherits the fastest, if all other periods are multiples of it. If only
@@ -117,8 +117,8 @@ def moving_blocks(diagram: Diagram, equations: Mapping[str, BlockEquations]) -> 
 
     A moving output depends on time, a state, or another moving output. Outputs that depend only on sampled
     blocks, constants and modes change at instants. The result contains all blocks on loops, so that a loop
-    through comparisons is solved for each value of the comparisons. ``equations`` are those of all blocks
-    that are not sampled.
+    through comparisons is solved for each value of the comparisons. ``equations``: the equations of all
+    blocks that are not sampled.
     """
     wires = {name: list[tuple[str, PortRef]]() for name in equations}
     for wire in diagram.connections:

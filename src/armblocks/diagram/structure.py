@@ -164,7 +164,7 @@ class DiagramBlock(Block):
     )
 
     def control_ports(self) -> tuple[Port, ...]:
-        """Inputs in addition to those of the inner diagram."""
+        """Inputs in addition to the inputs of the inner diagram."""
         return ()
 
     def check(self) -> None:

@@ -72,8 +72,8 @@ def _is_sum(network: Network, node: Node) -> bool:
     """Whether a node adds terms of several sources, or reduces the elements of one source.
 
     The product of a square matrix with one vector is not counted as a sum. Its relative rounding errors are
-    comparable to those of the matrix entries, and its rows would double the number of unknowns of a loop of
-    vectors.
+    comparable to the errors of the matrix entries, and its rows would double the number of unknowns of a loop
+    of vectors.
     """
     group = _group(network, node)
     function = Function("f", [group.t, group.p, group.z], [group.expression])

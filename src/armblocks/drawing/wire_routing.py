@@ -5,8 +5,8 @@ net. Lines of two nets never overlap, and cross at right angles away from corner
 without a legal route has labels at its ends in place of a line.
 
 The routes are a function of the blocks and nets alone. :class:`Routing` stores the previous routes and the
-area on which each depends. It reroutes only nets with a change in this area. The result equals that of
-routing the whole sheet again.
+area on which each depends. It reroutes only nets with a change in this area. Routing the whole sheet again
+gives the same result.
 """
 
 from __future__ import annotations

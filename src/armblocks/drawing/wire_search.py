@@ -28,7 +28,7 @@ _MAX_BENDS = 14
 
 
 def grid_lines(exact: Sequence[float], candidates: Sequence[float], spacing: float) -> Floats:
-    """All ``exact`` coordinates, and those of ``candidates`` that are ``spacing`` from all others; sorted."""
+    """All ``exact`` coordinates, and all ``candidates`` at least ``spacing`` from all others; sorted."""
     fixed = sorted(set(exact))
     lines, k = list(fixed), 0
     last = -np.inf
@@ -49,9 +49,9 @@ def edge_weights(rectangles: Floats, weights: Floats, line: Floats, levels: Floa
     """The sum of the weights of the open rectangles that each edge of parallel grid lines intersects.
 
     ``rectangles`` (n, 4): begin, end along the lines, begin, end across them. ``weights`` (n, kinds) are
-    dyadic, so sums are exact. ``line`` has the coordinates of the nodes along each line, ``levels`` those of
-    the lines. Returns (kinds, edges, lines). The weights are written to the corners of the rectangles;
-    cumulative sums in both directions extend them to the interior (a summed-area table).
+    dyadic, so sums are exact. ``line`` has the coordinates of the nodes along each line, ``levels`` the
+    coordinates of the lines. Returns (kinds, edges, lines). The weights are written to the corners of the
+    rectangles; cumulative sums in both directions extend them to the interior (a summed-area table).
     """
     first = np.maximum(np.searchsorted(line, rectangles[:, 0], "right") - 1, 0)
     last = np.maximum(np.searchsorted(line, rectangles[:, 1], "left"), first)

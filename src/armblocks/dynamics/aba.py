@@ -46,7 +46,8 @@ def aba(
         if on_bodies and i in on_bodies:
             bias = bias + vertcat(*on_bodies[i].moment, *on_bodies[i].force)
         pA.append(bias)
-    # The rotors of ball joints have the accelerations qdd; the bodies have those of a series of axes.
+    # The rotors of ball joints have the accelerations qdd; the bodies have the accelerations of a series of
+    # axes.
     shift = axis_accelerations(tree, qd, [0.0] * tree.n)
     U: list[SX] = [SX(6, 1)] * tree.n
     d: list[SX] = [SX(1, 1)] * tree.n

@@ -188,7 +188,7 @@ def rotation_vector(quaternion: Sequence[Scalar]) -> Vector:
 def _motions(
     robot: Robot, q: Sequence[Scalar], qd: Sequence[Scalar] = ()
 ) -> Iterator[tuple[bool, Sequence[Scalar], Sequence[Scalar]]]:
-    """For each elementary motion of the joints whether it is that of a ball, with its parts of q and qd."""
+    """For each elementary motion of the joints: whether it is a ball, and its parts of q and qd."""
     position = speed = 0
     for joint in robot.joints:
         for motion in joint.motions:

@@ -36,7 +36,7 @@ def regrouped(tree: KinematicTree) -> KinematicTree:
     Before that, each body's origin is shifted along its joint axis to the foot of the common normal with the
     next axis. This removes products with the distance between them.
 
-    Joint torques, mass matrix and kinetic energy are those of the robot; the inertia of a single body is not.
+    Joint torques, mass matrix and kinetic energy are unchanged; the inertia of a single body changes.
     Source: Khalil, Dombre, *Modeling, Identification and Control of Robots*, 9.4 (base inertial parameters).
     """
     tree = _origins_on_common_normals(tree)

@@ -267,7 +267,7 @@ def check_no_prescribed_motion(robot: Robot) -> None:
 def restoring_rates(robot: Robot, q: SX, qd: SX, motion: ConstrainedMotion) -> tuple[SX, SX]:
     """Rates of the states ``q`` (nq, 1) and ``qd`` (n, 1) of an integration of ``motion``.
 
-    The rates are those of the motion, plus a term that reduces the distance from the consistent state with
+    The rates are the rates of the motion plus a term that reduces the distance from the consistent state with
     the time constant ``RESTORING_TIME``. This term keeps the integrated states within the range of the
     projection. It does not change the motion, because the outputs of a run are the consistent state. Source:
     the method of Baumgarte 1972, here without its influence on the results.

@@ -88,9 +88,10 @@ def attached_frame(tree: KinematicTree, attachment: Attachment) -> Frame:
 class FramePair:
     """Two frames a and b, such as those of a closure, in base axes, and the motion of b relative to a.
 
-    ``displacement``: from the origin of a to that of b. ``point_columns``, ``angular_columns``: by index in
-    qd, the velocity of the origin of b relative to frame a, and the angular velocity of b relative to a, per
-    unit speed. Joints that move both frames, or none, are absent: they do not change the relative pose.
+    ``displacement``: from the origin of a to the origin of b. ``point_columns``, ``angular_columns``: by
+    index in qd, the velocity of the origin of b relative to frame a, and the angular velocity of b relative
+    to a, per unit speed. Joints that move both frames, or none, are absent: they do not change the relative
+    pose.
     """
 
     n: int

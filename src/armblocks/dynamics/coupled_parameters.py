@@ -53,7 +53,8 @@ def regrouped_by_couplings(tree: KinematicTree, robot: Robot) -> KinematicTree:
     """A tree with the same equations of motion in the independent coordinates of ``robot``, and fewer terms.
 
     ``tree``: the tree of the robot without couplings. The parameters of the bodies between base and tip are
-    preferred to those of the rods beside them. The tree is returned unchanged if this removes no parameter.
+    preferred to the parameters of the rods beside them. The tree is returned unchanged if this removes no
+    parameter.
     """
     effects = _Effects(tree, robot)
     states = -(-2 * PARAMETERS * tree.n // max(robot.nv, 1))
@@ -150,7 +151,7 @@ class _Effects:
 
 
 def _regrouped(effects: Array, given: Array, order: Sequence[int]) -> Array | None:
-    """The parameters with the same torques as ``given``, those of dependent columns replaced by others.
+    """The parameters with the same torques as ``given``, without the parameters of dependent columns.
 
     Gauss-Jordan elimination with row pivots; columns are taken in ``order``. ``None``: rounding errors decide
     whether a column depends on others.

@@ -1,6 +1,6 @@
 """Dynamics whose inertial parameters of chosen links are inputs: sweeps, tuning and identification.
 
-The functions are those of :mod:`armblocks.dynamics.traces`, with one more input ``parameters`` (k, 10): one
+The functions of :mod:`armblocks.dynamics.traces`, with one more input ``parameters`` (k, 10): one
 row for each of k links, with its mass (kg), centre of mass x y z (m, in the frame of the link) and inertia xx
 yy zz xy yz xz (kg m2, about the centre of mass, in link axes). They replace the numbers of the description.
 """

@@ -25,16 +25,16 @@ class JointMotion:
     p: Vector
 
     def to_body(self, a: Vector) -> Vector:
-        """A vector, transformed from the axes of the parent body to those of the body."""
+        """A vector, transformed from axes of the parent body to axes of the body."""
         return self.rotation.rotate_back(self.to_joint(a))
 
     def to_joint(self, a: Vector) -> Vector:
-        """A vector, transformed from the axes of the parent body to those of the unrotated joint."""
+        """A vector, transformed from axes of the parent body to axes of the unrotated joint."""
         R = self.body.placement.rotation
         return rotate((_column(R, 0), _column(R, 1), _column(R, 2)), a)
 
     def to_parent(self, a: Vector) -> Vector:
-        """A vector, transformed from the axes of the body to those of the parent body."""
+        """A vector, transformed from axes of the body to axes of the parent body."""
         return rotate(self.body.placement.rotation, self.rotation.rotate(a))
 
 

@@ -171,7 +171,7 @@ def _about_base(wrench: Wrench, p: Vector) -> Wrench:
 
 
 def _in_frame(wrench: Wrench, pose: Pose) -> Wrench:
-    """A wrench about the origin of a frame, from base axes to those of the frame."""
+    """A wrench about the origin of a frame, transformed from base axes to axes of the frame."""
     axes = (pose.x, pose.y, pose.z)
     force, moment = (tuple(dot(axis, value) for axis in axes) for value in wrench)
     return Wrench((force[0], force[1], force[2]), (moment[0], moment[1], moment[2]))

@@ -73,7 +73,7 @@ def body_poses(tree: KinematicTree, q: Sequence[Scalar], ground: Pose) -> list[P
 
 
 def _ball_pose(parent: _RotatedPose, body: Body, q: Sequence[Scalar]) -> _RotatedPose:
-    """The pose of a body of a ball joint, from that of its parent."""
+    """The pose of a body of a ball joint, from the pose of its parent."""
     before = parent.pose.after(body.placement)
     rotation = ball_rotation(body, q)
     x, y, z = (before.rotate(column) for column in transpose(rotation.matrix()))
@@ -82,7 +82,7 @@ def _ball_pose(parent: _RotatedPose, body: Body, q: Sequence[Scalar]) -> _Rotate
 
 
 def _body_pose(parent: _RotatedPose, body: Body, coordinates: Sequence[Scalar]) -> _RotatedPose:
-    """The pose of a body on an axis, from that of its parent."""
+    """The pose of a body on an axis, from the pose of its parent."""
     q = coordinates[body.position]
     p = parent.start.rotate(parent.rotation.rotate(body.placement.translation))
     p = add(parent.pose.p, p)

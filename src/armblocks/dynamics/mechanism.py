@@ -351,7 +351,7 @@ class Mechanism:
 
 @lru_cache(maxsize=32)
 def mechanism(robot: Robot) -> Mechanism:
-    """The numerical functions of a robot's constraints; those of the last 32 robots are cached."""
+    """The numerical functions of a robot's constraints, cached for the last 32 robots."""
     return Mechanism(robot)
 
 

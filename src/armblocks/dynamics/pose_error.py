@@ -33,9 +33,9 @@ def trace_pose_error(
     """``error (6,)`` and ``J (6, n)`` for ``q (nq,)`` and the target ``T (4, 4)`` in the world.
 
     ``error``: the displacement from the tool to the target (m), then the rotation vector (rad, at most π)
-    from the orientation of the tool to that of the target; both in the given ``axes``. ``J qd`` is the
-    velocity of the tool in the same axes, so ``J qd = error`` moves the tool towards the target. ``frame``:
-    the name of another frame of the robot that takes the place of the tool.
+    from the orientation of the tool to the orientation of the target; both in the given ``axes``. ``J qd`` is
+    the velocity of the tool in the same axes, so ``J qd = error`` moves the tool towards the target.
+    ``frame``: the name of another frame of the robot that takes the place of the tool.
 
     With closed loops, q are the coordinates of all joints, and the constraints are additional equations.
     Raises RobotError for a robot without moving joints.

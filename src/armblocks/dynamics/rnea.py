@@ -26,8 +26,8 @@ class BodyMotion(NamedTuple):
     """The motion of one body, in the axes of the body.
 
     ``omega`` is the angular velocity (rad/s), ``alpha`` the angular acceleration (rad/s2), ``acceleration``
-    that of the origin (m/s2). ``U = [alpha]x + [omega]x [omega]x`` maps a point to its acceleration relative
-    to the origin.
+    the acceleration of the origin (m/s2). ``U = [alpha]x + [omega]x [omega]x`` maps a point to its
+    acceleration relative to the origin.
     """
 
     omega: Vector
@@ -155,7 +155,7 @@ def inertial_wrench(inertia: RigidInertia, motion: BodyMotion) -> Wrench:
 
 
 def _with_child_wrench(parent: Wrench, child: Wrench, joint: JointMotion) -> Wrench:
-    """The parent's wrench plus that of a child, about the parent's origin."""
+    """The parent's wrench plus the wrench of a child, about the parent's origin."""
     force = joint.to_parent(child.force)
     moment = add(joint.to_parent(child.moment), cross(joint.p, force))
     return Wrench(add(parent.force, force), add(parent.moment, moment))

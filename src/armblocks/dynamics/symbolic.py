@@ -1,7 +1,7 @@
 """Readable functions of a robot, with symbols in the place of lengths, inertial parameters and gravity.
 
-The equations are those of :mod:`armblocks.dynamics.traces`, but the inertial parameters are those of the
-links, not their base parameters, so that the symbols of the user remain.
+The equations of :mod:`armblocks.dynamics.traces`, but with the inertial parameters of the links instead of
+base parameters, so that the symbols of the user remain.
 """
 
 from __future__ import annotations

@@ -39,7 +39,7 @@ def trace_torque_regressor(robot: Robot, links: Sequence[str]) -> TracedFunction
 
     Columns: ten for each link, in the order of ``INERTIAL``; then for the m degrees of freedom of the tree
     (joints that couplings determine included) the blocks of ``MOTOR`` at the joint side of the gear; last the
-    torque of all other links, and of the springs. The torques are those of the independent coordinates.
+    torque of all other links, and of the springs. The torques act on the independent coordinates.
 
     Raises RobotError for a robot with closed loops, UnknownNameError for an unknown link.
     """

@@ -188,7 +188,7 @@ def trace_joint_wrenches_loaded(robot: Robot, near: Array | None = None) -> Trac
 
     Row k is the wrench that the parent exerts on link k through its joint, about the origin and in the axes
     of the distal frame of the joint. Its component along the axis is the torque of the rigid bodies, without
-    friction and rotor inertia. The last rows are those of the closures: the wrench that the first link exerts
+    friction and rotor inertia. The last rows belong to the closures: the wrench that the first link exerts
     on the second one, about the origin and in the axes of the second frame.
     """
     return _joint_wrenches(robot, ("q", "qd", "qdd", "wrench", "payload"), near)
@@ -234,8 +234,8 @@ def trace_coriolis(robot: Robot) -> TracedFunction:
 
     The velocity torque is quadratic, ``c(q, qd) = C(q, qd) qd``; half its derivative with respect to ``qd``
     is the matrix of Christoffel symbols (Siciliano, Sciavicco, Villani, Oriolo, *Robotics*, 7.1.2 and 7.2.1).
-    With ball joints, whose speeds are not rates of coordinates, the symbols are those of the same connection
-    in these speeds: ``C = (dc/dqd + M W) / 2`` with W of :func:`structure_matrix`.
+    With ball joints, whose speeds are not rates of coordinates, the same connection is expressed in these
+    speeds: ``C = (dc/dqd + M W) / 2`` with W of :func:`structure_matrix`.
     """
     tree = base_parameter_tree(robot)
     bodies = body_of_speed(tree)

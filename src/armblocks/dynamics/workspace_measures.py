@@ -1,6 +1,6 @@
 """Quantities of a workspace: sampled coordinates, the position of the tool, and measures of mobility.
 
-The coordinates follow from the number of a sample: those of an additive recurrence (a Kronecker sequence),
+The number of a sample determines its coordinates by an additive recurrence (a Kronecker sequence),
 ``u_k = frac(start + k step)``, with low discrepancy for steps that are linearly independent over the rational
 numbers. Source: Niederreiter, *Random Number Generation and Quasi-Monte Carlo Methods*, SIAM 1992, section
 3.1. Each sample is therefore computed independently, in any thread.
@@ -224,7 +224,7 @@ def _inside(robot: Robot, q: SX) -> SX:
 
 def _dependent_ranges(robot: Robot, q: SX) -> list[tuple[Scalar, float, float]]:
     """The coordinates and limits of the joints that depend on several coordinates; :attr:`Robot.qlim`
-    contains the limits of those that depend on one."""
+    contains the limits of joints that depend on one coordinate."""
     found: list[tuple[Scalar, float, float]] = []
     for joint in robot.coupled_joints:
         if len(joint.factors) > 1 and joint.limits.position is not None:

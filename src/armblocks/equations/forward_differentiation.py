@@ -2,8 +2,8 @@
 
 The derivative of ``sqrt(u)`` is infinite at ``u = 0``. CasADi's forward differentiation multiplies it by the
 rate of u, so that a root that rests at 0 has the rate ``0 * inf = nan``. Here an operand with the rate 0
-contributes 0 at these points. At all other points the formulas are those of CasADi, and so are their own
-derivatives: the rate of u may be 0 at one time or for one value of a parameter only.
+contributes 0 at these points. At all other points the formulas and their own derivatives agree with CasADi:
+the rate of u may be 0 at one time or for one value of a parameter only.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def directional_derivative(expression: SX, variables: SX, direction: SX) -> SX:
 
     ``variables`` is a column of symbols (n, 1), and ``direction`` (n, 1) their rates. Where the partial
     derivative of a root, power, arc or norm is unbounded, an operand with the rate 0 contributes 0. A rate
-    that is not finite remains: that of ``sqrt(u)`` where u leaves 0 with a rate other than 0.
+    that is not finite remains, such as the rate of ``sqrt(u)`` where u leaves 0 with a rate other than 0.
     """
     own = {variables[k].element_hash() for k in range(variables.numel())}
     others = vertcat(*(symbol for symbol in symvar(expression) if symbol.element_hash() not in own), SX(0, 1))

@@ -164,7 +164,7 @@ class HybridSystem:
     """The indices in ``z`` of the momentary values, which become 0 at the end of every instant."""
     silenced_guards: tuple[tuple[int, int], ...] = ()
     """Guards, each with the index in ``z`` of a momentary value. While that value is nonzero the guard does
-    not fire; at the end of the instant its stored sign becomes that of its value."""
+    not fire; at the end of the instant its stored sign becomes the sign of its value."""
     locating_guards: tuple[int, ...] = ()
     """The guards that only locate changes of following modes."""
     ranks: EventRanks | None = None
@@ -183,8 +183,8 @@ class HybridSystem:
     """The linear loops that are solved symbolically."""
 
     def ticks_by_level(self, ticking: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], bool]]:
-        """The arguments ``m`` of ``update``, level by level, for clocks of which those with 1 tick, and
-        whether events come before this level."""
+        """For each level of ticks the argument ``m`` of ``update``, and whether events come before the level.
+        ``ticking``: 1 for each clock that ticks, else 0."""
         ranks = (-1,) if self.ranks is None else self.ranks.before_ticks
         if not ticking.any():
             return []

@@ -34,8 +34,8 @@ def solution_size(name: str) -> int | None:
 def derivative_rule(name: str) -> Function | None:
     """The derivative of this name as an expression; ``None`` if it is not a derivative of a linear solution.
 
-    The names are CasADi's: ``fwd2_linear_solution_3`` has two directions. Its arguments are those of the
-    function, then its results (which are not used), then the directions side by side.
+    The names are CasADi's: ``fwd2_linear_solution_3`` has two directions. Its arguments are the arguments of
+    the function, then its results (which are not used), then the directions side by side.
     """
     match = _DERIVATIVE.fullmatch(name)
     if match is None:

@@ -5,9 +5,9 @@ no event there. The derivative of a run with respect to a parameter needs one, b
 parameter shifts the time of the jump. :func:`with_located_jumps` replaces each such operation by a following
 mode. The guards of the mode locate its changes. With consistent modes all signals keep their values.
 
-Some comparisons are not replaced: those of the time with constants and unchanged parameters, whose times do
-not shift; those of the time with a breakpoint, which is an instant already; those of the time with a stored
-instant, which are true at single times only; and those that search an index of a table.
+Some comparisons are not replaced: comparisons of the time with constants and unchanged parameters, whose
+times do not shift; of the time with a breakpoint, which is an instant already; of the time with a stored
+instant, which are true at single times only; and comparisons that search an index of a table.
 """
 
 from __future__ import annotations
@@ -266,7 +266,7 @@ class _Located:
 
 
 def _functions(system: HybridSystem) -> tuple[list[TracedFunction], int]:
-    """The functions of the variables; the jumps in the first ones, as many as the number says, are
+    """The functions of the variables, and the number of functions, from the first on, whose jumps are
     located."""
     searched = [system.derivative, system.signals, system.residual]
     if system.delays is not None:

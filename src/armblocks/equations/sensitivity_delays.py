@@ -53,7 +53,7 @@ class DelayedSensitivities:
         self.curvature = columns.add("curvature", self.n if self.reads_derivatives else 0)
         """u'' at the delayed time, if derivatives of delayed signals are read."""
         self.Z = [self._corrected(k) for k in range(len(columns.names))]
-        """Sensitivities of z: those of delayed values are computed from the history."""
+        """Sensitivities of z; sensitivities of delayed values are computed from the history."""
         if delays is None:
             return
         n, count = self.n, len(columns.names)

@@ -132,9 +132,9 @@ class Instants:
         return 0, 0, *[1] * (len(self.moving_breakpoints) + 2 * self.delays.n)
 
     def ranks(self, own: EventRanks) -> EventRanks:
-        """The ranks of all guards. Those of sources and of delayed jumps that arrive come first, with a
-        negative rank, because they change only derivatives. Those of delay inputs that jumped come after the
-        guards of the system, and the guards that end an instant come last."""
+        """The ranks of all guards. Guards of sources and of arriving delayed jumps come first, with a
+        negative rank, because they change only derivatives. Guards of delay inputs that jumped come after the
+        guards of the system, and guards that end an instant come last."""
         n, last = self.delays.n, max(own.guards)
         added = (last + 2, last + 2, *[-1] * (len(self.moving_breakpoints) + n), *[last + 1] * n)
         return dataclasses.replace(
@@ -189,7 +189,7 @@ class Instants:
     # At an instant.
 
     def reset(self, e: SX) -> tuple[SX, SX]:
-        """All states and discrete variables after the events ``e``, including those of the added guards."""
+        """All states and discrete variables after the events ``e``, including events of the added guards."""
         c, d, names = self.columns, self.delays, self.columns.names
         counts = [self.guards, 2, len(self.moving_breakpoints), d.n, d.n]
         own, arms, sources, arrived, jumped = vertsplit(e, [0, *accumulate(counts)])

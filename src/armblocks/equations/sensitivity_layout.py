@@ -97,7 +97,7 @@ class Columns:
         return densify(directional_derivative(expression, by, vertcat(t, x, z, w, p)))
 
     def extended(self, layout: Signature, letter: str) -> Signature:
-        """The slots of ``x``, ``z`` or ``w`` with those of their sensitivities."""
+        """The slots of ``x``, ``z`` or ``w``, and the slots of their sensitivities."""
         added = [
             Slot(sensitivity_name(slot.name, name), slot.shape) for name in self.names for slot in layout
         ]

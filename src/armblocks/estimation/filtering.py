@@ -14,9 +14,9 @@ ORDER = 4
 def low_passed(values: Array, step: float, cutoff: float) -> Array:
     """``values`` (N, …) sampled every ``step`` s, without the frequencies above ``cutoff`` Hz.
 
-    The gain is that of a Butterworth filter of fourth order applied forwards and backwards, ``1 / (1 + (f /
-    cutoff)^8)``, and there is no phase shift. At both ends the signal is continued by its reflection through
-    the end point, so that values and derivatives are continuous.
+    The gain of a Butterworth filter of fourth order applied forwards and backwards is ``1 / (1 + (f /
+    cutoff)^8)``, without phase shift. At both ends the signal is continued by its reflection through the end
+    point, so that values and derivatives are continuous.
     """
     count = len(values)
     if count < 4 or cutoff * step >= 0.5:

@@ -74,7 +74,7 @@ class CompiledDiagram(metaclass=ArgumentErrors):
         log: LogRequest | None = None,
         **settings: Unpack[RunSettings],
     ) -> SimulationResult:
-        """Run once; see :func:`simulate`. ``options`` default to those of the diagram."""
+        """Run once; see :func:`simulate`. ``options``: by default the settings of the diagram."""
         check_settings(settings, CompiledDiagram.simulate)
         tuned, values = self._tuned(parameters)
         options = with_settings(options or tuned.diagram.settings, settings)

@@ -56,7 +56,7 @@ class NativeFunctions(metaclass=ArgumentErrors):
     def jacobe(self) -> FrameFunction:
         """``jacobe(q)`` → J (6, n): velocity of the tool in tool axes is ``J qd``, rows as ``jacob0``.
 
-        ``frame=`` as for ``fkine``; the axes are those of the frame.
+        ``frame=`` as for ``fkine``; the velocity is then in axes of the frame.
         """
         return self._code.framed("jacobe")
 

@@ -72,7 +72,7 @@ def sweep(
     ``measures``: each name with a :class:`Measure`, the text of one, such as ``"overshoot(motor/speed,
     final=1)"``, or a Python function of the result that returns a number. ``keep``: signals whose samples are
     kept in memory or in the file. ``parameters``: parameter values for all runs. ``max_steps``: the maximum
-    number of steps of a run. ``threads``: by default the number of cores. The settings are the settings of
+    number of steps of a run. ``threads``: by default the number of cores. ``settings``: as for
     :func:`simulate`.
 
     ``out``: a ``.parquet`` or ``.csv`` file. The results are written during the sweep, so that the memory

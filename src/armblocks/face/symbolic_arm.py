@@ -23,8 +23,8 @@ class SymbolicArm(metaclass=ArgumentErrors):
     ``qdd1``, for another name ``name_d`` and ``name_dd``; ``symbols`` (k,) of lengths, masses, inertias and
     gravity, which :meth:`with_symbols` and :func:`symbolic_dh` introduce. ``names`` lists all names.
 
-    The methods return a :class:`SymbolicExpression`. The equations are the equations of :class:`Arm`, with
-    the same frames, units, friction and springs.
+    The methods return a :class:`SymbolicExpression`. Equations, frames, units, friction and springs are the
+    same as in :class:`Arm`.
     """
 
     def __init__(

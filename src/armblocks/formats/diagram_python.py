@@ -183,7 +183,7 @@ def _library_block(link: str) -> str:
 
 
 def _unlinked_diagrams(diagram: Diagram) -> Iterator[Diagram]:
-    """A diagram and the diagrams inside its blocks, without those of libraries."""
+    """A diagram and the diagrams inside its blocks, without diagrams of libraries."""
     yield diagram
     for block in diagram.blocks.values():
         if isinstance(block, DiagramBlock) and not block.diagram.link:
@@ -223,7 +223,7 @@ def _backward_connections(diagram: Diagram, order: list[str]) -> list[Connection
 
 
 def _sources(diagram: Diagram, name: str, added: set[str], names: Mapping[str, str]) -> list[str]:
-    """The sources of a block's inputs as arguments: positional as long as the order is that of the ports,
+    """The sources of a block's inputs as arguments: positional as long as they follow the order of the ports,
     then by port name."""
     arguments: list[str] = []
     in_order = True

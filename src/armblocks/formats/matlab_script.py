@@ -32,9 +32,9 @@ def read_script(
     ``name`` is the file's name in messages. Both interfaces of the toolbox are supported: ``link`` and
     ``robot`` of releases up to 8 (value objects), ``Link`` and ``SerialLink`` of releases 9 and later (handle
     objects). They differ in the order of the D-H parameters. Every robot gets ``friction_model``, by default
-    that of releases 9.5 to 10 for scripts of all releases: the formulas of older releases have wrong signs or
-    powers of the gear ratio; :class:`armblocks.robot.FrictionModel` lists them. The sign of gravity is
-    reversed, because the toolbox's vector points up. Links are named ``link1``, ``link2`` …
+    the model of releases 9.5 to 10 for scripts of all releases: the formulas of older releases have wrong
+    signs or powers of the gear ratio; :class:`armblocks.robot.FrictionModel` lists them. The sign of gravity
+    is reversed, because the toolbox's vector points up. Links are named ``link1``, ``link2`` …
 
     Raises ``FormatError`` with file, line and text at the first invalid or unsupported line. Issues a
     warning for lines that a printed page splits, which are joined.

@@ -41,7 +41,7 @@ def correct_robot(
 ) -> CorrectedFile:
     """The content of a robot file in which the findings with an unambiguous remedy are corrected.
 
-    The arguments are those of ``load_robot``. The function writes no file. All other text of the file,
+    Arguments as for ``load_robot``. The function writes no file. All other text of the file,
     including comments and spaces, is unchanged. Findings in included files, and in formats without
     corrections (xacro, MATLAB scripts), remain. Poses change only where the finding is about an angle;
     correcting the result again changes nothing.

@@ -3,7 +3,7 @@
 Angles may be texts such as ``"90 deg"``, and angular speeds such as ``"105 deg/s"``. The writer uses degrees
 where they have few digits and read back exactly. A link with a ``dh`` row takes its joint and transforms from
 it. Unknown keys are errors that suggest the nearest known key, because ignoring a misspelt key would give a
-wrong robot. ``notes`` is a comment, and ``facts`` are those of :mod:`armblocks.formats.robot_facts`. Neither
+wrong robot. ``notes`` is a comment; :mod:`armblocks.formats.robot_facts` reads ``facts``. Neither
 is preserved. ``poses`` are the taught poses of the studio (:mod:`armblocks.formats.robot_poses`), which are
 checked here and are not part of the ``Robot``.
 

@@ -1,4 +1,4 @@
-"""All findings about a robot file: those of its reader, impossible inertias, implausible values, warnings."""
+"""All findings about a robot file: from its reader, impossible inertias, implausible values, warnings."""
 
 from __future__ import annotations
 
@@ -21,8 +21,7 @@ def lint_robot(
     packages: Mapping[str, str | PathLike[str]] | None = None,
     arguments: Mapping[str, object] | None = None,
 ) -> tuple[FileFinding, ...]:
-    """All findings about a robot, in the order of the lines of its file; the arguments are those of
-    ``load_robot``.
+    """All findings about a robot, in the order of the lines of its file; arguments as for ``load_robot``.
 
     Raises the errors of ``load_robot`` for files that cannot be read.
     """

@@ -111,7 +111,7 @@ def inertial_in(link: Link, frame: Transform) -> tuple[tuple[float, ...], tuple[
 
 
 def warn_of_shapes(robot: Robot, kinds: Sequence[type[Shape]], format: str) -> None:
-    """Warn of shapes that the file does not contain: those of other kinds, and bevelled edges."""
+    """Warn of shapes that the file does not contain: shapes of other kinds, and bevelled edges."""
     others = [shape for link in robot.links for shape in link.geometry or () if type(shape) not in kinds]
     if others:
         names = ", ".join(sorted({type(shape).__name__ for shape in others}))
@@ -147,7 +147,7 @@ def file_names(robot: Robot, is_reserved: Callable[[str], bool], format: str) ->
 def frame_names(
     robot: Robot, is_reserved: Callable[[str], bool], format: str, used: set[str]
 ) -> dict[str, str]:
-    """The names of the named frames in the file, from now on used; a warning names frames whose names the
+    """Reserve and return the names of the named frames in the file; a warning lists frames whose names the
     format reserves. Names that a writer adds come after them, so that no frame loses its name."""
     used |= {frame.name for frame in robot.frames}
     return {

@@ -30,7 +30,7 @@ class ButcherTableau:
     ``second_error`` is given, both estimates are combined as in DOP853: ``e = h |e5|^2 / sqrt(|e5|^2 +
     0.01 |e3|^2)``.
 
-    ``order`` is the global order of the steps, ``dense_order`` that of the dense output.
+    ``order`` is the global order of the steps, ``dense_order`` the order of the dense output.
     """
 
     name: str

@@ -16,7 +16,7 @@ from armblocks.routines.memory import RealVariable
 from armblocks.routines.values import Boolean, Real
 
 ALL_LEVELS, FIRST_LEVEL = 1.0, 2.0
-"""Marks of a clock that ticks: for all its blocks, and for those of the first level of ticks."""
+"""Marks of a clock that ticks: for all its blocks, and for its blocks on the first level of ticks."""
 
 
 class Clocks:

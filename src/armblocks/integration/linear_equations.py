@@ -1,6 +1,6 @@
 """The linear equations of a Rosenbrock step, as routines: ``(E / gamma - h J) k = right``.
 
-``E`` is one for the rows of the flow and zero for those of implicit equations. A large sparse matrix is
+``E`` is one for the rows of the flow and zero for the rows of implicit equations. A large sparse matrix is
 eliminated in the order of :mod:`armblocks.integration.elimination_plan`, with its pivots on the diagonal and
 work in proportion to its entries. The residual of the first solution is checked, each row relative to its
 terms (Oettli, Prager, *Numer. Math.* 6 (1964) 405-409; the check is invariant to scaling). If the
@@ -188,7 +188,7 @@ class _Sparse:
         return Rows(r, places, r.integers("lower.ends", _ends(self.plan.lower)))
 
     def upper(self, r: Routine) -> Rows:
-        """The entries of U in each row, without the diagonal: stored after those of L."""
+        """The entries of U in each row, without the diagonal: stored after the entries of L."""
         first = sum(map(len, self.plan.lower))
         places = r.integers("upper.place", [0] * first + [k for row in self.plan.upper for k in row])
         return Rows(r, places, r.integers("upper.ends", [first + end for end in _ends(self.plan.upper)]))

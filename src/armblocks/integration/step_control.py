@@ -1,6 +1,6 @@
 """Step control: adaptive steps from the error estimate, fixed steps on a grid, detection of minimum steps.
 
-Adaptive step control is that of SciPy's ``RK45`` (Hairer, Norsett, Wanner I, II.4): root-mean-square norm of
+Adaptive step control as in SciPy's ``RK45`` (Hairer, Norsett, Wanner I, II.4): root-mean-square norm of
 the error over ``atol + rtol max(|x|, |x_new|)``, safety factor 0.9, step factors 0.2 to 10, no growth right
 after a rejection, the same choice of the first step. Step counts are therefore comparable with SciPy's.
 """

@@ -160,7 +160,7 @@ class LoopSizes:
       the guard does not fire.
     - ``locating_guards``: the guards that only locate mode changes.
     - ``guard_ranks``: the rank of each guard; empty if all events are processed together.
-      ``hysteresis_ranks``, ``recaptured_ranks``: those of the entries of ``hysteresis_modes`` and
+      ``hysteresis_ranks``, ``recaptured_ranks``: the ranks of the entries of ``hysteresis_modes`` and
       ``recaptured_states``. ``controls``: the indices in ``z`` of a mode and of its old value, and a rank;
       while events of a lower rank are processed, the mode has its old value.
       ``ranks_before_ticks``: for each level of ticks, the highest rank of the events before it; negative if

@@ -57,7 +57,7 @@ def nearest(
 def is_pose(r: Routine, target: Reals) -> Real:
     """1 for a homogeneous matrix (16 numbers) of a finite pose, else 0.
 
-    The rotation may deviate from an orthonormal matrix as much as that of a ``Transform``.
+    The rotation may deviate from an orthonormal matrix as much as the rotation of a ``Transform``.
     """
     is_valid = target[0].finite
     for k in range(1, POSE):

@@ -158,7 +158,7 @@ class InverseKinematics:
     ) -> Callable[[Array], tuple[Array, list[float]]]:
         """A function of one target (4, 4): :meth:`solve` from the table, with less overhead.
 
-        It returns q (nq,), and the numbers in the order of ``Number`` and the counts in that of ``Count``.
+        It returns q (nq,), the numbers in the order of ``Number`` and the counts in the order of ``Count``.
         """
         settings = settings.copy()
         settings[_HAS_STARTS] = 0.0

@@ -259,7 +259,7 @@ FUNCTIONS_OF_ARRAYS: Mapping[str, Function] = {
     "size": array_function(
         "x, k",
         "The numbers of rows and columns; in formulas a vector counts as a column. `size(A, 1)` is the "
-        "number of rows, `size(A, 2)` that of columns.",
+        "number of rows, `size(A, 2)` the number of columns.",
         ARRAYS,
         _size,
         optional=1,

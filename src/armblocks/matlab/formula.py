@@ -45,7 +45,7 @@ class Formula:
 
     @property
     def names(self) -> frozenset[str]:
-        """The names that need a value: all names except those of the function table.
+        """The names that need a value: all names that are not in the function table.
 
         A name such as ``length`` is a parameter where it is used alone and a function where it is called.
         """

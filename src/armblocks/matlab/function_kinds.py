@@ -21,8 +21,8 @@ class MismatchError(Exception):
 class Arithmetic(Protocol):
     """The operations that implement the functions of the table, in addition to ``+ - * < == …`` of arrays.
 
-    ``Any`` is an array of numbers or of symbols. All operations act element by element, except those of whole
-    arrays, which are listed last.
+    ``Any`` is an array of numbers or of symbols. All operations act element by element, except the operations
+    on whole arrays, which are listed last.
     """
 
     @property
@@ -91,7 +91,7 @@ class Arithmetic(Protocol):
         ...
 
     def fold(self, combine: Callable[[Any, Any], Any], value: Any) -> Any:
-        """All elements of a vector, or those of each column of a matrix, combined from first to last."""
+        """The elements of a vector, or of each column of a matrix, combined from first to last."""
         ...
 
     def total(self, value: Any) -> Any:

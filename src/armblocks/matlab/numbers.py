@@ -104,7 +104,7 @@ class NumberArithmetic:
         return rows, columns
 
     def fold(self, combine: Callable[[Any, Any], Any], value: Array) -> Array:
-        """All elements of a vector, or those of each column of a matrix, combined from first to last."""
+        """The elements of a vector, or of each column of a matrix, combined from first to last."""
         rows = value.reshape(-1, 1) if 1 in value.shape else value
         if not rows.size:
             raise MismatchError("the array is empty")

@@ -47,7 +47,7 @@ INFIX: Mapping[str, Level] = {
 """Operators between two operands, in MATLAB's spelling."""
 
 ALTERNATIVES: Mapping[str, str] = {"!=": "~=", "**": "^", "!": "~"}
-"""Other spellings of operators: Python's and those of Simulink's Fcn block."""
+"""Other spellings of operators, from Python and from Simulink's Fcn block."""
 WORDS: Mapping[str, str] = {"and": "&&", "or": "||"}
 """Python's words for operators."""
 SIGNS = ("+", "-", "~")

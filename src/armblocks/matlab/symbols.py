@@ -141,7 +141,7 @@ class SymbolArithmetic:
         return rows, columns
 
     def fold(self, combine: Callable[[Any, Any], Any], value: SX) -> SX:
-        """All elements of a vector, or those of each column of a matrix, combined from first to last."""
+        """The elements of a vector, or of each column of a matrix, combined from first to last."""
         if not value.numel():
             raise MismatchError("the array is empty")
         return reduce(combine, [value[k, :] for k in range(value.shape[0])])

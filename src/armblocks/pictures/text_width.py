@@ -1,7 +1,7 @@
 """Widths of texts, without a font library.
 
-The advance widths are those of DejaVu Sans (Bitstream Vera licence), in thousandths of the font size. It is
-one of the widest sans-serif fonts, so texts in the fonts of other systems do not overlap either.
+The advance widths of DejaVu Sans (Bitstream Vera licence), in thousandths of the font size. The font is one
+of the widest sans-serif fonts, so texts in the fonts of other systems do not overlap either.
 """
 
 from __future__ import annotations

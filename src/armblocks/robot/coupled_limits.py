@@ -48,12 +48,12 @@ def dependent_joints_of(links: Sequence[Link], coordinates: CoordinateMap) -> li
 def limits_with_couplings(
     own: Sequence[JointLimits], motors: Sequence[object], dependent: Sequence[DependentJoint]
 ) -> tuple[JointLimits, ...]:
-    """The limits of each entry of qd: its own limits and those of the joints that depend on it alone.
+    """The limits of each entry of qd: its own limits and the limits of joints that depend on it alone.
 
     ``own``: the limits of the joint of each entry. Positions and speeds satisfy the limits of all these
     joints. A position range that has no common value with the other ranges is ignored. If the joint of the
-    coordinate has neither motor nor torque limit, and only one joint has a motor, the torque limit is that of
-    this joint. The torques of several motors would add up.
+    coordinate has neither motor nor torque limit, and only one joint has a motor, the torque limit of this
+    joint applies. The torques of several motors would add up.
     """
     limits = list(own)
     for joint in dependent:

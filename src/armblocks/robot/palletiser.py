@@ -108,7 +108,7 @@ def palletiser(
 
     Turret, arms, drive lever and drive rod, two level rods with their triangle, wrist and flange are bodies.
     The parallelograms are couplings, so q has four entries and all motions are exact. ``masses`` (None: no
-    masses) are those of the parts; arms and rods are beams of square section with uniform mass.
+    masses): the masses of the parts; arms and rods are beams of square section with uniform mass.
     """
     if upper_arm_angle not in ("absolute", "relative"):
         raise InputError(

@@ -1,4 +1,4 @@
-"""Checks whether the inertia of each link is that of a possible rigid body."""
+"""Checks whether the inertia of each link is possible for a rigid body."""
 
 from __future__ import annotations
 

@@ -95,7 +95,7 @@ def _findings(robot: Robot) -> Iterator[PlausibilityFinding]:
             yield PlausibilityFinding(
                 robot=robot.name,
                 link=link.name,
-                what=f"its inertia of {moment:g} kg m2 is that of {link.mass:g} kg at a distance of "
+                what=f"its inertia of {moment:g} kg m2 belongs to {link.mass:g} kg at a distance of "
                 f"{math.sqrt(moment / link.mass):g} m, while the robot reaches {reach:g} m",
                 question="Is it in kg mm2 or kg cm2? It is used as given.",
             )

@@ -132,7 +132,7 @@ class Robot(metaclass=ArgumentErrors):
 
     @cached_property
     def coordinate_map(self) -> CoordinateMap:
-        """The coordinates of ``uncoupled`` as functions of those of this robot."""
+        """The coordinates of ``uncoupled`` as functions of the coordinates of this robot."""
         return coordinate_map(self.tree_links, self.couplings, f"robot '{self.name}'")
 
     @property
@@ -158,7 +158,7 @@ class Robot(metaclass=ArgumentErrors):
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints, in the order of q: those of the links that they carry."""
+        """Names of the joints, in the order of q; a joint has the name of the link that it carries."""
         return tuple(link.name for link in self.moving_links)
 
     @property
@@ -173,7 +173,7 @@ class Robot(metaclass=ArgumentErrors):
 
     @property
     def speeds(self) -> tuple[Coordinate, ...]:
-        """The entries of qd, qdd and tau with the names of their joints; the unit is that of the integral."""
+        """The entries of qd, qdd and tau with the names of their joints and the units of their integrals."""
         return tuple(_of_link(link, entry) for link in self.moving_links for entry in link.joint.speeds)
 
     @property
@@ -193,9 +193,9 @@ class Robot(metaclass=ArgumentErrors):
         """The limits of each entry of qd, including the limits of joints that depend on this entry alone.
 
         Limits of joints that depend on several entries are not included; a finding of
-        :func:`armblocks.robot.plausibility_findings` names these joints. A torque limit is that of the
+        :func:`armblocks.robot.plausibility_findings` names these joints. A torque limit is the limit of the
         entry's own joint. If this joint has neither motor nor torque limit, and only one dependent joint has
-        a motor, the limit is that of this motor, converted to the entry of qd.
+        a motor, it is the limit of this motor, converted to the entry of qd.
         """
         own = tuple(limits for joint in self.joints for limits in joint.coordinate_limits)
         return limits_with_couplings(own, self.motors, self.coupled_joints) if self.couplings else own

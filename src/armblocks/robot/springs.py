@@ -64,7 +64,7 @@ class Spring(ABC, metaclass=ArgumentErrors, methods=False):
 class JointSpring(Spring):
     """A spring at a joint with one coordinate q: the torque on the joint is ``-stiffness (q - rest)``.
 
-    ``joint``: the name of the joint, which is that of its link; couplings may determine the joint.
+    ``joint``: the name of the joint, equal to the name of its link; couplings may determine the joint.
     ``stiffness``: N m/rad, or N/m of a prismatic joint, zero or more. ``rest``: the coordinate without
     torque, rad or m. The energy is ``stiffness (q - rest)^2 / 2``. A joint may have several springs.
     """

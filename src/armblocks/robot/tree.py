@@ -208,7 +208,7 @@ def _bodies(link: Link, position: int, speed: int) -> Iterator[tuple[Body, Trans
                     ball=k,
                     motor=link.motor,
                 )
-                # Three cycles are the identity: the axes of the last body are those of the distal frame.
+                # Three cycles are the identity: the last body has the axes of the distal frame.
                 yield body, Transform()
         position, speed = position + len(motion.positions), speed + len(motion.speeds)
 

@@ -1,7 +1,7 @@
 """Typed values of a routine: numbers and conditions with operators.
 
 Each operation appends a statement to the routine that the value belongs to, at the position where Python
-evaluates it. Python numbers are constants. The types are those of the routine: a type checker distinguishes
+evaluates it. Python numbers are constants. Values have the types of the routine: a type checker distinguishes
 doubles, integers and arrays (:mod:`armblocks.routines.memory`). Python's ``if`` raises an error for a
 :class:`Boolean`, because its value is not known yet.
 """

@@ -69,7 +69,7 @@ def _step(compiled: CompiledSystem, start: RunPoint, w: Array, p: Array) -> Arra
 def _solve(matrix: Array, right: Array) -> Array:
     """The solution of linear equations by elimination with row pivoting.
 
-    The last bits of LAPACK's results depend on the processor, and those of a guess affect the run.
+    The last bits of LAPACK's results depend on the processor, and the last bits of a guess affect the run.
     """
     rows = np.column_stack([matrix, right])
     n = len(right)

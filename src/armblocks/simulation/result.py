@@ -38,15 +38,15 @@ class SimulationResult(RunData):
     def to_dataframe(self, *, jumps: bool = False) -> pd.DataFrame:
         """A pandas table: index ``time`` in s, one column for each scalar, named as in :meth:`columns`.
 
-        With ``jumps``, the rows are those of :meth:`with_jumps`, and the index is not unique.
+        With ``jumps``, the rows are the same as in :meth:`with_jumps`, and the index is not unique.
         """
         return to_dataframe(self, jumps=jumps)
 
     def save(self, path: str | PathLike[str], *, jumps: bool = True) -> None:
         """Write a file atomically; its suffix is ``.csv``, ``.parquet``, ``.npz`` or ``.mat``.
 
-        The rows are those of :meth:`with_jumps`, two rows with the same time for each jump. Without ``jumps``
-        the file has the samples only.
+        The rows are the same as in :meth:`with_jumps`, two rows with the same time for each jump. Without
+        ``jumps`` the file has the samples only.
 
         Raises ``UnknownNameError`` for another suffix and ``FormatError`` if the file cannot be written.
         """

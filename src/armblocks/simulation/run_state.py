@@ -3,8 +3,8 @@
 A run shortens its last step to end at its stop time. A longer run would take the full step. Besides the
 values at the end, a state therefore contains the arrays of the native loop before the last step. A run that
 continues with the same solver, settings and parameters repeats the step with its full length, and its samples
-are identical to those of the uninterrupted run. With other settings or parameters, or changed values, a run
-restarts from the values at ``time``.
+are identical to the samples of the uninterrupted run. With other settings or parameters, or changed values, a
+run restarts from the values at ``time``.
 """
 
 from __future__ import annotations

@@ -66,7 +66,7 @@ class Simulation:
         signals_layout: Signature | None = None,
         times: Array | None = None,
     ) -> None:
-        """``times`` (N,) s: the samples, instead of those of ``options``; from 0 to the stop time."""
+        """``times`` (N,) s: the samples, instead of the samples of ``options``; from 0 to the stop time."""
         if {function.block for function in calls} != set(compiled.called):
             raise InputError(
                 f"no function is given for the blocks {', '.join(map(repr, compiled.called))}",
@@ -148,9 +148,9 @@ class Simulation:
         (s).
 
         The first of these limits applies; without limits the run continues to its end. Steps are not
-        shortened, so the reached time may exceed ``until`` by part of a step; the samples are those of a run
-        without the pause. ``exactly`` ends a step at ``until`` and restarts the integration there, as at a
-        jump of a source.
+        shortened, so the reached time may exceed ``until`` by part of a step; a run without the pause has the
+        same samples. ``exactly`` ends a step at ``until`` and restarts the integration there, as at a jump of
+        a source.
 
         Raises ``SimulationError`` if the run cannot continue; its ``partial`` has the valid samples. Ctrl-C
         raises ``KeyboardInterrupt``; no samples are lost, and the run can continue.

@@ -1,7 +1,7 @@
 """Rotations, poses and twists as arrays: angles, quaternions, exponential, logarithm, interpolation.
 
-The names are those of the Robotics Toolbox. Every function takes one value or N of them: (3, 3) or (N, 3, 3),
-(4, 4) or (N, 4, 4), (3,) or (N, 3). Poses and rotations may also be a :class:`Transform`, or an ``SE3``,
+Names are the same as in the Robotics Toolbox. Every function takes one value or N of them: (3, 3) or (N, 3,
+3), (4, 4) or (N, 4, 4), (3,) or (N, 3). Poses and rotations may also be a :class:`Transform`, or an ``SE3``,
 ``SO3``, ``UnitQuaternion`` or ``Twist3`` of spatialmath; functions that return poses or rotations then return
 objects of spatialmath, too. Angles are in rad, or with ``unit="deg"`` in degrees. NaN gives NaN.
 
@@ -233,7 +233,7 @@ def trinterp(T0: PoseLike, T1: PoseLike, s: ArrayLike) -> PoseLike:
     kind = _array_of(T0)[1]
     first, last = pose_array(T0, "trinterp"), pose_array(T1, "trinterp")
     if first.shape[-1] != last.shape[-1]:
-        raise _shape_error(last.shape, f"that of T0, {first.shape}", "trinterp")
+        raise _shape_error(last.shape, f"the shape of T0, {first.shape}", "trinterp")
     part = np.asarray(s, dtype=np.float64)
     R = _interpolated(first[..., :3, :3], last[..., :3, :3], part)
     if first.shape[-1] == 3:
@@ -246,7 +246,7 @@ def trinterp(T0: PoseLike, T1: PoseLike, s: ArrayLike) -> PoseLike:
 def tr2delta(T0: PoseLike, T1: PoseLike) -> Array:
     """The small motion (6,) from ``T0`` to ``T1`` in frame T0: displacement, then ``vex(R0' R1 - I)``.
 
-    The axes are those of release 10 and of the Python toolbox. Releases up to 9 use world axes, which the
+    The axes are the same as in release 10 and the Python toolbox. Releases up to 9 use world axes, which the
     block ``Tr2Delta`` also supports.
     """
     first, last = pose_array(T0, "tr2delta"), pose_array(T1, "tr2delta")

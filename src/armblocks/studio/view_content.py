@@ -125,7 +125,7 @@ def _sliders(robot: Robot) -> list[dict[str, Any]]:
 
 
 def _normalised(robot: Robot, before: Array, q: Array) -> Array:
-    """The coordinates with quaternions of length 1; a quaternion of zeros becomes that of ``before``."""
+    """The coordinates with quaternions of length 1; ``before`` replaces a quaternion of zeros."""
     q, first = q.copy(), 0
     for joint in robot.joints:
         for motion in joint.motions:

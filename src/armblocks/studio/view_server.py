@@ -143,7 +143,7 @@ class ArmPage:
             return self._version, self._shown()
 
     def _shown(self) -> dict[str, Any]:
-        """The state for a page, which ignores states with a smaller ``number`` than that of its own state."""
+        """The state for a page, which ignores states with a smaller ``number`` than its own."""
         return {"q": self._q.tolist(), "poses": self._poses, "number": self._moves}
 
     def stream_opened(self) -> None:

@@ -18,7 +18,7 @@ from armblocks.sweeps.batch_places import Number, Place, Quantity
 def find_jumps(r: Routine, a: Addresses, n: Integers, p: Reals, count: Integer, instants: Integer) -> Integer:
     """Evaluate both sides of all instants, and find the signals that jump; returns the number of instants.
 
-    The criteria are those of :class:`armblocks.simulation.jumps.JumpSearch`.
+    The criteria are the same as in :class:`armblocks.simulation.jumps.JumpSearch`.
     """
     sides = instants + instants
     _unpack(r, a, n, sides)

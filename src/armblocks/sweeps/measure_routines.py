@@ -1,8 +1,8 @@
 """The measures of a sweep as native functions of one signal.
 
-Each function has the arguments ``t (n,)`` s, ``y (n,)``, ``n``, and ``options (4,)``. The rows are those of
-:meth:`armblocks.simulation.SimulationResult.with_jumps` for the signal: a jump has two rows with the same
-time, the left limit and the value. Between two rows the signal is linear, and the integrals are exact.
+Each function has the arguments ``t (n,)`` s, ``y (n,)``, ``n``, and ``options (4,)``. The rows are the same
+as in :meth:`armblocks.simulation.SimulationResult.with_jumps`: a jump has two rows with the same time, the
+left limit and the value. Between two rows the signal is linear, and the integrals are exact.
 """
 
 from __future__ import annotations

@@ -72,7 +72,7 @@ class Layout:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of all columns, except those of kept samples."""
+        """The names of all columns, except columns of kept samples."""
         return (RUN, *self.parameter_names, STATUS, MESSAGE, *self.measures, STEPS, EVENTS, END_TIME)
 
     @property

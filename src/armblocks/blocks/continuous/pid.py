@@ -146,7 +146,7 @@ class PID2DOF(ContinuousPidBlock):
     """PID with two degrees of freedom: y = P (b r - u) + I/s (r - u) + D N s/(s + N) (c r - u).
 
     Set-point weights b, c < 1 reduce the control action and the overshoot after a step of r; the response to
-    disturbances is unchanged. Forms, limits, reset and tracking are those of the PID Controller.
+    disturbances is unchanged. Forms, limits, reset and tracking are the same as in the PID Controller.
     """
 
     title: ClassVar[str] = "PID Controller (2DOF)"

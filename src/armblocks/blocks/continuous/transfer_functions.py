@@ -22,7 +22,7 @@ from armblocks.diagram.signs import FaceSign, Fraction, polynomial
 class TransferFunction(RationalBlock):
     """A rational transfer function: y = (b0 s^m + … + bm) / (a0 s^n + … + an) u, initially at rest.
 
-    Coefficients are listed from the highest power to the lowest, as in MATLAB. The states are those of the
+    Coefficients are listed from the highest power to the lowest, as in MATLAB. The states belong to the
     controllable canonical form: xn is u filtered by 1/denominator, x1 its derivative of order n - 1.
     """
 

@@ -34,8 +34,8 @@ class ZeroPole(SectionsByRoots):
     """A transfer function: y = gain (s - z1) … (s - zm) / ((s - p1) … (s - pn)) u, m <= n.
 
     Complex zeros and poles come in conjugate pairs. Files contain them as rows (real, imaginary); Python also
-    accepts complex numbers. The block is initially at rest. The states are those of a cascade of sections
-    with one or two poles.
+    accepts complex numbers. The block is initially at rest. The states belong to a cascade of sections with
+    one or two poles.
     """
 
     title: ClassVar[str] = "Zero-Pole"

@@ -136,7 +136,7 @@ class DiscretePID2DOF(SampledPidBlock):
     """Sampled PID with two degrees of freedom: P acts on b r - u, I on r - u, D on c r - u.
 
     Set-point weights b, c < 1 reduce the control action and the overshoot after a step of r; the response to
-    disturbances is unchanged. Rules, forms, limits, reset and tracking are those of the Discrete PID
+    disturbances is unchanged. Rules, forms, limits, reset and tracking are the same as in the Discrete PID
     Controller.
     """
 

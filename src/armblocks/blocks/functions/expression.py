@@ -36,9 +36,9 @@ class Expression(Block):
 
     A formula may contain the input ``u`` (or ``u1``, ``u2``, … for several inputs), elements ``u[1]``,
     ``u[2]``, … with indices from 1, the time ``t``, ``pi``, ``e``, and tunable constants, whose names are in
-    ``names`` and whose values are in ``values``. Operators and functions are those of all formulas, such as
-    ``+ - * / ^``, comparisons, ``&& || ~``, ``atan2``, ``min``, ``mod`` and ``if(condition, yes, no)``.
-    Vectors are evaluated element by element.
+    ``names`` and whose values are in ``values``. Operators and functions are the same as in all formulas,
+    such as ``+ - * / ^``, comparisons, ``&& || ~``, ``atan2``, ``min``, ``mod`` and ``if(condition, yes,
+    no)``. Vectors are evaluated element by element.
     """
 
     title: ClassVar[str] = "Fcn"

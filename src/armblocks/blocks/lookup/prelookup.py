@@ -39,8 +39,8 @@ from armblocks.errors import InputError
 class Prelookup(BlockWithAxes):
     """The interval of a position and the fraction in it: u = b(k) + f (b(k+1) - b(k)), k from 0.
 
-    Several Interpolation Using Prelookup blocks can use the result of one Prelookup. At the last position
-    the index is that of the last interval and f is 1. Beyond the ends ``clip`` limits f to 0 or 1, and
+    Several Interpolation Using Prelookup blocks can use the result of one Prelookup. At the last position the
+    index of the last interval is returned, with f = 1. Beyond the ends ``clip`` limits f to 0 or 1, and
     ``linear`` extrapolates.
     """
 

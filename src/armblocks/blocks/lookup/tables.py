@@ -83,7 +83,7 @@ class LookupTable1D(BlockWithAxes):
 class LookupTable2D(BlockWithAxes):
     """A surface through given points: y = table(u1, u2), rows along u1 and columns along u2.
 
-    Interpolation and extrapolation methods are those of the 1-D Lookup Table.
+    Interpolation and extrapolation methods are the same as in the 1-D Lookup Table.
     """
 
     title: ClassVar[str] = "2-D Lookup Table"
@@ -137,9 +137,9 @@ class LookupTable2D(BlockWithAxes):
 class LookupTableND(BlockWithAxes):
     """A table of one to four axes: y = table(u1, u2, …), one input for each axis.
 
-    ``positions`` lists the positions of the first axis, then those of the second, and so on. Each axis has as
-    many positions as the table has entries along it. Interpolation and extrapolation methods are those of the
-    1-D Lookup Table.
+    ``positions`` lists the positions of the first axis, then of the second axis, and so on. Each axis has as
+    many positions as the table has entries along it. Interpolation and extrapolation methods are the same as
+    in the 1-D Lookup Table.
     """
 
     title: ClassVar[str] = "n-D Lookup Table"

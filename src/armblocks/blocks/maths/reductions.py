@@ -72,7 +72,7 @@ class ProductOfElements(Block):
 class Extremum(Block):
     """The minimum or maximum of all elements, and its index: y = u(index). Indices start at 1.
 
-    If several elements are equal, the index is that of the first. Indices of a matrix are in column-major
+    If several elements are equal, the index of the first is returned. Indices of a matrix are in column-major
     order.
     """
 

@@ -1,6 +1,6 @@
 """The arm with stick-slip friction, end stops, a variable payload and a force at the tip.
 
-The equations are those of :mod:`armblocks.dynamics.lockable_joints`, which names the sources.
+The equations are in :mod:`armblocks.dynamics.lockable_joints`, which names the sources.
 """
 
 from __future__ import annotations

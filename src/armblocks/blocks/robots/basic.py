@@ -1,6 +1,6 @@
 """The blocks of the toolbox's roblocks library: trajectory, kinematics, dynamics and animation.
 
-Their equations are those of :mod:`armblocks.dynamics` with the robot's parameters.
+The equations are in :mod:`armblocks.dynamics`.
 """
 
 from __future__ import annotations

@@ -106,8 +106,8 @@ class ResolvedRate(Block):
 
     Resolved-rate motion control (Whitney, 1969) with damped least squares: near a singular configuration,
     where the manipulability falls below ``region``, damping up to ``damping`` bounds the speeds, and the tool
-    velocity deviates from the commanded velocity. The manipulability is that of the Jacobian whose linear
-    rows are divided by the size of the arm. All speeds are reduced in proportion, so that none exceeds
+    velocity deviates from the commanded velocity. The manipulability is computed from the Jacobian whose
+    linear rows are divided by the size of the arm. All speeds are reduced in proportion, so that none exceeds
     ``max_speed``. ``avoidance`` moves joints towards the middle of their ranges without moving the tool. This
     requires more joints than degrees of freedom of the tool.
     """
@@ -147,11 +147,11 @@ class ResolvedRate(Block):
 class DifferentialIkine(Block):
     """Inverse kinematics by integration: the joints follow a moving pose T, also through singularities.
 
-    The joint speeds are those of ResolvedRate for the velocity ``v + gain e``, where ``v`` is the velocity of
-    the pose (0 if it is unknown) and ``e`` the error of the pose: displacement and rotation vector from the
-    tool to T. The joint coordinates are their integral from ``q0`` (closed-loop inverse kinematics, Siciliano
-    et al., *Robotics*, 2009, 3.7). The error decays with the time constant ``1 / gain``. A pose out of reach
-    gives the nearest pose.
+    The joint speeds are computed as in ResolvedRate for the velocity ``v + gain e``, where ``v`` is the
+    velocity of the pose (0 if it is unknown) and ``e`` the error of the pose: displacement and rotation
+    vector from the tool to T. The joint coordinates are their integral from ``q0`` (closed-loop inverse
+    kinematics, Siciliano et al., *Robotics*, 2009, 3.7). The error decays with the time constant ``1 /
+    gain``. A pose out of reach gives the nearest pose.
     """
 
     title: ClassVar[str] = "Differential Ikine"

@@ -174,7 +174,7 @@ class MultiSegment(Block):
 class CTraj(Block):
     """A straight motion from pose T0 to T1 in tmax: p = p0 + s (p1 - p0), R = R0 rot(axis, s angle).
 
-    Axis and angle are those of R0' R1, so that the rotation is the shortest. s goes from 0 to 1 by the
+    R0' R1 determines axis and angle, so that the rotation is the shortest. s goes from 0 to 1 by the
     quintic of ``jtraj`` or the trapezoidal profile of ``lspb``.
     """
 

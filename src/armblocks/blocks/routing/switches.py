@@ -134,7 +134,7 @@ class MultiportSwitch(Block):
         return {"y": common_unit({name: unit for name, unit in inputs.items() if name != "index"})}
 
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
-        doc = "1 where the index is at least that of input {}"
+        doc = "1 where the index is at least the index of input {}"
         return located(self, *(Condition(f"from{k}", (), doc.format(k)) for k in range(2, self.inputs + 1)))
 
     def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:

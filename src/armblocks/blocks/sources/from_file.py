@@ -29,7 +29,7 @@ class FromFile(BlockWithRows):
     (time, value, …). Each row is an event, so that no step passes over a row. The cost of a row does not
     depend on the length of the table. Before the first row and after the last row, the values of that row are
     held; or, with ``zero``, the signal is 0 before the first row and from the time of the last row on. Values
-    are not converted: the unit in a header such as ``q1 [deg]`` is that of the signal.
+    are not converted: the signal has the unit in its header, such as ``q1 [deg]``.
     """
 
     title: ClassVar[str] = "From File"

@@ -1,6 +1,6 @@
 """Conversions between poses and angles, quaternions or axis and angle; a pose is one 4x4 matrix.
 
-The names are those of the toolbox. :mod:`armblocks.spatial.orientation` describes the conventions and the
+Names are the same as in the toolbox. :mod:`armblocks.spatial.orientation` describes the conventions and the
 singularities, where an orientation has more than one set of angles.
 """
 

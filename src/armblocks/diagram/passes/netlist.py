@@ -61,7 +61,7 @@ class KnownSignals:
 class Netlist:
     """Blocks by path and their connections, before, between or after the passes.
 
-    Paths are those of the user's hierarchy. A block that a pass adds is named after a block of the
+    Paths refer to the user's hierarchy. A block that a pass adds is named after a block of the
     hierarchy, its origin; ``origins`` has the path of the origin.
     """
 

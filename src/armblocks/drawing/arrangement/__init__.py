@@ -11,7 +11,7 @@ The forward path is one row from the source to the sink. The feedback path is be
 5. :func:`arranged_boxes`: widths of the columns and of the gaps between them; connected parts of the
    sheet are placed one below the other.
 
-The method is that of Sugiyama, Tagawa and Toda, *Methods for visual understanding of hierarchical system
+Source: Sugiyama, Tagawa and Toda, *Methods for visual understanding of hierarchical system
 structures*, 1981, with lines that reverse their direction as in Sander's *Graph layout
 through the VCG tool*, 1994.
 """

@@ -84,8 +84,8 @@ def _strong_components(count: int, links: Sequence[Link]) -> list[list[int]]:
 def _cheapest_order(members: Sequence[int], network: Network) -> list[int]:
     """The blocks of a loop in the order with the lowest weight of backward links.
 
-    The order is that of a depth-first search, improved by moving single blocks. For a small loop it is the
-    best result of searches from every block.
+    The order comes from a depth-first search and is improved by moving single blocks. For a small loop it is
+    the best result of searches from every block.
     """
     links = network.links
     inside = set(members)
@@ -130,7 +130,7 @@ def _cheapest_order(members: Sequence[int], network: Network) -> list[int]:
 
 
 def _protect_inputs(weight: Mapping[int, dict[int, float]], network: Network) -> None:
-    """Make the weight of a cut before a function higher than that of a cut after it."""
+    """Make the weight of a cut before a function higher than the weight of a cut after it."""
     sources: dict[int, list[int]] = {member: [] for member in weight}
     for source, weights in weight.items():
         for target in weights:
@@ -186,7 +186,7 @@ def _depth_first(roots: Sequence[int], after: Mapping[int, Sequence[int]]) -> li
             else:
                 visited.add(target)
                 stack.append((target, iter(after[target])))
-        # Blocks of later roots precede those of earlier roots, unless a link requires the opposite order.
+        # Blocks of later roots precede blocks of earlier roots, unless a link requires the opposite order.
     return order[::-1]
 
 

@@ -68,7 +68,7 @@ def _planar(
 ) -> Iterator[tuple[list[SX], SX]]:
     """The angles of three parallel joints that take ``point`` to ``x`` with the ``total`` rotation.
 
-    All angles are about the direction of the first axis, and are converted to those of the other axes.
+    All angles are about the direction of the first axis, and are converted to angles about the other axes.
     """
     h = one.direction
     p1, p2, p3 = one.point, two.point, three.point

@@ -1,4 +1,4 @@
-"""Interpreter of the toolbox's robot scripts; lexer and parser are those of :mod:`armblocks.matlab`.
+"""Interpreter of the toolbox's robot scripts, with the lexer and parser of :mod:`armblocks.matlab`.
 
 ``script_text`` and ``page_layout`` (lines) → :mod:`armblocks.matlab` (statements) → ``interpreter``, with the
 ``script_values`` of expressions (``values``, ``records`` and the toolbox's objects). Nothing is evaluated by

@@ -99,7 +99,7 @@ def _weld(robot: Robot, closure: Closure, names: Mapping[str | None, str]) -> st
 
 
 def _site(robot: Robot, name: str, end: Attachment, frames: dict[str, NamedFrame], sites: Sites) -> str:
-    """The name of the site at an attachment: that of a frame of the robot, or of a new site."""
+    """The name of the site at an attachment: the name of a frame of the robot, or of a new site."""
     for frame in frames.values():
         if (frame.link, frame.pose) == (end.link, end.pose):
             return frame.name
@@ -111,7 +111,7 @@ def _site(robot: Robot, name: str, end: Attachment, frames: dict[str, NamedFrame
 
 
 def add_site(robot: Robot, sites: Sites, frame: NamedFrame) -> None:
-    """Add the element of a frame; in the world its pose includes that of the base."""
+    """Add the element of a frame; in the world its pose includes the pose of the base."""
     pose = frame.pose if frame.link is not None else robot.base @ frame.pose
     indent = "    " if frame.link is None else "  "
     line = f"{indent}<site name={quoted(frame.name, robot)} {placed(pose)}/>"

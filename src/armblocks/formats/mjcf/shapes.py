@@ -94,7 +94,7 @@ def inertia_of(geom: Geom, meshes: MeshAssets, label: str, context: FileContext)
             context,
             INERTIA,
             element,
-            "the shape is a shell; its inertia is computed as that of a solid",
+            "the shape is a shell; its inertia is computed as for a solid",
             label,
         )
     if mass is None:

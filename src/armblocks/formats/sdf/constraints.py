@@ -41,7 +41,7 @@ _CLOSURES: Mapping[str, type[Closure]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Coordinate:
-    """The coordinate of an axis of a joint, which is that of the robot's ``link``.
+    """The coordinate of an axis of a joint: the coordinate of the robot's ``link``.
 
     ``joint``, ``tag``: the joint of the file and its axis. ``carrier``, ``carried``: the links on both sides
     of the joint, from the base outwards; None is the base.
@@ -59,7 +59,7 @@ def closure_of(
 ) -> Closure:
     """The joint between a parent and a child that other joints connect already.
 
-    Its frames are those of the initial configuration. Raises ``FormatError`` for types that close no loop.
+    Its frames refer to the initial configuration. Raises ``FormatError`` for types that close no loop.
     """
     kind = joint_type_of(joint)
     if kind not in _CLOSURES:
@@ -191,6 +191,6 @@ def _gearbox(gear: Frame, coordinates: Sequence[Coordinate], frames: Frames) -> 
             math.hypot(*turned) * math.hypot(*joint_axis)
         )
         if abs(cosine) < 0.999:
-            return f"the axis of the gearbox is not that of the joint of '{shortened(name)}'"
+            return f"the axis of the gearbox differs from the axis of the joint of '{shortened(name)}'"
         terms.append((own.link, factor if cosine > 0 else -factor))
     return Coupling(name=gear.name, terms=tuple(terms))

@@ -2,7 +2,7 @@
 
 Source: sdformat.org, *Pose Frame Semantics: Terminology and Behavior*. A name is searched in the scope of its
 model (or world); ``a::b`` is the frame b of the nested model a, ``__model__`` the frame of the model. The
-defaults are those of all versions; attributes that name other frames exist since SDF 1.7.
+defaults apply to all versions; attributes that name other frames exist since SDF 1.7.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Frame:
 class Scope:
     """The names inside a model or a world.
 
-    ``frame``: that of the model or world. ``fixed``: the model is static, or a part of a static model.
+    ``frame``: the frame of the model or world. ``fixed``: the model is static, or a part of a static model.
     ``prefix``: the beginning of the full names. ``canonical``: the name of the link to which the frame of the
     model is attached.
     """

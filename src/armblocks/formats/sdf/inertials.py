@@ -18,7 +18,7 @@ _UNIT: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 class Inertial(NamedTuple):
     """``mass`` kg; ``centre`` of mass m in the link's frame; ``inertia`` kg m2 about it, in link axes.
 
-    The defaults are those of SDF.
+    Defaults are the same as in SDF.
     """
 
     mass: float = 1.0

@@ -145,7 +145,7 @@ def _magnitude(limit: Element, tag: str, joint: Frame, context: FileContext) -> 
 def motor_of(joint: Frame, axis: Element | None, context: FileContext) -> Motor | None:
     """The motor that gives a joint the friction of ``<dynamics>``: ``tau = damping qd + friction sign(qd)``.
 
-    Rotor and gear are those of Drake's elements ``drake:rotor_inertia`` and ``drake:gear_ratio``. Findings
+    Rotor and gear are read from Drake's elements ``drake:rotor_inertia`` and ``drake:gear_ratio``. Findings
     name friction that accelerates the joint.
     """
     if axis is None:

@@ -77,7 +77,7 @@ class _Instance:
 
     @property
     def node(self) -> str:
-        """The name of its node; that of the root is the ground."""
+        """The name of its node; the root is the ground."""
         return "/".join(self.path) if self.path else GROUND
 
 

@@ -74,8 +74,9 @@ class PlacedJoint(NamedTuple):
 def joint_of(element: Element, context: FileContext) -> PlacedJoint:
     """The joint of an element, with its place.
 
-    A planar joint of URDF moves in the plane normal to its axis. The x and y axes of the plane are those of
-    the joint frame, rotated by the smallest rotation of z to the axis. A floating joint has no limits here.
+    A planar joint of URDF moves in the plane normal to its axis. The x and y axes of the plane are the axes
+    of the joint frame, rotated by the smallest rotation of z to the axis. A floating joint has no limits
+    here.
     """
     kind = joint_type_of(element)
     before = origin_of(element, context)

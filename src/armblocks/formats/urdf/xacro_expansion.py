@@ -36,7 +36,7 @@ def uses_xacro(root: Element) -> bool:
 
 
 def expanded(data: bytes, file: str, context: FileContext) -> Element:
-    """The root element of the expanded file. Lines of messages are those of the expanded text.
+    """The root element of the expanded file. Line numbers in messages refer to the expanded text.
 
     Raises ``MissingLibraryError`` without the extra ``xacro``, ``FormatError`` where the file cannot be
     expanded.

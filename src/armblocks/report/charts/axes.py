@@ -45,7 +45,7 @@ class PlotArea:
         return np.column_stack([px, py])
 
     def frame(self, *, x_label: str, y_label: str, numbers: bool = True) -> list[Mark]:
-        """Draw grid, frame, numbers and names; with ``numbers`` false those of the x axis are omitted."""
+        """Draw grid, frame, numbers and names; ``numbers`` false omits numbers and name of the x axis."""
         left, top, right, bottom = self.box
         marks: list[Mark] = []
         for value in (*self.x_minor_ticks, *self.x_ticks):

@@ -89,7 +89,7 @@ class Joint(ABC, metaclass=ArgumentErrors, methods=False):
 
     @property
     def speeds(self) -> tuple[Coordinate, ...]:
-        """The entries of qd; their unit is that of the integral of the speed."""
+        """The entries of qd, with the units of their integrals."""
         return tuple(entry for motion in self.motions for entry in motion.speeds)
 
     @property
@@ -132,8 +132,8 @@ class Joint(ABC, metaclass=ArgumentErrors, methods=False):
     def travel(self) -> tuple[float, float] | None:
         """Lowest and highest translation along the axis within the limits, m, or None without limits.
 
-        The offset is included. For several translations, the limits are those of the first translation with
-        limits.
+        The offset is included. If several translations have limits, the limits of the first of them are
+        returned.
         """
         motions = [motion for motion in self.motions for _ in motion.speeds]
         for motion, limits in zip(motions, self.coordinate_limits):

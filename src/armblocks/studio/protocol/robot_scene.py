@@ -29,7 +29,7 @@ class SceneJoint:
     ``frame`` is the joint frame in the frame of ``carrier``, ``moving`` the joint frame in the link frame,
     both (16,) row by row; z is the joint axis. For a revolute joint, x of ``moving`` is rotated from x of
     ``frame`` by q + ``offset``; for a prismatic joint, its origin is displaced by q + ``offset``. ``limits``
-    are in rad or m, ``radius`` (m) is that of the cylinder drawn at the joint.
+    are in rad or m, ``radius`` (m): radius of the cylinder drawn at the joint.
     """
 
     name: str

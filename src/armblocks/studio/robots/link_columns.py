@@ -44,7 +44,7 @@ def variable_of(link: Link) -> str:
 
 
 def with_row(link: Link, limits: JointLimits | None = None, **changes: object) -> Link:
-    """Return the link with changed D-H parameters; ``limits`` default to those of the link."""
+    """Return the link with changed D-H parameters; ``limits``: by default the limits of the link."""
     if link.dh is None:
         raise RobotError(
             _NO_ROW,

@@ -52,7 +52,7 @@ class Keys:
     """The secrets of one server, created at its start.
 
     ``token`` grants full access as a bearer. ``login`` is valid once; the login sets the cookie ``session``.
-    A given ``session`` is that of the previous server, so that its clients can reconnect.
+    A given ``session`` is the session of the previous server, so that its clients can reconnect.
     """
 
     def __init__(self, port: int, session: str = "") -> None:

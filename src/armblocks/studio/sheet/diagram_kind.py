@@ -70,7 +70,7 @@ class DiagramKind(FileKind[Diagram, Document]):
     def from_text(self, text: str, where: str) -> Diagram:
         """Read a diagram from its journal or from the clipboard.
 
-        The text does not contain the sheets of library blocks; their layout is that of the opened file.
+        The text does not contain the sheets of library blocks; their layout is taken from the opened file.
         """
         diagram = formats.diagram_from_bytes(
             text.encode(),

@@ -42,7 +42,7 @@ _GAP = 6.0
 def grounded(diagram: Diagram, names: Collection[str]) -> Diagram:
     """Return the diagram with a Ground or Terminator at every unconnected port of the named blocks.
 
-    A Ground has the shape that its input declares. Inputs that take a bus, and those of Merge blocks, remain
+    A Ground has the shape that its input declares. Inputs that take a bus, and inputs of Merge blocks, remain
     unconnected, as do the ports of commented blocks. Raises ``DiagramError`` if nothing can be added.
     """
     placed = boxes(diagram)

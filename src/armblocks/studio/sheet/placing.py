@@ -1,4 +1,4 @@
-"""Positions of the blocks of an incomplete diagram: stored ones, or those of the automatic layout."""
+"""Positions of the blocks of an incomplete diagram: stored, or from the automatic layout."""
 
 from __future__ import annotations
 

@@ -106,8 +106,8 @@ class Connect(DiagramEdit):
 class MoveBlocks(DiagramEdit):
     """Move blocks and notes, or rotate blocks; one drag is one edit.
 
-    User-drawn routes between blocks that move by the same amount move with them. ``wires`` are added and
-    those of ``instead`` removed, when a block is inserted into a wire or disconnected from its wires.
+    User-drawn routes between blocks that move by the same amount move with them. ``wires`` are added and the
+    wires of ``instead`` removed, when a block is inserted into a wire or disconnected from its wires.
     """
 
     kind: Literal["move"] = "move"
@@ -279,7 +279,7 @@ class SaveParameterSet(ModelEdit):
     """Store values of parameters, by ``block.parameter``, under a name.
 
     ``all_parameters``: the model's values of the parameters that only other sets have are stored, too.
-    ``replace``: the values replace those of a set with this name, which must exist.
+    ``replace``: the values replace the values of a set with this name, which must exist.
     """
 
     kind: Literal["save_parameter_set"] = "save_parameter_set"

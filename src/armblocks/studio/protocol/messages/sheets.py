@@ -234,10 +234,10 @@ class BlockCorner(Message):
 
 
 class RouteWires(Request[dict[str, WireLines]]):
-    """Return the lines of a sheet during a drag that differ from those of the document.
+    """Return the lines of a sheet during a drag that differ from the lines of the document.
 
-    ``places``: positions of the dragged blocks. ``wires``: the displayed wires, if they differ from those of
-    the document. ``passed``: a block that lines do not avoid, because it may be inserted into one.
+    ``places``: positions of the dragged blocks. ``wires``: the displayed wires, if they differ from the wires
+    of the document. ``passed``: a block that lines do not avoid, because it may be inserted into one.
     """
 
     kind: Literal["route"] = "route"

@@ -20,7 +20,7 @@ class Reached(Message):
     """The configuration of an arm whose tool was dragged.
 
     ``q`` (nq,) and the ``poses`` (L+2, 4, 4) of base, links and tool. ``reached``: whether the tool has the
-    target; otherwise ``why`` says what stopped it. ``at_limit``: the coordinates at a limit. ``missing``: the
+    target; otherwise ``why`` is the reason. ``at_limit``: the coordinates at a limit. ``missing``: the
     directions that the joints cannot follow, such as ``turn about x``. ``tool``: the pose of the tool (16,).
     """
 
