@@ -178,7 +178,7 @@ def test_closed_forms_and_blocks_are_refused_by_name() -> None:
     arm = ab.Arm(four_bar())
     with pytest.raises(RobotError, match="closed forms and rates of inverse kinematics do not support"):
         arm.ikine_all(np.eye(4))
-    with pytest.raises(InputError, match="robot 'four-bar' has constraints, such as 'pin'"):
+    with pytest.raises(InputError, match="robot 'four-bar' has closed loops, such as 'pin'"):
         ab.blocks.DifferentialIkine(robot=arm, q0=[0.0] * arm.nq)
 
 

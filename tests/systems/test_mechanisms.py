@@ -7,6 +7,7 @@ maximal coordinates and projection to 1e-11.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,9 +15,10 @@ from scipy.integrate import solve_ivp
 
 import armblocks as ab
 from armblocks import blocks
+from armblocks.diagram import Block
 from armblocks.dynamics.mechanism import Mechanism
-from armblocks.errors import InputError
-from armblocks.robot import Robot
+from armblocks.errors import InputError, RobotError
+from armblocks.robot import Coupling, Link, Motor, Robot, Spherical
 from mechanisms_for_tests import bricard, four_bar, parallelograms, slider_crank
 
 
@@ -100,9 +102,64 @@ def test_a_start_beside_the_constraints_is_refused_with_the_gap() -> None:
         blocks.ForwardDynamics(robot=four_bar(), qd0=(1.0, 0.0, 0.0))
 
 
-def test_blocks_of_independent_joints_refuse_constraints() -> None:
-    with pytest.raises(InputError, match="robot 'four-bar' has constraints, such as 'pin'"):
+def controlled(law: Block, qr: np.ndarray, q0: np.ndarray, robot: Robot) -> ab.SimulationResult:
+    """A robot that starts at ``q0`` and is controlled by a law with the constant reference ``qr``."""
+    builder, zero = ab.DiagramBuilder("controlled"), np.zeros(robot.n)
+    plant = builder.add("plant", blocks.ForwardDynamics(robot=robot, q0=q0))
+    signals = {"qr": qr, "qdr": zero, "qddr": zero}
+    constants = {name: builder.add(name, blocks.Constant(value=value)) for name, value in signals.items()}
+    control = builder.add("control", law)
+    for port in law.input_ports():
+        builder.connect(
+            plant[port.name] if port.name in ("q", "qd") else constants[port.name], control[port.name]
+        )
+    builder.connect(control, plant["tau"])
+    return ab.simulate(builder.build(), stop_time=1.0, sample_time=0.05, rtol=1e-9, atol=1e-11)
+
+
+def test_controllers_of_closed_loops_control_the_joints_with_a_motor() -> None:
+    """The error of the crank decays with critical damping; only its motor has a torque.
+
+    The references of the other joints violate the loop, as those of an interpolation of all joints do.
+    """
+    robot = four_bar().with_link("crank", motor=Motor(inertia=1e-3, gear_ratio=10.0, viscous_friction=1e-3))
+    arm = ab.Arm(robot)
+    start = arm.assemble([0.2, 0.0, 0.0], locked=("crank",)).q
+    reference = np.array([0.0, 0.07, -0.05])
+    result = controlled(blocks.ComputedTorque(robot=robot, Kp=100.0, Kd=20.0), reference, start, robot)
+    t = result.time
+    assert result["plant/q"][:, 0] == pytest.approx(0.2 * (1 + 10 * t) * np.exp(-10 * t), abs=1e-7)
+    assert not result["control/tau"][:, 1:].any()
+    for law in (
+        blocks.GravityCompensation(robot=robot, Kp=300.0, Kd=60.0),
+        blocks.FeedForward(robot=robot, Kp=300.0, Kd=60.0),
+    ):
+        result = controlled(law, reference, start, robot)
+        holding = arm.gravload(arm.assemble([0.0, 0.0, 0.0], locked=("crank",)).q)
+        assert result["plant/q"][-1, 0] == pytest.approx(0.0, abs=0.01)
+        assert not result["control/tau"][:, 1:].any()
+        expected = holding[0] - 300.0 * result["plant/q"][-1, 0] - 60.0 * result["plant/qd"][-1, 0]
+        assert result["control/tau"][-1, 0] == pytest.approx(expected, abs=0.1)
+
+
+def test_controllers_of_closed_loops_name_missing_motors() -> None:
+    with pytest.raises(
+        RobotError, match="the joints with motors have 0 degrees of freedom, the mechanism has 1"
+    ):
         blocks.ComputedTorque(robot=four_bar())
+    loop = four_bar()
+    rotor = Link(name="rotor", mass=0.5, inertia=((0.01, 0, 0), (0, 0.01, 0), (0, 0, 0.01)), motor=Motor())
+    sum_ = Coupling(name="sum", terms=(("rotor", 1.0), ("crank", -3.0), ("rocker", 2.0)))
+    summed = replace(loop, links=(*loop.links, rotor), constraints=(*loop.constraints, sum_))
+    with pytest.raises(RobotError, match="the motor of joint 'rotor' drives a sum of several joints"):
+        blocks.FeedForward(robot=summed)
+    ball = Link(name="ball", joint=Spherical(), mass=1.0, inertia=rotor.inertia, motor=Motor())
+    more = replace(loop, links=(*loop.links, ball)).with_link("crank", motor=Motor())
+    with pytest.raises(InputError, match="joint 'ball' of robot 'four-bar' has a motor and a quaternion"):
+        blocks.GravityCompensation(robot=more)
+    passive = more.with_link("ball", motor=None)
+    with pytest.raises(RobotError, match="the joints with motors have 1 degree"):
+        blocks.GravityCompensation(robot=passive)
 
 
 def test_computed_torque_moves_a_palletiser_with_its_linkages() -> None:

@@ -124,6 +124,27 @@ def directions_without_motor(robot: Robot) -> Array:
     return basis
 
 
+def motor_joints(robot: Robot) -> tuple[str, ...]:
+    """The joints of q that the motors of a robot with closed loops drive, through couplings as well.
+
+    Raises RobotError unless they have as many degrees of freedom as the mechanism and determine the other
+    joints, and if a motor drives only the sum of several joints.
+    """
+    directions = directions_without_motor(robot)
+    _check_actuation(robot, directions, independent_relations(robot), None)
+    passive = {k for k, row in enumerate(directions) if row.any()}
+    if len(passive) != directions.shape[1]:
+        joint = next(j for j in robot.coupled_joints if j.link.motor and passive & {*j.factors})
+        raise RobotError(
+            f"the motor of joint '{joint.link.name}' drives a sum of several joints",
+            where=f"robot '{robot.name}'",
+            allowed="motors that drive one joint each",
+            fix="give the motors to joints that no coupling determines",
+        )
+    names = [link.name for link in robot.moving_links for _ in range(link.joint.nv)]
+    return tuple(dict.fromkeys(name for k, name in enumerate(names) if k not in passive))
+
+
 def _check_actuation(
     robot: Robot, free_directions: Array, relations: Sequence[int], near: Array | None
 ) -> None:

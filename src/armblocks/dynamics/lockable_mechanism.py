@@ -122,15 +122,21 @@ class MechanismEquations:
         return x, SX(vertcat(*multipliers))
 
 
-def consistent_state(robot: Robot, q: SX, qd: SX, free: SX, near: Array | None) -> tuple[SX, SX]:
+def consistent_state(
+    robot: Robot, q: SX, qd: SX, free: SX, near: Array | None, *, newton_steps: int = 0
+) -> tuple[SX, SX]:
     """Coordinates and speeds near ``q``, ``qd`` that satisfy the closures, by motions of the free joints.
 
     Locked joints keep their values exactly. The coordinates are NaN if ``q`` is too far from the closures.
+    ``newton_steps``: additional steps before the others, each with its own Jacobian, for distant ``q``.
     """
     relations = independent_relations(robot, near)
     if not relations:
         return q, qd
     tree = KinematicTree.of(robot)
+    for _ in range(newton_steps):
+        residuals, step = _shortest_step(robot, tree, q, free, relations)
+        q = SX(vertcat(*integrated(robot, entries(q), entries(step(residuals)), 1.0)))
     residuals, step = _shortest_step(robot, tree, q, free, relations)
     for _ in range(POSITION_STEPS):
         q = SX(vertcat(*integrated(robot, entries(q), entries(step(residuals)), 1.0)))

@@ -14,6 +14,7 @@ other. Source: Featherstone, *Rigid Body Dynamics Algorithms*, 9.2 (hybrid dynam
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +34,7 @@ from armblocks.dynamics.reduction import generalised_forces, tree_speeds
 from armblocks.dynamics.robot_trace import robot_inputs
 from armblocks.equations import Signature, TracedFunction
 from armblocks.errors import RobotError, counted
+from armblocks.robot.constraints import PrescribedMotion
 from armblocks.robot.robot import Robot
 from armblocks.robot.tree import KinematicTree
 
@@ -56,20 +58,22 @@ def driven_motion(
     near: Array | None = None,
     wrench: SX | None = None,
     payload: SX | None = None,
+    newton_steps: int = 0,
 ) -> DrivenMotion:
     """The motion at ``q``, ``qd`` with the torques ``tau`` (n, 1) of the free joints and the accelerations
     ``qdd`` (n, 1) of the prescribed joints.
 
     The other entries of ``tau`` and ``qdd`` are not read. The state is the consistent one nearest to ``q``,
     ``qd`` with the given coordinates and speeds of the prescribed joints; it is NaN if ``q`` is too far from
-    the constraints. ``near``: see :func:`independent_relations`. Raises RobotError for prescribed joints that
+    the constraints. ``near``: see :func:`independent_relations`; ``newton_steps``: see
+    :func:`consistent_state`. Raises RobotError for prescribed joints that
     depend on each other, and for free joints without inertia.
     """
     prescribed = entries_of(robot, robot.prescribed_joints).speeds
     free = entries_of(robot, robot.prescribed_joints, others=True).speeds
     check_drives(robot, near, with_payload=payload is not None)
     mask = SX(np.isin(np.arange(robot.nv), free).astype(float))
-    q, qd = consistent_state(robot, q, qd, mask, near)
+    q, qd = consistent_state(robot, q, qd, mask, near, newton_steps=newton_steps)
     equations = MechanismEquations(robot, q, qd, wrench, payload, near)
     M, J, coordinates = equations.M, equations.J, robot.coordinate_map
     rates = entries(tree_speeds(coordinates, qd))
@@ -98,6 +102,19 @@ def driven_motion(
         needed = needed - mtimes(J.T, multipliers)
     torques[prescribed] = needed[prescribed]
     return DrivenMotion(q, qd, result, torques)
+
+
+def with_prescribed_joints(robot: Robot, joints: Sequence[str]) -> Robot:
+    """The robot with prescribed motions of these joints only. Raises RobotError, see :class:`Robot`."""
+    others = tuple(c for c in robot.constraints if not isinstance(c, PrescribedMotion))
+    used = {constraint.name for constraint in others}
+    prescribed: list[PrescribedMotion] = []
+    for joint in dict.fromkeys(joints):
+        name = f"motion of {joint}"
+        while name in used:
+            name += "'"
+        prescribed.append(PrescribedMotion(name=name, joint=joint))
+    return replace(robot, constraints=(*others, *prescribed))
 
 
 def check_drives(robot: Robot, near: Array | None, *, with_payload: bool = False) -> None:

@@ -43,9 +43,14 @@ from armblocks.dynamics.ball_joints import motion_of_rates
 from armblocks.dynamics.constrained import ConstrainedMotion, restoring_rates
 from armblocks.dynamics.joint_entries import JointEntries, entries_of
 from armblocks.dynamics.joint_motion import entries
-from armblocks.dynamics.prescribed_motion import DrivenMotion, check_drives, driven_motion
+from armblocks.dynamics.prescribed_motion import (
+    DrivenMotion,
+    check_drives,
+    driven_motion,
+    with_prescribed_joints,
+)
 from armblocks.errors import UnknownNameError
-from armblocks.robot import PrescribedMotion, Robot
+from armblocks.robot import Robot
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -274,15 +279,7 @@ def _with_prescribed(robot: Robot, joints: str, block: str) -> Robot:
     for name in names:
         if name not in links:
             raise UnknownNameError("joint", name, robot.joint_names, where=f"{block}.joints")
-    others = tuple(c for c in robot.constraints if not isinstance(c, PrescribedMotion))
-    used = {c.name for c in others}
-    prescribed: list[PrescribedMotion] = []
-    for name in dict.fromkeys(names):
-        label = f"motion of {name}"
-        while label in used:
-            label += "'"
-        prescribed.append(PrescribedMotion(name=label, joint=name))
-    return replace(robot, constraints=(*others, *prescribed))
+    return with_prescribed_joints(robot, names)
 
 
 def _part(port: Port, indices: list[int]) -> Port:

@@ -13,9 +13,15 @@ from casadi import SX
 from numpy.typing import ArrayLike
 
 from armblocks import dynamics
+from armblocks.blocks.robots.loop_control import (
+    REFERENCE_STEPS,
+    at_motors,
+    check_controlled,
+    motor_torques,
+    position_errors,
+)
 from armblocks.blocks.robots.ports import (
     apply_traced,
-    check_no_closures,
     check_speeds_are_rates,
     q_port,
     qd_port,
@@ -40,7 +46,10 @@ from armblocks.robot import Robot
 
 
 def _check_gains(block: Block, robot: Robot) -> None:
-    check_speeds_are_rates(block, robot)
+    if robot.closures:
+        check_controlled(robot, block.type_name())
+    else:
+        check_speeds_are_rates(block, robot)
     for name in ("Kp", "Kd"):
         shape = shape_of(block.parameter_value(name))
         if shape not in ((), (robot.n,)):
@@ -106,7 +115,10 @@ class JointPD(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class GravityCompensation(Block):
-    """PD with gravity compensation: tau = g(q) + Kp (qr - q) - Kd qd, whose only equilibrium is qr."""
+    """PD with gravity compensation: tau = g(q) + Kp (qr - q) - Kd qd, whose only equilibrium is qr.
+
+    In robots with closed loops only the joints with a motor are controlled, and only they have torques.
+    """
 
     title: ClassVar[str] = "PD with Gravity Compensation"
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -144,8 +156,13 @@ class GravityCompensation(Block):
         return (tau_port(self.robot, "torque or force at the joints"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        gravity = apply_traced(dynamics.trace_gravload(self.robot), u["q"])
-        return {"tau": gravity + p["Kp"] * (u["qr"] - u["q"]) - p["Kd"] * u["qd"]}
+        robot, q = self.robot, u["q"]
+        if robot.closures:
+            gravity = motor_torques(robot, q, SX.zeros(robot.n), SX.zeros(robot.n))
+            control = p["Kp"] * position_errors(robot, u["qr"], q) - p["Kd"] * u["qd"]
+            return {"tau": gravity + at_motors(robot, control)}
+        gravity = apply_traced(dynamics.trace_gravload(robot), q)
+        return {"tau": gravity + p["Kp"] * (u["qr"] - q) - p["Kd"] * u["qd"]}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,7 +171,8 @@ class ComputedTorque(Block):
 
     If the model equals the robot, the errors of all joints obey e'' + Kd e' + Kp e = 0 independently:
     critically damped for Kd = 2 sqrt(Kp). The model may have couplings, such as those of palletising arms,
-    but no closed loops, because the coordinates and accelerations of a loop are not independent.
+    and closed loops. In robots with closed loops only the joints with a motor are controlled, and only they
+    have torques; the motion of the other joints follows from the constraints.
     """
 
     title: ClassVar[str] = "Computed Torque Controller"
@@ -182,7 +200,6 @@ class ComputedTorque(Block):
     )
 
     def check(self) -> None:
-        check_no_closures(self, self.robot)
         _check_gains(self, self.robot)
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -194,13 +211,20 @@ class ComputedTorque(Block):
         return (tau_port(self.robot, "torque or force at the joints"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        acceleration = u["qddr"] + p["Kd"] * (u["qdr"] - u["qd"]) + p["Kp"] * (u["qr"] - u["q"])
+        error = position_errors(self.robot, u["qr"], u["q"])
+        acceleration = u["qddr"] + p["Kd"] * (u["qdr"] - u["qd"]) + p["Kp"] * error
+        if self.robot.closures:
+            return {"tau": motor_torques(self.robot, u["q"], u["qd"], acceleration)}
         return {"tau": apply_traced(dynamics.trace_rne(self.robot), u["q"], u["qd"], acceleration)}
 
 
 @dataclass(frozen=True, kw_only=True)
 class FeedForward(Block):
-    """Feedforward and PD: tau = rne(qr, qdr, qddr) + Kp (qr - q) + Kd (qdr - qd)."""
+    """Feedforward and PD: tau = rne(qr, qdr, qddr) + Kp (qr - q) + Kd (qdr - qd).
+
+    In robots with closed loops only the joints with a motor are controlled, and only they have torques. The
+    desired motion of the other joints follows from the constraints; their desired coordinates are its guess.
+    """
 
     title: ClassVar[str] = "Feed-Forward Controller"
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -244,5 +268,10 @@ class FeedForward(Block):
         return (tau_port(self.robot, "torque or force at the joints"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        feedforward = apply_traced(dynamics.trace_rne(self.robot), u["qr"], u["qdr"], u["qddr"])
+        robot, reference = self.robot, (u["qr"], u["qdr"], u["qddr"])
+        if robot.closures:
+            feedforward = motor_torques(robot, *reference, newton_steps=REFERENCE_STEPS)
+            control = p["Kp"] * position_errors(robot, u["qr"], u["q"]) + p["Kd"] * (u["qdr"] - u["qd"])
+            return {"tau": feedforward + at_motors(robot, control)}
+        feedforward = apply_traced(dynamics.trace_rne(robot), *reference)
         return {"tau": feedforward + p["Kp"] * (u["qr"] - u["q"]) + p["Kd"] * (u["qdr"] - u["qd"])}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from casadi import SX
 from numpy.typing import NDArray
@@ -13,7 +11,7 @@ from armblocks.diagram import Block, Port, rate_unit, shape_of
 from armblocks.dynamics.mechanism import mechanism
 from armblocks.equations import TracedFunction, flatten, unflatten
 from armblocks.errors import InputError, counted
-from armblocks.robot import Constraint, Robot
+from armblocks.robot import Robot
 
 MAX_START_RESIDUAL = 1e-6
 """Largest residual of a start state that counts as consistent: m, or cosine of an angle, also per second."""
@@ -144,17 +142,13 @@ def start_numbers(block: Block, robot: Robot, name: str) -> NDArray[np.float64]:
 
 def check_no_closures(block: Block, robot: Robot) -> None:
     """Raise ``InputError`` for a robot with closed loops, whose coordinates are not independent."""
-    check_independent(block, robot, robot.closures)
-
-
-def check_independent(block: Block, robot: Robot, constraints: Sequence[Constraint]) -> None:
-    """Raise ``InputError`` for the first of the constraints that a block does not support."""
-    if constraints:
+    if robot.closures:
         raise InputError(
-            f"robot '{robot.name}' has constraints, such as '{constraints[0].name}'",
+            f"robot '{robot.name}' has closed loops, such as '{robot.closures[0].name}'",
             where=block.type_name(),
-            allowed="robots whose joints move independently",
-            fix="use the block ForwardDynamics for its motion, and controllers of its motor joints",
+            allowed="robots without closed loops, whose joints move independently",
+            fix="compute the motion by arm.ikine, which supports closed loops, and play it by the block "
+            "Trajectory",
         )
 
 
