@@ -1801,11 +1801,13 @@ export interface RobotScene {
   rows: number;
   bodies: SceneBody[];
   joints: SceneJoint[];
+  rods: SceneRod[];
   rest: number[];
   [k: string]: unknown;
 }
 /**
- * A body of a robot; its pose is ``row`` of the poses: row 0 is the base, the links follow.
+ * A body of a robot; its pose is ``row`` of the poses: row 0 is the base, the links and the tool follow,
+ * then the rods.
  *
  * ``corners`` (F, 3, 3) m and unit ``normals`` (F, 3, 3) of its triangles: base64 of little-endian float32.
  */
@@ -1834,6 +1836,18 @@ export interface SceneJoint {
   moving: number[];
   offset: number;
   radius: number;
+  [k: string]: unknown;
+}
+/**
+ * A rod between the point ``first`` (3,) m in the frame of row ``first_row`` and ``second``.
+ *
+ * The front end computes its pose: the origin is the first point, z points to the second one.
+ */
+export interface SceneRod {
+  first_row: number;
+  first: number[];
+  second_row: number;
+  second: number[];
   [k: string]: unknown;
 }
 /**

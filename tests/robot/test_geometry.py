@@ -8,9 +8,20 @@ import pytest
 
 from armblocks.errors import RobotError
 from armblocks.formats import load_robot
-from armblocks.robot import JointLimits, Link, Revolute, Robot, serial_chain, standard_dh
+from armblocks.robot import (
+    Attachment,
+    JointLimits,
+    Link,
+    Prismatic,
+    Revolute,
+    Robot,
+    Rod,
+    serial_chain,
+    standard_dh,
+)
 from armblocks.robot.geometry import link_frames, reach, robot_bodies, robot_shapes
 from armblocks.robot.linkage_points import rod_points
+from armblocks.robot.rod_bars import rod_bars, with_bars
 from armblocks.robot.shapes import IDENTITY, Box, Cylinder, Housing, Material, Mesh, Shape, Sphere
 from armblocks.robot.triangles import SIDES, TriangleMesh, triangles
 from armblocks.spatial import Transform, transl
@@ -186,3 +197,22 @@ def test_the_rods_of_palletisers_end_at_a_drawn_bracket(name: str) -> None:
             carried = [(T[row_of[carrier]] @ np.append(point, 1.0))[:3] for point, _ in found]
             gaps = [np.linalg.norm((T[row_of[rod]] @ end)[:3] - p) for end in ends for p in carried]
             assert min(gaps) < 1e-9 * size
+
+
+def test_the_bar_of_a_rod_is_drawn_from_point_to_point() -> None:
+    """A crank of 0.3 m and a rod of 0.5 m to a slider: the bar has the pins at its ends."""
+    crank = Link(name="crank", joint=Revolute(axis=(0, 0, 1)))
+    slider = Link(name="slider", joint=Prismatic(axis=(1, 0, 0)))
+    ends = Attachment(link="crank", pose=transl(0.3, 0, 0)), Attachment(link="slider", pose=transl(0, 0, 0.1))
+    rod = Rod(name="rod", first=ends[0], second=ends[1], length=0.5)
+    robot = Robot(name="slider-crank", links=(crank, slider), constraints=(rod,))
+    q = [0.4, 0.3 * np.cos(0.4) + np.sqrt(0.25 - 0.01 - (0.3 * np.sin(0.4)) ** 2)]
+    poses = with_bars(rod_bars(robot), link_frames(robot, q))
+    (body,) = (body for body in robot_bodies(robot) if body.row == len(robot.links) + 2)
+    z = body.mesh.corners[..., 2]
+    assert (z.min(), z.max()) == pytest.approx((0.0, 0.5), abs=1e-12)
+    assert poses.shape == (5, 4, 4)
+    assert poses[4, :3, :3] @ poses[4, :3, :3].T == pytest.approx(np.eye(3), abs=1e-12)
+    for distance, end in ((0.0, (0.3 * np.cos(0.4), 0.3 * np.sin(0.4), 0)), (0.5, (q[1], 0, 0.1))):
+        assert poses[4] @ [0, 0, distance, 1] == pytest.approx([*end, 1], abs=1e-12)
+    assert with_bars((), poses) is poses

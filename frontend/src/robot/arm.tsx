@@ -1,7 +1,7 @@
 import { useFrame } from '@react-three/fiber'
 import { useEffect, useMemo, useRef } from 'react'
 import { type BufferGeometry, Matrix4, type Group } from 'three'
-import { geometry, matrixAt, type Material, type Poses, type RobotScene } from './scene'
+import { geometry, matrixAt, rodMatrix, type Material, type Poses, type RobotScene } from './scene'
 
 export const MATERIALS: Record<Material, { color: string; metalness: number; roughness: number }> = {
   paint: { color: '#e8711a', metalness: 0.0, roughness: 0.38 },
@@ -27,7 +27,7 @@ export function useBodies(scene: RobotScene): Body[] {
 }
 
 interface ArmProps {
-  rows: number
+  scene: RobotScene
   bodies: Body[]
   poses: () => Poses | undefined
   /** The colour of a ghost, which shows a past or future pose of the arm. */
@@ -35,7 +35,8 @@ interface ArmProps {
 }
 
 /** The bodies at the present poses. */
-export function Arm({ rows, bodies, poses, ghost }: ArmProps) {
+export function Arm({ scene, bodies, poses, ghost }: ArmProps) {
+  const { rows, rods } = scene
   const groups = useRef<(Group | null)[]>([])
   const matrix = useMemo(() => new Matrix4(), [])
   useFrame(() => {
@@ -44,14 +45,15 @@ export function Arm({ rows, bodies, poses, ghost }: ArmProps) {
       if (!group) return
       group.visible = Boolean(now)
       if (!now) return
-      group.matrix.copy(matrixAt(now, row, matrix))
+      const rod = rods[row - rows]
+      group.matrix.copy(rod ? rodMatrix(now, rod, matrix) : matrixAt(now, row, matrix))
       group.matrixWorldNeedsUpdate = true
     })
   })
   const first = ghost ? 1 : 0 // a ghost shares the base of the arm
   return (
     <group name={ghost ? 'ghost' : 'arm'}>
-      {Array.from({ length: rows - first }, (_, k) => k + first).map((row) => (
+      {Array.from({ length: rows + rods.length - first }, (_, k) => k + first).map((row) => (
         <group key={row} ref={(group) => void (groups.current[row] = group)} matrixAutoUpdate={false}>
           {bodies
             .filter((body) => body.row === row)

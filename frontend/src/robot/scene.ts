@@ -1,4 +1,4 @@
-import { BufferAttribute, BufferGeometry, Matrix4 } from 'three'
+import { BufferAttribute, BufferGeometry, Matrix4, Vector3 } from 'three'
 import { unpackedFloats } from '../model/packed'
 import type { RobotScene, SceneJoint } from '../protocol'
 
@@ -42,6 +42,18 @@ export function matrixAt(poses: Poses, row: number, target: Matrix4): Matrix4 {
     0,
     1,
   )
+}
+
+/** The pose of a rod: its origin is the first end, z points to the second end. */
+export function rodMatrix(poses: Poses, rod: RobotScene['rods'][number], target: Matrix4): Matrix4 {
+  const first = new Vector3().fromArray(rod.first).applyMatrix4(matrixAt(poses, rod.first_row, target))
+  const second = new Vector3().fromArray(rod.second).applyMatrix4(matrixAt(poses, rod.second_row, target))
+  const z = second.sub(first)
+  if (z.lengthSq() === 0) z.set(0, 0, 1)
+  z.normalize()
+  const side = Math.abs(z.x) < 0.7 ? new Vector3(1, 0, 0) : new Vector3(0, 1, 0)
+  const y = side.cross(z).negate().normalize()
+  return target.makeBasis(new Vector3().crossVectors(y, z), y, z).setPosition(first)
 }
 
 export function matrixOf(numbers: number[]): Matrix4 {

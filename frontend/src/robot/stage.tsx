@@ -226,12 +226,12 @@ function StageContents({
         intensity={0.55}
         color="#dfe8f5"
       />
-      <Arm rows={scene.rows} bodies={bodies} poses={poses} />
+      <Arm scene={scene} bodies={bodies} poses={poses} />
       {options.ghosts && ghosts && (
-        <Arm rows={scene.rows} bodies={bodies} poses={ghosts.start} ghost={colours.start} />
+        <Arm scene={scene} bodies={bodies} poses={ghosts.start} ghost={colours.start} />
       )}
       {options.ghosts && ghosts && (
-        <Arm rows={scene.rows} bodies={bodies} poses={ghosts.goal} ghost={colours.goal} />
+        <Arm scene={scene} bodies={bodies} poses={ghosts.goal} ghost={colours.goal} />
       )}
       {options.frames && <Frames {...overlay} />}
       {options.axes && <JointAxes {...overlay} />}

@@ -19,6 +19,7 @@ from armblocks.rendering.camera import AZIMUTH, ELEVATION, Camera
 from armblocks.rendering.render import Rendering, composite, crop, render, shadow, with_opacity
 from armblocks.robot import Robot
 from armblocks.robot.geometry import Body, link_frames, reach, robot_bodies
+from armblocks.robot.rod_bars import RodBar, rod_bars, with_bars
 from armblocks.robot.shapes import Housing, Material
 from armblocks.robot.triangles import TriangleMesh, triangles
 
@@ -32,9 +33,10 @@ START_POSE_OPACITY = 0.26
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Stage:
-    """The common data of all panels of a figure: bodies, floor, camera and the panel's size in px."""
+    """The common data of all panels of a figure: bodies, bars of rods, floor, camera, panel size in px."""
 
     bodies: tuple[Body, ...]
+    bars: tuple[RodBar, ...]
     pedestal: tuple[TriangleMesh, ...]
     camera: Camera
     floor: float
@@ -62,10 +64,10 @@ class Stage:
 
         ``view``: azimuth and elevation of the camera, degrees.
         """
-        bodies = robot_bodies(robot)
+        bodies, bars = robot_bodies(robot), rod_bars(robot)
         corner_points = [
             body.mesh.corners.reshape(-1, 3) @ pose[body.row, :3, :3].T + pose[body.row, :3, 3]
-            for pose in poses
+            for pose in (with_bars(bars, pose) for pose in poses)
             for body in bodies
         ]
         points = np.concatenate([*corner_points, path])
@@ -91,6 +93,7 @@ class Stage:
         )
         return cls(
             bodies=bodies,
+            bars=bars,
             pedestal=_pedestal(robot, base_height, floor),
             camera=camera,
             floor=floor,
@@ -102,7 +105,8 @@ class Stage:
 
     def meshes(self, pose: _Array) -> list[TriangleMesh]:
         """The bodies and the pedestal in world coordinates, for one pose (L+2, 4, 4) of the links."""
-        return [*(body.mesh.moved(pose[body.row]) for body in self.bodies), *self.pedestal]
+        all_poses = with_bars(self.bars, pose)
+        return [*(body.mesh.moved(all_poses[body.row]) for body in self.bodies), *self.pedestal]
 
     def render(self, meshes: Sequence[TriangleMesh]) -> Rendering:
         """Bodies in the world, shaded."""

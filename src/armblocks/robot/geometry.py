@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from armblocks.robot.link import Link
 from armblocks.robot.linkage_points import LinkPoints, closure_points, configurations, rod_points
 from armblocks.robot.robot import Robot
+from armblocks.robot.rod_bars import RodBar, rod_bars
 from armblocks.robot.shapes import Box, Cylinder, Housing, Material, Pose, Shape, Sphere
 from armblocks.robot.triangles import TriangleMesh, triangles
 from armblocks.spatial import Transform
@@ -36,18 +37,27 @@ _NEGLIGIBLE = 0.02  # shorter parts, relative to a drum's radius, are not drawn
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Body:
-    """One mesh, and the ``row`` of ``link_poses`` with its frame (0 the base, then the links)."""
+    """One mesh, and the ``row`` of ``link_poses`` with its frame (0 the base, then the links).
+
+    The rows after the tool are those of the bars of rods, see :func:`armblocks.robot.rod_bars.with_bars`.
+    """
 
     row: int
     mesh: TriangleMesh
 
 
 def robot_bodies(robot: Robot) -> tuple[Body, ...]:
-    """All meshes of a robot, each in the frame of its row of ``link_poses``."""
-    return tuple(
-        Body(row=row, mesh=triangles(shape))
-        for row, shapes in enumerate(robot_shapes(robot))
-        for shape in shapes
+    """All meshes of a robot, each in the frame of its row of ``link_poses`` or of a bar."""
+    rows = [*robot_shapes(robot), *((_bar_shape(robot, bar),) for bar in rod_bars(robot))]
+    return tuple(Body(row=row, mesh=triangles(shape)) for row, shapes in enumerate(rows) for shape in shapes)
+
+
+def _bar_shape(robot: Robot, bar: RodBar) -> Shape:
+    """The bar of a rod, along z from the origin."""
+    radius = 0.45 * min(_Plan.of(robot).radius.values())
+    middle = _aligned(np.array([0.0, 0.0, bar.length / 2]), np.array([0.0, 0.0, 1.0]))
+    return Cylinder(
+        radius=radius, length=bar.length, bevel=0.1 * radius, material=Material.FLANGE, pose=middle
     )
 
 

@@ -11,7 +11,8 @@ from typing import Literal
 
 @dataclass(frozen=True, kw_only=True)
 class SceneBody:
-    """A body of a robot; its pose is ``row`` of the poses: row 0 is the base, the links follow.
+    """A body of a robot; its pose is ``row`` of the poses: row 0 is the base, the links and the tool follow,
+    then the rods.
 
     ``corners`` (F, 3, 3) m and unit ``normals`` (F, 3, 3) of its triangles: base64 of little-endian float32.
     """
@@ -44,6 +45,19 @@ class SceneJoint:
 
 
 @dataclass(frozen=True, kw_only=True)
+class SceneRod:
+    """A rod between the point ``first`` (3,) m in the frame of row ``first_row`` and ``second``.
+
+    The front end computes its pose: the origin is the first point, z points to the second one.
+    """
+
+    first_row: int
+    first: list[float]
+    second_row: int
+    second: list[float]
+
+
+@dataclass(frozen=True, kw_only=True)
 class RobotScene:
     """Bodies, joints and size of a robot.
 
@@ -58,4 +72,5 @@ class RobotScene:
     rows: int
     bodies: list[SceneBody]
     joints: list[SceneJoint]
+    rods: list[SceneRod]
     rest: list[float]

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from armblocks.errors import InputError, counted
 from armblocks.robot import Link, Robot
 from armblocks.robot.geometry import drum_radii, link_frames, reach, robot_bodies
+from armblocks.robot.rod_bars import rod_bars
 from armblocks.spatial import Transform, rotation_about, trotx
-from armblocks.studio.protocol.robot_scene import RobotScene, SceneBody, SceneJoint
+from armblocks.studio.protocol.robot_scene import RobotScene, SceneBody, SceneJoint, SceneRod
 
 
 def scene_of(robot: Robot) -> RobotScene:
@@ -52,6 +53,15 @@ def scene_of(robot: Robot) -> RobotScene:
             )
             for link in robot.moving_links
             if link.joint.nv == 1
+        ],
+        rods=[
+            SceneRod(
+                first_row=bar.rows[0],
+                first=list(bar.points[0]),
+                second_row=bar.rows[1],
+                second=list(bar.points[1]),
+            )
+            for bar in rod_bars(robot)
         ],
         rest=rest_of(robot),
     )
