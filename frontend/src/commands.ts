@@ -168,7 +168,7 @@ const COMMANDS: Command[] = [
   { title: 'Print the list of keys', run: () => showDialog('keys', 'print') },
 ]
 
-/** The command for the pressed keys, among the commands of the sheet or among all others. */
+/** The command for the pressed keys, among the commands of the sheet or among all other commands. */
 export function commandOf(event: KeyboardEvent, ofSheet: boolean): Command | undefined {
   const typing = event.target instanceof Element && event.target.closest('input, textarea') !== null
   return COMMANDS.find(

@@ -11,7 +11,7 @@ let requested = 0
 /** Run all views in the next animation frame. */
 export function scheduleFrame(): void {
   requested ||= requestAnimationFrame((now) => {
-    requested = 0 // a view may request the frame after this one
+    requested = 0 // a view may request the next frame
     for (const callback of callbacks) callback(now)
   })
 }

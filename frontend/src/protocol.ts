@@ -1791,7 +1791,7 @@ export interface CellColumn {
  * Bodies, joints and size of a robot.
  *
  * ``reach`` (m) of the arm; ``foot`` (m): distance by which the bodies of the base extend below its frame.
- * ``rows`` is the number of poses: base, links and tool. ``joints`` are those with one axis. ``rest``: the
+ * ``rows`` is the number of poses: base, links and tool. ``joints``: joints with one axis. ``rest``: the
  * coordinates q of the pose that is shown without motion.
  */
 export interface RobotScene {

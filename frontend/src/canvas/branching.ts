@@ -16,7 +16,7 @@ interface Branch {
   source: string
   from: Point
   to: Point
-  /** The input at which it would end. */
+  /** The input at which the branch would end. */
   target: string | null
 }
 

@@ -18,7 +18,7 @@ interface MovedNode {
   position: { x: number; y: number }
 }
 
-/** The alignment of dragged blocks with all others. */
+/** The alignment of dragged blocks with all other blocks. */
 export function alignment(
   moved: readonly MovedNode[],
   blocks: Record<string, SheetBlock>,

@@ -7,7 +7,7 @@ import { connection, useStudio } from '../store'
 /** The layout of a sheet during a drag, which differs from the document. */
 interface DraggedLayout {
   places: Places
-  /** The displayed wires, if they differ from those of the document. */
+  /** The displayed wires, if they differ from the wires of the document. */
   wires: Wire[] | null
   passed: string | null
 }

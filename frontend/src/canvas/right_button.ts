@@ -48,7 +48,7 @@ function rightDrag(flow: Flow, edges: readonly WireEdgeType[]) {
   }
 }
 
-/** Duplicate a block, or all selected ones, at the release of the pointer; Escape cancels. */
+/** Duplicate a block, or all selected blocks, at the release of the pointer; Escape cancels. */
 function duplicateWhileDragged(flow: Flow, node: string, pointerDown: PointerEvent): void {
   const { selection } = useStudio.getState()
   const names = selection.has(node) ? [...selection] : [node]

@@ -105,7 +105,7 @@ function blockEntries(document: OpenDocument, block: SheetBlock): Entries {
   ]
 }
 
-/** The sides without ports, and the present one. */
+/** The sides without ports, and the present side of the name. */
 function nameEntries(chosen: SheetBlock[]): Entries {
   const titles = {
     auto: 'At a side without wires',

@@ -37,12 +37,12 @@ export interface WireTag extends PortPosition {
 /** The wire whose route is being drawn, with its present bends. */
 export const useBending = create<{ wire: Required<Wire> | null }>(() => ({ wire: null }))
 
-/** End the drawing of a route, unless another one has begun. */
+/** End the drawing of a route, unless another drawing has begun. */
 function endBending(wire: Required<Wire>): void {
   if (useBending.getState().wire === wire) useBending.setState({ wire: null })
 }
 
-/** Distance within which a dragged segment is aligned with a parallel one, px. */
+/** Distance within which a dragged segment is aligned with a parallel segment, px. */
 const SNAP_PX = 7
 
 /**

@@ -129,7 +129,7 @@ function List({ bookmarks, focused }: { bookmarks: SheetBookmark[]; focused: boo
   }, [focused])
   const remove = (bookmark: SheetBookmark) =>
     void applyEdit({ kind: 'remove_bookmark', name: bookmark.name }, bookmark.inside)
-  // After a removal the next bookmark has the focus, after a renaming the renamed one.
+  // After a removal the next bookmark has the focus, after a renaming the renamed bookmark.
   const hadFocus = useRef(false)
   useEffect(() => {
     if (hadFocus.current && document.activeElement === document.body) focus(active)

@@ -47,7 +47,7 @@ const EMPTY_VIEW: DocumentView = {
 
 loadViews()
 
-/** The view of a diagram that was shown before another one. */
+/** The view of a diagram that was shown before another diagram. */
 export const viewOf = (document: string): DocumentView | undefined => views.get(document)
 
 /** Delete the views of a closed document. */

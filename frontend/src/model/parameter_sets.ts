@@ -21,7 +21,7 @@ export function setNames(table: ParameterSetTable): string[] {
   return Object.keys(table.sets).toSorted((a, b) => a.localeCompare(b, undefined, { numeric: true }))
 }
 
-/** One cell of the table of sets: the value, and whether it is that of the model. */
+/** One cell of the table of sets: the value, and whether the model has this value. */
 export interface Cell {
   value: unknown
   /** The set does not contain the parameter: applying it leaves the value of the model. */

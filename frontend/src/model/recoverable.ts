@@ -1,6 +1,6 @@
 import type { DocumentState, Recovery } from '../protocol'
 
-/** The documents that can be recovered, without those that are open. */
+/** The documents that can be recovered, without open documents. */
 export function recoverable(
   recoveries: readonly Recovery[],
   documents: readonly Pick<DocumentState, 'document'>[],

@@ -21,7 +21,8 @@ export function isInsertable(block: SheetBlock, wires: Wire[]): boolean {
 }
 
 /**
- * The wires without those between some blocks and all others. For a single block with one input and one
+ * The wires without the wires between some blocks and all other blocks. For a single block with one input and
+ * one
  * output, its two neighbours are connected.
  */
 export function disconnectBlocks(blocks: SheetBlock[], wires: Wire[]): Wire[] {

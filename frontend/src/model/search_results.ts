@@ -20,7 +20,8 @@ export interface SearchResult<Document> {
 export const MAX_FOUND = 50
 
 /**
- * The results of all documents, document by document; those of the document in front are first. One document
+ * The results of all documents, document by document; results of the document in front are first. One
+ * document
  * has no headings.
  */
 export function groupedResults<Document>(

@@ -1,8 +1,8 @@
 import type { Place, SheetBlock, SheetNote } from '../protocol'
 
 /**
- * Positions that this client has sent to the server. The sheet shows them at once; the server's answer, which
- * takes longer on a large sheet, replaces them.
+ * Positions that this client has sent to the server. The sheet shows them at once; the reply of the server
+ * replaces them.
  */
 export interface SentMove {
   key: string

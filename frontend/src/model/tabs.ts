@@ -32,7 +32,7 @@ export function neighbour(tabs: readonly Tab[], document: string): Tab | undefin
   return tabs[index + 1] ?? tabs[index - 1]
 }
 
-/** The tab a number of steps to the right; after the last tab follows the first. */
+/** The tab a number of steps to the right; the first tab follows the last. */
 export function tabAfter(tabs: readonly Tab[], document: string | undefined, steps: number): Tab | undefined {
   const index = tabs.findIndex((tab) => tab.document === document)
   return tabs[(index + steps + tabs.length) % tabs.length]
@@ -53,8 +53,8 @@ export function tabLabels(tabs: readonly Tab[]): string[] {
 }
 
 /**
- * The tabs that the server can open again. A document without a file or an origin that the server does not
- * know had no edits, or they were discarded.
+ * The tabs that the server can open again. A document without file and origin that is missing on the server
+ * had no edits, or they were discarded.
  */
 export function restorableTabs(
   tabs: readonly Tab[],

@@ -9,7 +9,7 @@ export interface Trace {
   channel: string
   element: number
   label: string
-  /** The signal and the entry in the label: a number, or a name such as that of a joint. */
+  /** The signal and the entry in the label: a number, or a name such as the name of a joint. */
   stem: string
   entry: string
   unit: string
@@ -75,7 +75,7 @@ export function withEntry({ stem }: Trace, parts: string[]): Pick<Trace, 'entry'
 export const hasEntry = ({ entry, label, stem }: Trace): boolean =>
   entry !== '' && label === `${stem} ${entry}`
 
-/** The traces of two charts; those of the second have the colours and dashes that they have in the first. */
+/** The traces of two charts; traces of the second chart have the same colours and dashes as in the first. */
 export function sameTones(first: Trace[], second: Trace[]): [Trace[], Trace[]] {
   const known = new Map(first.map((trace) => [trace.key, trace]))
   const tones = (trace: Trace): Trace => {
@@ -88,7 +88,7 @@ export function sameTones(first: Trace[], second: Trace[]): [Trace[], Trace[]] {
 /** The columns of a plot: common times, and the values of each trace. */
 export type PlotColumns = [Float64Array, ...(Float64Array | (number | null | undefined)[])[]]
 
-/** The extremes of traces in the intervals of a window, as far as they are computed. */
+/** The extremes of traces in the intervals of a window that are computed so far. */
 export interface Extremes {
   from: number
   to: number

@@ -21,7 +21,7 @@ interface Joints {
 /** The coordinates at the sliders, and the poses that Python has computed. */
 export const useJoints = create<Joints>(() => ({ q: [], poses: [], count: 0, live: true }))
 
-/** Time after which an unanswered request no longer prevents the next one. */
+/** Time after which a request without a reply no longer prevents the next request. */
 const REPLY_MS = 2000
 
 let awaitedSince = -Infinity

@@ -96,7 +96,7 @@ const newScratch = () => ({
 type Scratch = ReturnType<typeof newScratch>
 
 function placeBehindTool(now: CameraControls, { matrix, eye, to }: Scratch, reach: number): void {
-  // A hand camera: behind the tool and a little above, looking along the axis of the tool.
+  // A hand camera: behind the tool and a little above, in the direction of the tool's axis.
   eye.set(-0.16 * reach, 0, -0.3 * reach).applyMatrix4(matrix)
   to.set(0, 0, 0.35 * reach).applyMatrix4(matrix)
   void now.setLookAt(eye.x, eye.y, eye.z, to.x, to.y, to.z, false)

@@ -5,7 +5,7 @@ interface FileNameDialogProps {
   title: string
   description: string
   path: string
-  /** A remark on the name; empty without one. */
+  /** A remark on the name, or empty. */
   note?: string
   /** Why the file was not written; empty if it was not tried. */
   refusal: string

@@ -98,7 +98,7 @@ export function JointAxes({ scene, poses, dark }: OverlayProps) {
   })
 }
 
-/** The ranges of the joints: an arc or a bar over the allowed positions, and a pointer at the present one. */
+/** The ranges of the joints: an arc or a bar over the allowed range, and a pointer at the position. */
 export function Limits({ scene, poses, dark }: OverlayProps) {
   return scene.joints.map((joint) => (
     <Range key={joint.name} joint={joint} poses={poses} dark={dark} reach={scene.reach} />

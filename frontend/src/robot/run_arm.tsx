@@ -15,9 +15,9 @@ interface RunArmProps {
   rest: Poses
   /** The drawing for browsers without WebGL. */
   drawing: () => Promise<string | undefined>
-  /** Additional entries of the context menu, before the others. */
+  /** Additional entries at the start of the context menu. */
   entries?: () => Entries
-  /** Additional buttons, before the others. */
+  /** Additional buttons before the usual buttons. */
   children?: React.ReactNode
 }
 

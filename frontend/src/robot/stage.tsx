@@ -36,7 +36,7 @@ const COLOURS = {
   },
 }
 
-/** Poses that are shown in addition to the arm: past and future ones. */
+/** Past and future poses that are shown in addition to the arm. */
 export interface Ghosts {
   start: () => Poses | undefined
   goal: () => Poses | undefined
@@ -64,13 +64,13 @@ interface StageProps {
    * Plays the run from its start and resolves at its end, for a video; without it no video can be recorded.
    */
   playForVideo?: () => Promise<void>
-  /** Additional entries of the context menu, before the others. */
+  /** Additional entries at the start of the context menu. */
   entries?: () => Entries
   /** Objects in the scene in addition to the arm, such as a handle of its tool. */
   contents?: React.ReactNode
-  /** A handler of keys before those of the view; returns whether it has handled the key. */
+  /** A handler of keys, called before the handlers of the view; returns whether it has handled the key. */
   onKey?: (event: React.KeyboardEvent) => boolean
-  /** Additional buttons, before the others. */
+  /** Additional buttons before the usual buttons. */
   children?: React.ReactNode
 }
 
@@ -140,7 +140,7 @@ export function Stage(props: StageProps) {
   )
 }
 
-/** Keys of the view: those of the caller first, then those of the camera. */
+/** Keys of the view: first the keys of the caller, then the keys of the camera. */
 function handleKey(event: React.KeyboardEvent, view: CameraHandle | null, onKey: StageProps['onKey']): void {
   if (!onKey?.(event) && !moveCamera(event, view)) return
   event.preventDefault()
@@ -315,7 +315,7 @@ function useFloor(
     const floor = low < footHeight ? step * Math.floor(low / step) : Infinity
     const lower = (previous: typeof lowestFloor) =>
       previous.name !== scene.name || floor < previous.floor - 1e-9
-    // Several frames may come before the state changes; a later one does not raise the floor again.
+    // Several frames may come before the state changes; a later frame does not raise the floor again.
     if (lower(lowestFloor)) setLowestFloor((before) => (lower(before) ? { name: scene.name, floor } : before))
   })
   return lowestFloor.name === scene.name ? Math.min(footHeight, lowestFloor.floor) : footHeight

@@ -6,7 +6,7 @@ import { useRuns } from './runs'
 import { setTrialValues } from './trial_values'
 import { useParameterSets } from './use_parameter_sets'
 
-/** Menu that chooses the values for the next run: those of a parameter set, or the values of the model. */
+/** Menu that chooses the values for the next run: a parameter set, or the values of the model. */
 export function ParameterSetMenu() {
   const table = useParameterSets()
   const trialValues = useRuns((s) => s.trialValues)

@@ -46,7 +46,8 @@ export async function parameterSets(
 }
 
 /**
- * Replace all tried values: the next run starts with them. In a run in progress, parameters that are no
+ * Replace all tried values; the next run starts with the new values. In a run in progress, parameters that
+ * are no
  * longer tried return to the values of the model.
  */
 export async function setTrialValues(next: Values): Promise<void> {

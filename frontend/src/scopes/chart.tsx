@@ -54,7 +54,7 @@ export function Chart({
   /** The block whose signals are shown. */
   view?: string
   band?: number
-  /** The state of this chart and of another one with equal axes, and the traces of that chart. */
+  /** The state of this chart, and state and traces of another chart with equal axes. */
   shared?: ChartState
   companions?: Trace[]
 }) {
@@ -142,7 +142,7 @@ interface LegendProps {
   toggle: (key: string) => void
 }
 
-/** The names of the traces, after that of their common signal. */
+/** The names of the traces, after the name of their common signal. */
 function Legend({ traces, hidden, toggle }: LegendProps) {
   const stem = commonStem(traces)
   return (
@@ -244,7 +244,7 @@ interface Action {
   run: () => void
 }
 
-/** The ways to save a chart: all samples, those that are shown, and the picture that is shown. */
+/** The ways to save a chart: all samples, the shown samples, and the shown picture. */
 function exportEntries(
   title: string,
   traces: Trace[],

@@ -12,7 +12,7 @@ import { withUnit } from './quantity'
 import { Grid, PlotTools } from './scopes'
 import { DASHES, MAX_TRACES, sameTones, tracesOf, withEntry, type Trace } from '../model/trace'
 
-/** Runs in one plot, the difference of two of them, or two plots with equal axes. */
+/** Runs in one plot, the difference of two runs, or two plots with equal axes. */
 type View = 'overlay' | 'difference' | 'side by side'
 
 const VIEWS = [

@@ -14,7 +14,7 @@ const LABEL_HEIGHT = 16
 export const TIME_AXIS_HEIGHT = TIME_TEXTS_HEIGHT + LABEL_HEIGHT
 
 /**
- * The uPlot options of the traces; `label` and `unitFactor` are those of the vertical axis, `band` a band
+ * The uPlot options of the traces; `label` and `unitFactor` belong to the vertical axis, `band` a band
  * about zero.
  */
 export function plotOptions(

@@ -12,11 +12,11 @@ import { useStudio } from '../store'
 import { useWindow, wholeRun } from './window'
 
 interface Trigger extends TriggerSettings {
-  /** The trigger that the user has chosen; null: the last one. */
+  /** The trigger that the user has chosen; null: the last trigger. */
   chosen: number | null
   /** The time from which on a single trigger is accepted, s. */
   armedAt: number
-  /** The number of triggers, the displayed one, and its time, s. */
+  /** The number of triggers, the displayed trigger, and its time, s. */
   count: number
   index: number | null
   at: number | null
@@ -44,7 +44,7 @@ export function applySettings(settings: TriggerSettings): void {
   useTrigger.setState({ ...settings, chosen: null, armedAt: -Infinity, count: 0, index: null, at: null })
 }
 
-/** Find the triggers of new samples, and show the window about the chosen one. */
+/** Find the triggers of new samples, and show the window about the chosen trigger. */
 function updateTrigger(): void {
   const state = useTrigger.getState()
   if (!state.on) return

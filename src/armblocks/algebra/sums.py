@@ -16,7 +16,7 @@ PARAMETER, COORDINATE, RATE, TRIGONOMETRIC, CALL = range(5)
 """The ranks of atoms, in the order of the factors of a product."""
 
 CANCELLATION = 1e-13
-"""Numbers below this fraction of the numbers of which they are the sum count as rounding errors."""
+"""A sum below this fraction of its terms counts as a rounding error."""
 EQUAL = 1e-12
 """Largest relative difference of two numbers that count as equal."""
 QUARTER = math.pi / 2
@@ -135,7 +135,7 @@ def call(name: str, *arguments: Sum) -> Sum:
 
 
 def _collected(terms: Iterable[tuple[Monomial, tuple[float, float]]]) -> dict[Monomial, tuple[float, float]]:
-    """Equal monomials added, without those that cancel."""
+    """The sum with equal monomials added; monomials with the coefficient 0 are omitted."""
     collected: dict[Monomial, tuple[float, float]] = {}
     for key, (value, size) in terms:
         if key in collected:

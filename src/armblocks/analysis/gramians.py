@@ -89,7 +89,7 @@ def _gramian(A: Array, B: Array, *, discrete: bool) -> tuple[Array, float]:
 
 
 def _in_order_of_effect(A: Array) -> list[list[int]]:
-    """The irreducible parts of A, ordered such that each part is affected by itself and later parts only."""
+    """The irreducible parts of A, ordered so that only later parts affect a part."""
     parts = irreducible_parts(A)
     member = np.zeros((len(parts), A.shape[0]))
     for k, part in enumerate(parts):

@@ -53,9 +53,9 @@ def eigenvalues(matrix: Array) -> Complex:
     """The eigenvalues of a matrix; simple small ones are refined.
 
     The error of the usual algorithm is proportional to the norm of the matrix, which can be much larger
-    than an eigenvalue. Such eigenvalues are improved by Newton's method with deflation of the others
-    (Aberth, Math. Comp. 27, 1973, 339-344) for ``det(s I - A)``, whose logarithmic derivative is the trace of
-    ``(s I - A)^-1``.
+    than an eigenvalue. Such eigenvalues are improved by Newton's method with deflation of the other
+    eigenvalues (Aberth, Math. Comp. 27, 1973, 339-344) for ``det(s I - A)``, whose logarithmic derivative is
+    the trace of ``(s I - A)^-1``.
     """
     with from_extra("analysis", "poles and zeros of a linear system"):
         from scipy.linalg import eigvals, matrix_balance

@@ -16,7 +16,7 @@ Indices = NDArray[np.intp]
 
 
 def _controllable(matrix: SystemMatrix, states: Indices) -> Indices:
-    """Transform the states such that some of them are controllable and do not depend on the others.
+    """Transform the states such that some states are controllable and independent of the other states.
 
     Returns the indices of the controllable states. The staircase algorithm (Van Dooren, IEEE Trans. Automatic
     Control 26, 1981, 111-129) determines ranks of blocks, not of powers of A as the controllability matrix.

@@ -22,7 +22,7 @@ ROW_GUARDS = (Guard("next", (), "t - the time of the next row", 1),)
 
 @dataclass(frozen=True)
 class TableRows:
-    """A table with ``count`` rows of ``width`` entries, of which the first is the time (s)."""
+    """A table with ``count`` rows of ``width`` entries; the first entry is the time (s)."""
 
     count: int
     width: int

@@ -67,7 +67,7 @@ def _entries(rows: Sequence[_Row]) -> int:
 
 
 def _chains(tape: Tape) -> Iterator[list[int]]:
-    """Chains of operations, each of which adds a product to the sum of the previous operation.
+    """Chains of operations that each add a product to the sum of the previous operation.
 
     No other operation reads these sums.
     """

@@ -1,4 +1,4 @@
-"""Long tapes divided into parts, each of which becomes a function.
+"""Divides long tapes into parts; each part becomes a function.
 
 LLVM's compile time grows faster than linearly with the length of a function, mainly because it compares loads
 and stores pairwise. Ten thousand operations take minutes in one function and seconds in parts. Values that a

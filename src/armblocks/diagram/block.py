@@ -134,7 +134,7 @@ class Block(ABC, metaclass=ArgumentErrors, methods=False):
         return _parameters_of(cls)
 
     def inputs_of_the_run(self) -> tuple[Parameter, ...]:
-        """The run inputs of the compiled system: tunable parameters and those that are read by index."""
+        """The run inputs of the compiled system: tunable parameters and tables that are read by index."""
         return tuple(rule for rule in self.parameters() if rule.tunable)
 
     def parameters_behind_inputs(self) -> tuple[str, ...]:

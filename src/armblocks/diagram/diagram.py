@@ -136,7 +136,7 @@ class Diagram(metaclass=ArgumentErrors):
     """An immutable diagram of blocks and connections. ``DiagramBuilder.build`` creates and checks it.
 
     ``blocks`` is sorted by name and ``connections`` by ends, so that equal diagrams compare equal. ``layout``
-    may name only some blocks, and ``bends`` only some connections: those with a user-drawn route, see
+    may name only some blocks, ``bends`` only the connections with a user-drawn route, see
     :func:`armblocks.drawing.wires.bent`. ``notes`` are annotations by name. ``mask`` has the parameters that
     the diagram declares (see :mod:`armblocks.diagram.mask`) and ``mask_values`` their values (by default the
     default values). The values of block parameters that are formulas are computed from ``mask_values``.

@@ -1,4 +1,4 @@
-"""Implicit equations: those that are linear in their unknowns are solved here symbolically."""
+"""Implicit equations; equations that are linear in their unknowns are solved here symbolically."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def _function_of(expression: SX, unknowns: SX) -> Function:
 
 
 def _dependencies(residual: SX, w: SX) -> list[list[int]]:
-    """The indices of the unknowns in each residual, including those that occur in comparisons only."""
+    """The indices of the unknowns in each residual, including unknowns in comparisons only."""
     sparsity = _function_of(residual, w).jac_sparsity(0, 0)
     needs: list[list[int]] = [[] for _ in range(residual.shape[0])]
     for row, column in zip(sparsity.row(), sparsity.get_col()):

@@ -112,7 +112,7 @@ def formula_names(text: str, where: str = "") -> frozenset[str]:
 
 
 def parameters_read(text: str, known: Iterable[str], where: str = "") -> frozenset[str]:
-    """The known parameters that a formula reads, including those that hide a function of the same name.
+    """The known parameters that a formula reads, including parameters that hide a function of the same name.
 
     Raises ``InputError`` where the text is not a formula.
     """

@@ -25,7 +25,7 @@ class DependentParameters:
     """The parameters that depend on one mask parameter through formulas, by path, at any depth.
 
     ``tunable``: parameters that stay inputs of the compiled system, as formulas of the mask parameter's
-    symbol. ``structural``: those that are constants of the equations.
+    symbol. ``structural``: parameters that are constants of the equations.
     """
 
     tunable: dict[str, SX] = field(default_factory=dict[str, SX])

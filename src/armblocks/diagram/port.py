@@ -15,8 +15,8 @@ class Port(metaclass=ArgumentErrors):
 
     ``shape`` is the only allowed shape, or ``None`` if it follows from the connections. ``unit`` is SI, or
     ``""`` if the port has no unit or the unit of its signal. ``names`` are the names of the entries of a
-    vector, such as joints, where the block knows them. ``before_events``: an output with the value before the
-    events of its block at the same instant, such as the state of an integrator before a reset.
+    vector, such as joints, if the block has names for them. ``before_events``: an output with the value
+    before the events of its block at the same instant, such as the state of an integrator before a reset.
     """
 
     name: str

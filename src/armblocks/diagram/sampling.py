@@ -1,4 +1,4 @@
-"""Sample times: those that blocks declare, and those that are inherited through connections."""
+"""Sample times, declared by blocks or inherited through connections."""
 
 from __future__ import annotations
 

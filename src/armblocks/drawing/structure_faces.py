@@ -208,7 +208,7 @@ def oval(x: float, y: float, width: float, height: float) -> Mark:
 def bus_outline(
     block: Block, x: float, y: float, width: float, height: float, flipped: bool
 ) -> tuple[Mark, ...]:
-    """The outline of a bus block, of which one edge is the bar."""
+    """The outline of a bus block; one edge is the bar."""
     card = Rectangle(x, y, width, height, 2, Tone.SURFACE, Tone.HAIRLINE, 1.0)
     return card, bus_bar(block, x, y, width, height, flipped)
 

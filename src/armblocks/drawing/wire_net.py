@@ -38,7 +38,7 @@ class NetRouter:
         self._examined: Extent = (np.inf, np.inf, -np.inf, -np.inf)
 
     def route(self) -> NetRoute:
-        """Route all targets: user-drawn routes first, then the others by distance from the source."""
+        """Route all targets: user-drawn routes first, then all other targets by distance from the source."""
         net = self._net
         paths: dict[int, tuple[Point, ...]] = {}
         for k, (target, bends) in enumerate(zip(net.targets, net.bends)):

@@ -90,7 +90,7 @@ def drawn_path(source: WireEnd, bends: Sequence[float], target: WireEnd) -> tupl
 
 
 def corners(points: Sequence[Point]) -> tuple[Point, ...]:
-    """The points without repetitions and without those on a straight line between their neighbours."""
+    """The points without repetitions and without points on a straight line between their neighbours."""
     result: list[Point] = []
     for point in points:
         if result and point == result[-1]:

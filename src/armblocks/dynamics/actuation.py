@@ -49,7 +49,7 @@ class MotorForces(NamedTuple):
 def motor_forces(
     robot: Robot, q: SX, free_torques: SX, qd: SX | None, qdd: SX | None, near: Array | None
 ) -> MotorForces:
-    """Torques of the joints with a motor, and 0 at the others, in the order of qd.
+    """Torques of the joints with a motor, and 0 at all other joints, in the order of qd.
 
     ``free_torques`` (n, 1): the torques of all joints for the same motion without the closures. ``near``: see
     :func:`independent_relations`. The results are NaN if the motion violates the constraints, because its
@@ -168,5 +168,5 @@ def _check_actuation(
             f"the joints with {drives} do not determine the other joints",
             where=where,
             allowed="motors whose joints fix the mechanism when they are locked",
-            fix="move a motor to a joint that can still move while the others are locked",
+            fix="move a motor to a joint that can still move while the other joints with motors are locked",
         )

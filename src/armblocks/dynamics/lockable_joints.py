@@ -130,7 +130,7 @@ class JointEquations:
         self.M = SX(vertcat(*(vertcat(*(SX(self._M[i][j]) for j in body_of_joint)).T for i in body_of_joint)))
 
     def solve(self, right: SX, free: SX) -> SX:
-        """``x`` with ``M x = right`` in the rows of the free joints (1), and exactly 0 for the others (0)."""
+        """``x`` with ``M x = right`` in the rows of free joints (1), and exactly 0 for locked joints (0)."""
         n, bodies = self._tree.n, self._tree.bodies
         is_free = [free[body.speed] for body in bodies]
         masked: SquareMatrix = [
@@ -153,7 +153,7 @@ class JointEquations:
         return qdd, torque - self.bias - mtimes(self.M, qdd)
 
     def speeds_after_impact(self, qd: SX, stopping: SX) -> SX:
-        """Speeds after an impact that stops some joints (1) and leaves the others free (0).
+        """Speeds after an impact that stops some joints (1) and leaves all other joints free (0).
 
         The impulse acts only at the joints that stop: ``M (qd+ - qd)`` is 0 for the others.
         """
@@ -199,11 +199,11 @@ def locked_joints(
     friction: DryFriction,
     breakaway: SX,
 ) -> JointModes:
-    """The locked joints, and the sliding directions of the others.
+    """The locked joints, and the sliding directions of all other joints.
 
     ``driving`` is the torque (n,) at the joints without Coulomb friction and hard stops; ``start`` is the
     initial guess. A moving joint slides. Of the joints at rest, those beyond their friction limit are
-    released, and those that would slide against their direction are locked. The number of repetitions is the
+    released, and joints that would slide against their direction are locked. The number of repetitions is the
     number of joints. (The accelerations minimise 1/2 qdd' M qdd - qdd' (torque - bias) + sum of friction
     |qdd|, the principle of least constraint. This function is convex and has a unique minimum.) Guards detect
     remaining inconsistencies.

@@ -91,7 +91,7 @@ class MechanismEquations:
         return qdd, holding + mtimes(self.J.T, multipliers) if self.J.shape[0] else holding
 
     def speeds_after_impact(self, qd: SX, stopping: SX) -> SX:
-        """Speeds after an impact that stops some joints (1) and leaves the others free (0).
+        """Speeds after an impact that stops some joints (1) and leaves all other joints free (0).
 
         Impulses act at the joints that stop and at the closures.
         """

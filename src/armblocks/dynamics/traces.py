@@ -3,7 +3,7 @@
 Shapes, units and frames of the inputs and outputs, here and in all functions below:
 
 ``q`` (nq,) rad or m, ``qd`` (n,) per second, ``qdd`` (n,) per second squared, ``tau`` (n,) N m or N, all in
-the order of the robot's moving links. A ball joint has a quaternion w x y z in q, of which only the direction
+the order of the robot's moving links. A ball joint has a quaternion w x y z in q; only its direction
 counts, and an angular velocity in the axes of the distal frame in qd; NOTATION.md has the layout. ``n`` is
 the number of degrees of freedom.
 ``wrench`` (6,): force (N) and moment (N m) of the tip on the environment, about the origin and in

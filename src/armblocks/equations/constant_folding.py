@@ -85,7 +85,7 @@ def has_elementary(function: Function) -> bool:
 
 
 def call_with_constants(function: Function, arguments: Sequence[SX]) -> list[SX]:
-    """The result columns of an SX function for these arguments, some of which may be constants."""
+    """The result columns of an SX function for these arguments, which may be constants."""
     if not any(map(_has_constants, arguments)):
         return function.call(list(arguments), True, False)
     return results_of_operations(function, arguments, operation_value)

@@ -87,7 +87,7 @@ class Instants:
         self.times, self.moving_breakpoints = self._breakpoints()
 
     def _breakpoints(self) -> tuple[SX, list[int]]:
-        """The breakpoints, and the indices of those that depend on the parameters."""
+        """The breakpoints, and the indices of breakpoints that depend on the parameters."""
         c = self.columns
         (p,) = c.system.breakpoints.arguments
         times = vertcat(*c.system.breakpoints.results, SX(0, 1))

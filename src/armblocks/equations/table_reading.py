@@ -6,8 +6,8 @@ as ``printme(printme(first, -n), index)``: ``first`` is the symbol of the table'
 translates it to one load, and nothing is printed. A table must be an input of the function (a parameter of
 the system), so that its entries are contiguous.
 
-CasADi's derivative with respect to the index is 0, which is correct for an integer. CasADi sees a dependence
-on the first entry only, so sensitivities to entries of such tables are not available.
+CasADi's derivative with respect to the index is 0, which is correct for an integer. CasADi reports a
+dependence on the first entry only, so sensitivities to entries of such tables are not available.
 """
 
 from __future__ import annotations

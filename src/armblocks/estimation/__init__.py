@@ -1,4 +1,4 @@
 """Estimation of parameters from measurements: least squares with standard errors, filters, constraints.
 
-The package has arrays only: it knows neither robots nor diagrams.
+All arguments and results are arrays; the package does not use robots or diagrams.
 """

@@ -44,7 +44,7 @@ class NonlinearFit:
 
 
 class _Search:
-    """Evaluates the model, keeps the best parameters, and remembers the last evaluation."""
+    """Evaluates the model, and stores the best parameters and the last evaluation."""
 
     def __init__(self, evaluate: Evaluation, observe: Callable[[int, float], None] | None) -> None:
         self._evaluate = evaluate

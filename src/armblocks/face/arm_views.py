@@ -1,6 +1,6 @@
 """``Arm.plot``, ``Arm.animate`` and ``Arm.teach``: views in a notebook or in the browser, and files.
 
-The views belong to the studio, a layer above this one, so they are imported by name at the first call.
+The views belong to the studio, a higher layer, so they are imported by name at the first call.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ def fit(
     such as its input; or a list of several experiments, which are fitted together. The times (s) need not be
     equally spaced; NaN are missing values, and two rows with one time are both sides of a jump.
 
-    ``bounds``: lowest and highest values by name, by default those that the block or mask allows. ``noise``:
+    ``bounds``: lowest and highest values by name, by default the bounds of the block or mask. ``noise``:
     known standard deviations of signals by name; otherwise each signal has unknown noise, which is estimated
     and determines its weight. ``values``: other values of further parameters. ``progress(evaluations,
     squares)`` is called after every evaluation. Ctrl-C ends the search with the best values so far.
@@ -115,7 +115,7 @@ def _index(fitted: FittedParameters, name: str, where: str) -> int:
 def _bounds(
     diagram: Diagram, fitted: FittedParameters, given: Mapping[str, tuple[float, float]], where: str
 ) -> Array:
-    """The bounds (k, 2): the given ones, else those that the block or mask allows."""
+    """The bounds (k, 2): as given, else the bounds of the block or mask."""
     limits = np.tile([-np.inf, np.inf], (len(fitted.entries), 1))
     for k in range(len(limits)):
         rule = parameter_rule(diagram, fitted.whole_of(k))

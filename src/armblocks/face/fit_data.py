@@ -104,7 +104,7 @@ def read_measurement(data: object, system: HybridSystem, where: str) -> Measurem
 def _assembled(
     path: str, entries: Mapping[str, Array], system: HybridSystem, count: int, where: str
 ) -> Array:
-    """The entries of a signal that have columns of their own; the others are NaN."""
+    """The entries of a signal with separate columns; all other entries are NaN."""
     elements = list(system.signals_layout[path].elements)
     values = np.full((count, len(elements)), np.nan)
     for name, column in entries.items():

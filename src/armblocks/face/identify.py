@@ -137,7 +137,7 @@ def _result(
 
 
 def _links(robot: Robot, links: str | Sequence[str] | None) -> tuple[str, ...]:
-    """The links with unknown inertial parameters: by default those with a joint."""
+    """The links with unknown inertial parameters: by default all links with a joint."""
     if links is None:
         return tuple(link.name for link in robot.tree_links)
     names = (links,) if isinstance(links, str) else tuple(links)

@@ -191,7 +191,7 @@ def _columns_of_file(file: ColumnFile, where: str) -> dict[str, Array]:
 
 
 def _factors(units: Mapping[str, str], where: str) -> dict[str, float]:
-    """The factors to SI units of the columns of joints, by their units or those in their names."""
+    """The factors to SI units of the columns of joints, by their units or the units in their names."""
     factors: dict[str, float] = {}
     for name, unit in units.items():
         match = _COLUMN.fullmatch(name.strip())

@@ -96,7 +96,7 @@ def sensitivity(
 
     - an index that is out of range,
     - a table that is read by index,
-    - a parameter of which only the integer part has an effect,
+    - a parameter whose integer part alone has an effect,
     - a parameter that shifts an event at the start,
     - implicit equations together with delays, or with a parameter that determines a jump time.
     """

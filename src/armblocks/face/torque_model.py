@@ -25,12 +25,12 @@ FRICTION: dict[str, tuple[str, ...]] = {
     "viscous": ("B",),
     "none": (),
 }
-"""The estimated friction parameters of each joint; the others have the values of the description."""
+"""The estimated friction parameters of each joint; other parameters have the values of the description."""
 
 INERTIAL = ("m", "mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Iyz", "Ixz")
 _OF_MOTORS = ("Jm", "B", "Tc", "Tc+", "Tc-")
-# Where only a sum of parameters has an effect, the first one in this order remains and the others are added
-# to it.
+# Where only a sum of parameters has an effect, the first parameter in this order remains and the others are
+# added to it.
 _PREFERRED = ("B", "Tc", "Tc+", "Tc-", "Izz", "Ixx", "Ixy", "Iyz", "Ixz", "mx", "my", "Jm", "Iyy", "mz", "m")
 _SEED = 20261127
 _STATES = 60
@@ -41,7 +41,7 @@ _MOTOR_SHARE = 0.1
 class TorqueModel:
     """``tau = X theta + rest``: the estimated parameters of a robot, with names ``link.quantity``.
 
-    ``links``: those whose inertial parameters are estimated. Motor parameters are those at the motor's side.
+    ``links``: links whose inertial parameters are estimated. Motor parameters refer to the motor's side.
     ``prior`` (p,): the values of the description.
     """
 

@@ -42,8 +42,8 @@ def trim(
 ) -> TrimResult:
     """Find an equilibrium operating point of a diagram.
 
-    The unknowns are all states except those with given values in ``states``. The derivatives of all states
-    except the ``moving`` states must be zero. ``free``: tunable parameters that are also unknowns,
+    The unknowns are all states except the states with given values in ``states``. The derivatives of all
+    states except the ``moving`` states must be zero. ``free``: tunable parameters that are also unknowns,
     ``"torque.value"`` (or ``"torque"`` for a block with one tunable parameter), or an entry,
     ``"map.table[3]"``. ``outputs``: required values of signals; NaN leaves an entry free. ``bounds``:
     ``(lower, upper)`` of states and free parameters. The search starts at the state of the run at time ``at``

@@ -29,8 +29,9 @@ class RobotFormat:
     of a file's bytes and its name for messages, which returns the robots by their names in the file and
     raises ``FormatError``. A format whose files refer to other files, or that reports findings, has
     ``read_in_context`` instead, with a :class:`FileContext` as third argument. ``correct``: a function of a
-    file's bytes, its name and its findings, which corrects those whose remedy is unambiguous. ``recognises``:
-    for a format that shares its suffix with another one, whether a file's bytes are of this format.
+    file's bytes, its name and its findings, which corrects findings with an unambiguous remedy.
+    ``recognises``: for a format that shares its suffix with another one, whether a file's bytes are of this
+    format.
     """
 
     name: str

@@ -54,7 +54,7 @@ def read_mat(data: bytes) -> ColumnFile:
 
 
 def _members(contents: Mapping[str, Any]) -> dict[str, Any]:
-    """The variables, and those in structures of one element, as ``structure/member``."""
+    """The variables, and variables in structures of one element as ``structure/member``."""
     members: dict[str, Any] = {}
     for name, value in contents.items():
         array = np.asarray(value)

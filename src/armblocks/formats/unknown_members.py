@@ -1,4 +1,4 @@
-"""Members of a document that this version does not know: of another program, or of a newer armblocks.
+"""Members of a document that this version does not support, from another program or a newer armblocks.
 
 They are stored in ``Diagram.extras`` and written again.
 """
@@ -17,7 +17,8 @@ Extras = dict[str, dict[str, object]]
 def split_extras(
     node: Node, known: tuple[str, ...], extras: Extras, section: str, key: str = ""
 ) -> dict[str, Node]:
-    """The known members; the others are stored in ``extras[section]``, under ``key`` if it is not empty."""
+    """The known members; unknown members are stored in ``extras[section]``, under ``key`` if it is not
+    empty."""
     members, unknown = split_members(node, known)
     if unknown:
         extras.setdefault(section, {}).update({key: unknown} if key else unknown)

@@ -54,8 +54,8 @@ class Events:
         self.x, self.new_x = frame.vector(workspace.x), frame.vector(workspace.new_x)
 
     def mark_fired(self, time: Real, x: Reals) -> Integer:
-        """Evaluate all guards and mark those that fire; return the number of them and of inconsistent
-        modes."""
+        """Evaluate all guards and mark the guards that fire; return the number of these guards and of
+        inconsistent modes."""
         f = self.frame
         self.point.value = time
         t = self.point.memory
@@ -256,7 +256,7 @@ class Events:
     def _store_previous_modes(self, rank: Integer | None = None) -> None:
         """Store the present values of hysteresis modes as their previous values.
 
-        In a subsystem that is being enabled, the previous values are those from before the instant. With a
+        In a subsystem that is being enabled, the previous values are the values before the instant. With a
         ``rank``, only modes up to this rank are stored.
         """
         f, r = self.frame, self.frame.r

@@ -80,7 +80,7 @@ class GuardFunctions:
             r.call(system_functions.guards, t, x, z, unknowns, p, values)
 
     def _mark_fired(self, r: Routine, t: Reals, x: Reals, reals: Reals, p: Reals) -> Integer:
-        """Evaluate the guards with ``trial_w`` and mark in ``fired`` those that fire, with the direction.
+        """Evaluate the guards with ``trial_w`` and mark firing guards in ``fired``, with the direction.
         Returns the number of guards that fire plus the number of inconsistent modes."""
         workspace = self.workspace
         self.evaluate(r, t, x, reals, p)
@@ -107,7 +107,7 @@ class GuardFunctions:
 
     def _unreliable_location(self, r: Routine, reals: Reals) -> Integer:
         """The reason why the event location of a marked guard is unreliable, or 0: the guard had no sign at
-        the start of the step, or was near zero there. The values in ``guards`` are those at the end of the
+        the start of the step, or was near zero there. ``guards`` has the values at the end of the
         step."""
         workspace, worst_reason = self.workspace, r.integer(0)
         for i in r.each(self.count):

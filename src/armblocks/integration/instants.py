@@ -1,6 +1,6 @@
 """The schedule of a system with clocks, events, delays or implicit equations.
 
-The integration is divided into pieces, each of which ends at an instant.
+The integration is divided into pieces, which end at instants.
 
 At an instant (a tick, an event, a breakpoint, the start) the loop does the following, in native code:
 

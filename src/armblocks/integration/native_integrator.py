@@ -99,7 +99,7 @@ class NativeIntegrator:
         ends exactly at each breakpoint inside the run. Before a breakpoint, ``f`` is evaluated no later than
         the last double before it; after it, the integration restarts. ``step`` s: grid of a fixed-step
         method, whose times are ``k step``. ``rtol``, ``atol``, ``max_step`` s: for adaptive methods.
-        ``checkpoint``: the run continues from there, with the results of the run that wrote it.
+        ``checkpoint``: continue another run exactly from its checkpoint.
         ``detect_stiffness``: the run pauses where the other method, explicit or for stiff systems, is faster
         (:attr:`Integration.other_method_faster`). ``span`` s: approximate length of the run, for the
         resolution of events near time 0 (default: ``stop``). ``jumps``: maximum number of rows for both sides
@@ -364,7 +364,7 @@ class Integration:
         """Pause where another method is faster. ``changes``: 1 plus the number of changes so far, or 0 for
         never.
 
-        With each change, more checks are required before an explicit method takes over again.
+        With each change, more checks are required before the run returns to an explicit method.
         """
         self.counts[Count.STIFFNESS_DETECTION] = changes
         if not self._explicit:

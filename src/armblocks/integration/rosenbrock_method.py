@@ -23,8 +23,8 @@ from armblocks.routines.values import Real
 
 STABLE_BELOW, STABLE_CHECKS = 2.0, 16
 """An explicit method could take a step if its length times the fastest rate is below this bound. After this
-number of consecutive checks with this result, the explicit method takes over. The number is multiplied by
-four after each return to this method."""
+number of consecutive checks with this result, the run returns to the explicit method. The number is
+multiplied by four after each return to this method."""
 
 
 class RosenbrockMethod(Method):

@@ -19,7 +19,7 @@ def derivative(r: Routine, t: Reals, x: Reals, z: Reals, w: Reals, p: Reals, xd:
 
 @external
 def flow_jacobian(r: Routine, t: Reals, x: Reals, z: Reals, w: Reals, p: Reals, J: Reals, T: Reals) -> None:
-    """The entries of the derivatives of ``(f, g)`` with respect to ``(x, w)``, and those with respect to
+    """The entries of the derivatives of ``(f, g)`` with respect to ``(x, w)``, and with respect to
     time."""
 
 

@@ -427,7 +427,7 @@ def _is_matrix(left: SX, right: SX) -> bool:
 
 
 def _check_products(location: Location, operator: str, left: Symbol, right: Symbol) -> None:
-    """Raise an error for a product of two vectors, one of which is a row, a column or a transpose."""
+    """Raise an error for a product of two vectors if one of them is a row, a column or a transpose."""
     kinds = [value.kind for value in (left, right) if isinstance(value, OrientedVector)]
     if kinds:
         operand = {"transposed": "a transposed vector"}.get(kinds[0], f"a {kinds[0]} of a matrix or product")

@@ -4,9 +4,9 @@ Figures use tones (:class:`Tone`) instead of colours; each tone has a light and 
 a contrast of at least 4.5:1 on page and surface, trace tones of at least 3:1 (WCAG 2.2, 1.4.3 and 1.4.11).
 Trace colours are the set of Okabe and Ito (2008). As far as this contrast requires, light colours are darker
 on white and blue is lighter on black, with the same hue. Their sky blue would then be near the blue; violet
-replaces it, which differs from the others in lightness as well, also for colour-blind readers. The order
-keeps the colours of the first six channels, the joints of most arms, far apart. Every joint has the same
-colour in all views.
+replaces it, which differs from the other colours in lightness as well, also for colour-blind readers. The
+order keeps the colours of the first six channels, the joints of most arms, far apart. Every joint has the
+same colour in all views.
 """
 
 from __future__ import annotations

@@ -102,7 +102,7 @@ def _path(result: SimulationResult, block: str, port: str) -> str | None:
 
 
 def _sources_first(diagram: Diagram, names: list[str]) -> list[str]:
-    """The blocks, beginning with those that output q (forward dynamics).
+    """The blocks; blocks that output q (forward dynamics) come first.
 
     Their speeds are simulated; the inputs of other blocks may be planned values.
     """

@@ -104,7 +104,8 @@ class MotionSummary:
 def summarise(
     robot: Robot, time: _Array, q: _Array, qd: _Array, qdd: _Array, tau: _Array | None, tool: _Array
 ) -> MotionSummary:
-    """The summary of a motion: ``time`` (N,) s, ``q`` (N, nq), the others (N, n), ``tool`` (N, 3) m."""
+    """The summary of a motion: ``time`` (N,) s, ``q`` (N, nq), ``qd``, ``qdd`` and ``tau`` (N, n), ``tool``
+    (N, 3) m."""
     power = None if tau is None else tau * qd
     joints: list[JointSummary] = []
     for j, (entry, limits, motor) in enumerate(zip(robot.speeds, robot.limits, robot.motors)):

@@ -21,7 +21,7 @@ from armblocks.robot.link import Link
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-9
-"""Coefficients and constants below this fraction of the others count as rounding errors."""
+"""Coefficients and constants below this fraction of the largest count as rounding errors."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -56,7 +56,7 @@ class Spring(ABC, metaclass=ArgumentErrors, methods=False):
         """The spring with the new name of a link; the joint of the link has the same name."""
 
     def with_offsets(self, offsets: Mapping[str, float]) -> Self:
-        """The spring after ``offsets`` of the coordinates of joints, by name, have moved into the joints."""
+        """The spring for joints whose offsets have increased by ``offsets``, by name of the joint."""
         return self
 
 

@@ -1,6 +1,6 @@
 """The robot in a form for algorithms: bodies with one degree of freedom each, every joint axis is z.
 
-A joint with several degrees of freedom becomes a series of bodies, of which only the last one has mass.
+A joint with several degrees of freedom becomes a series of bodies; only the last body has mass.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Frame:
 class KinematicTree:
     """The bodies of a robot and its frames.
 
-    ``robot``: without couplings, so that every joint has coordinates of its own.
+    ``robot``: without couplings, so that every joint has coordinates.
     ``bodies``: parents before children. ``links``: the frame of each link, in the robot's order. ``tip``: the
     frame of the last link. ``tool``: the tool frame, or the frame ``end`` if given. ``base``: pose of
     the base in the world. ``gravity``: m/s2, in *base* axes. ``grounded``: the inertia of the links fixed to

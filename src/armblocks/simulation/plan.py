@@ -293,7 +293,7 @@ def _sample_time(
 
 
 def parameter_vector(system: CompiledSystem, values: Mapping[str, ArrayLike] | ArrayLike | None) -> Array:
-    """The flat parameters ``(np,)``: the system's values, replaced by those in ``values``.
+    """The flat parameters ``(np,)``: the system's values, replaced by given ``values``.
 
     ``values`` is a mapping from ``block.parameter`` to a value of its shape (a scalar sets all entries), or
     the whole flat vector. Raises ``UnknownNameError`` and ``InputError``.

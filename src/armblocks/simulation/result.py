@@ -64,7 +64,7 @@ class SimulationResult(RunData):
         write a ``.svg``, ``.png`` or ``.pdf`` file. Angles are in degrees. Raises UnknownNameError for a
         signal or a suffix that does not exist.
         """
-        # The figures belong to a layer above this one.
+        # The figures belong to a higher layer.
         figures: Any = importlib.import_module("armblocks.report.signal_figure")
         figure: SignalFigure = figures.signal_figure(self, names, theme)
         if save is not None:

@@ -107,7 +107,7 @@ class RunLog:
         self._writing: Future[None] | None = None
 
     def append(self, time: Array, states: Array, signals: Array, *, samples: int) -> None:
-        """Add rows: ``time (N,)``, ``states (N, nx)``, ``signals (ny, N)``, of which ``samples`` are samples
+        """Add rows: ``time (N,)``, ``states (N, nx)``, ``signals (ny, N)``; ``samples`` of them are samples
         and all others are sides of jumps. The caller must not change them later.
 
         Raises ``FormatError`` if earlier samples could not be written.

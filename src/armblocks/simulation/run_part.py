@@ -174,8 +174,8 @@ class RunPart:
         return float(self._sample_times.part(number - 1, number)[0]) if number else -np.inf
 
     def instants(self, begin: int, end: int) -> InstantRows:
-        """Both sides of the instants of samples ``begin`` to ``end - 1``, without those that a consumer has
-        received. An instant belongs to the sample at its time, else to the next sample."""
+        """Both sides of the instants of samples ``begin`` to ``end - 1``, without instants that a consumer
+        has received. An instant belongs to the sample at its time, else to the next sample."""
         rows, sample = self._sides
         new = bisect_right(rows, self._delivered, key=_time)
         numbers = sample[new:, 0]
@@ -196,7 +196,7 @@ class RunPart:
 
     @property
     def _offset(self) -> int:
-        """Difference between the sample numbers of the run and those that the native loop records."""
+        """Difference between the sample numbers of the run and of the native loop."""
         return 0 if self.integration is None else self.begin
 
     @property

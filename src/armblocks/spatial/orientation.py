@@ -3,7 +3,7 @@
 A rotation R = R_ab (3, 3) transforms coordinates in frame b to coordinates in frame a. Quaternions are (s, x,
 y, z), the scalar first, as in the toolbox. Singular cases are described below. Otherwise the inverse
 conversions are exact to rounding, also close to singular orientations, because the last angle is computed
-after removing the others.
+after removing the other rotations.
 
 Sources: Siciliano et al., Robotics, 2009, 2.4 to 2.6; Shepperd, Quaternion from rotation matrix, J. Guidance
 and Control 1(3), 1978; Corke, Robotics Toolbox, releases 7 to 10 (rpy2tr, eul2tr, Quaternion).

@@ -88,7 +88,7 @@ def motion_content(robot: Robot, q: Array, time: Array, poses: Array) -> ViewCon
 def moved(robot: Robot, before: Array, q: Array) -> tuple[Array, list[list[list[float]]]]:
     """Coordinates and poses after the sliders were moved from ``before`` to ``q``, both (nq,).
 
-    Closed loops stay closed: the moved joints keep their coordinates, the others follow. Where this is
+    Closed loops stay closed: the moved joints keep their coordinates, all other joints follow. Where this is
     impossible, the arm stays at ``before``. Quaternions get the length 1.
     """
     q = _normalised(robot, before, q)

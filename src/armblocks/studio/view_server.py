@@ -3,8 +3,8 @@
 There is one server for a process, in threads that end with it. A loaded page has all its data, so that it can
 be used after the program has ended. It keeps one event stream open, by which the server detects open pages.
 
-Only this machine can connect. All paths begin with a secret of the server, which other programs and web
-sites do not know; requests with another ``Host`` (DNS rebinding) or ``Origin`` are rejected.
+Only this machine can connect. All paths begin with a secret of the server, so that other programs and web
+sites have no access; requests with another ``Host`` (DNS rebinding) or ``Origin`` are rejected.
 """
 
 from __future__ import annotations
@@ -87,7 +87,8 @@ class ArmPage:
 
     @property
     def q(self) -> Array:
-        """The coordinates (nq,) at the sliders, rad or m; of a motion, those at its end. Can be set."""
+        """The coordinates (nq,) at the sliders, rad or m; of a motion, the coordinates at its end. Can be
+        set."""
         with self._changed:
             return self._q.copy()
 

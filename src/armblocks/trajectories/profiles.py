@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 def from_derivatives(durations: Sequence[float], highest: Sequence[float], order: int) -> PiecewisePolynomial:
-    """A motion of one joint from rest at 0, of which the derivative of ``order`` is constant in each piece.
+    """A motion of one joint from rest at 0; its derivative of ``order`` is constant in each piece.
 
     ``durations`` (s) and the values ``highest`` of the derivative, piece after piece; pieces of length 0 are
     omitted. The end is exactly at rest.

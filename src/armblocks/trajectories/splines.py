@@ -70,8 +70,8 @@ def _inner_states(h: Array, change: Array, first: Array, last: Array) -> Array:
     lower, upper = np.zeros((count, 2, 2)), np.zeros((count, 2, 2))
     for k in range(count):
         a, b = h[k], h[k + 1]
-        # Rows: third and fourth derivative at the end of the piece before, less those at the start of the
-        # piece after. Columns: speed and acceleration at one point.
+        # Rows: third and fourth derivative at the end of the piece before, minus the derivatives at the start
+        # of the piece after. Columns: speed and acceleration at one point.
         lower[k] = [[-24 / a**2, -3 / a], [-168 / a**3, -24 / a**2]]
         upper[k] = [[24 / b**2, -3 / b], [-168 / b**3, 24 / b**2]]
         diagonal[k] = [

@@ -101,7 +101,7 @@ function arrange({ api }: DockviewReadyEvent): void {
     inactive: true,
     position: { referencePanel: isTall ? 'dynamics' : 'kinematics' },
   })
-  // Sizes are set last, from left and top: a resized group takes space from those after it.
+  // Sizes are set last, from left and top: a resized group takes space from the groups after it.
   const width = (minimum: number, share: number) =>
     Math.min(Math.max(minimum, share * innerWidth), 1.5 * minimum)
   const [joints, readings] = [width(300, 0.2), width(376, 0.26)]

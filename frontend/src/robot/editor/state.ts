@@ -33,7 +33,7 @@ interface RobotEditorState {
   notes: string[]
 }
 
-/** The open robots, and the one in the editor. */
+/** The open robots, and the robot in the editor. */
 export const useRobotEditor = create<RobotEditorState>(() => ({
   robots: {},
   current: null,

@@ -176,7 +176,7 @@ function Peaks({ motion }: { motion: ShownMotion }) {
   )
 }
 
-/** Excess over a limit by rounding and by interpolation, which is no warning, in percent. */
+/** Excess over a limit, in percent, up to which it is attributed to rounding and interpolation. */
 const TOLERANCE = 0.1
 
 /** A share of a limit in percent, with a bar; empty without a limit. */

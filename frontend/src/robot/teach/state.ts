@@ -30,7 +30,7 @@ interface Teaching {
   /** The directions that the joints cannot follow. */
   missing: string[]
   course: Course
-  /** The typed duration, s; empty for the least one. */
+  /** The typed duration, s; empty for the least duration. */
   duration: string
   motion: ShownMotion | null
   fault: string

@@ -239,7 +239,7 @@ class IntervalTestDynamic(Block):
     title: ClassVar[str] = "Interval Test Dynamic"
     sign: ClassVar[FaceSign] = graph((0, 0), (0.3, 0), (0.3, 1), (0.7, 1), (0.7, 0), (1, 0))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The output is 1 while the sine is between two limits, of which the upper one rises.",
+        shows="The output is 1 while the sine is between a constant lower and a rising upper limit.",
         inputs={
             "upper": driver("Ramp", slope=0.1),
             "u": driver("SineWave"),

@@ -172,7 +172,8 @@ class RepeatingSequence(Block):
         return {"pieces": x["pieces"] + (e["corner"] > 0.0)}
 
     def _segment(self, pieces: SX) -> tuple[SX, SX]:
-        """The number of past periods, and a vector that is 1 for the present segment and 0 for the others."""
+        """The number of past periods, and a vector that is 1 for the present segment and 0 for all other
+        segments."""
         count = shape_of(self.times)[0] - 1
         periods = floor(pieces / count)
         return periods, vertcat(*cells(pieces - count * periods, [k - 0.5 for k in range(1, count)]))

@@ -330,7 +330,7 @@ def _with_side(end: End, *, right: bool) -> End:
 def _sum_ports(
     network: Network, flow: Flow, paths: Sequence[Sequence[int]], column: Sequence[int]
 ) -> dict[int, dict[int, float]]:
-    """Heights of the inputs of round sums: one at the rear side, feedback below, the others above.
+    """Heights of the inputs of round sums: one at the rear side, feedback below, all other inputs above.
 
     Of two feedback lines to one sum, the line over more columns comes from above.
     """

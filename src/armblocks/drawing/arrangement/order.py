@@ -2,7 +2,7 @@
 
 Barycentre sweeps give a first order (Sugiyama, Tagawa, Toda 1981). Then every node is moved through its
 column to the position of least cost (sifting, Matuszewski, Schönfeld, Molitor 1999). The cost counts the
-crossings of all lines, including those that reverse their direction.
+crossings of all lines, including lines that reverse their direction.
 """
 
 from __future__ import annotations

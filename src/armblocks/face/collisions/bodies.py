@@ -116,7 +116,7 @@ def _prism(radius: float, length: float) -> Array:
 
 
 def _extreme(points: Array) -> Array:
-    """The different points, or those that are extreme in one of ``MAX_POINTS`` directions."""
+    """The different points, or only the points that are extreme in one of ``MAX_POINTS`` directions."""
     points = np.unique(np.round(points, 12), axis=0)
     if len(points) <= MAX_POINTS:
         return points

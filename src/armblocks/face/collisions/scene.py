@@ -20,7 +20,7 @@ from armblocks.spatial.convex_distance import hull_distances
 Array = NDArray[np.float64]
 
 CHUNK = 20_000
-"""Pairs of hulls of which the distances are computed at once."""
+"""Number of pairs of hulls whose distances are computed at once."""
 TESTED, ALWAYS = 60, 0.95
 """Configurations within the joint limits, and the share of them in which a pair must touch to be excluded."""
 

@@ -69,7 +69,7 @@ def workspace(
     couplings determine do not count. Positions of the tool, or of ``frame``, are counted in cubic cells of
     the side ``cell`` (m). Only the first ``points`` samples are stored, for point clouds.
 
-    Measures, of which each cell has the largest, the smallest and the mean value:
+    Measures; each cell has their largest, smallest and mean values:
 
     - ``"manipulability"``: Yoshikawa's product of the singular values of the Jacobian;
     - ``"singularity"``: the smallest singular value, which is the distance to the nearest singular Jacobian;

@@ -121,7 +121,8 @@ class _Place:
 
 @dataclass(kw_only=True)
 class _Contents:
-    """The elements of one body, including those in its frames, with the pose of their frame in the body."""
+    """The elements of one body, including elements in its frames, with the pose of their frame in the
+    body."""
 
     joints: list[tuple[Element, Transform]] = field(default_factory=list[tuple[Element, Transform]])
     geoms: list[Geom] = field(default_factory=list[Geom])
@@ -275,7 +276,7 @@ class _Model:
     def with_motors(self, links: list[Link]) -> list[Link]:
         """The links of a model with closed loops: the joints of actuators have motors.
 
-        The torques of these joints are those that inverse dynamics computes.
+        Inverse dynamics computes the torques of these joints.
         """
         driven = {self.joints.get(name) for name in actuated_joints(self.root, self.defaults)}
         return [

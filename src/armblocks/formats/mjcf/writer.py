@@ -155,7 +155,7 @@ def _sites(robot: Robot) -> dict[str | None, list[str]]:
 
 
 def _bodies(robot: Robot) -> tuple[dict[str, _Body], list[str]]:
-    """The bodies by the name of the link, and those at the base."""
+    """The bodies by the name of the link, and the bodies at the base."""
     children: dict[str | None, list[Link]] = {}
     for link in robot.links:
         children.setdefault(link.parent, []).append(link)

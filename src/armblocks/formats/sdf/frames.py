@@ -198,7 +198,7 @@ class Frames:
         return frame.model_frame or _world(frame.scope)
 
     def _chains(self, a: Frame, b: Frame) -> tuple[list[Frame], list[Frame]]:
-        """The frames from a and from b to the first frame that both are relative to, without that one.
+        """The frames from a and from b to the first frame that both are relative to, without this frame.
 
         Both chains are extended alternately, so that the effort depends only on the distance of the frames.
         """

@@ -116,7 +116,7 @@ class _Tables:
         return assembly
 
     def _entries(self, table: str) -> list[_Entry]:
-        """The entries in use: those with a name."""
+        """The entries in use: entries with a name."""
         entries = [entry for _, entry in sorted(self._tables.get(table, {}).items())]
         return [entry for entry in entries if self._identifier(entry)[0]]
 

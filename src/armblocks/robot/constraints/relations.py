@@ -1,4 +1,4 @@
-"""The elementary relations of which the closures of loops are composed.
+"""The elementary relations of closures of loops.
 
 A closure is a sequence of relations of three types. The algorithms of :mod:`armblocks.dynamics` use only
 these types, so the sequence describes a type of closure completely. ``a`` is the first frame of a closure and

@@ -1,4 +1,4 @@
-"""The elementary motions of which the motions of all joints are composed.
+"""The elementary motions; the motion of a joint is a sequence of them.
 
 A joint is a sequence of elementary motions, from its parent to its link. There are two types, and the
 algorithms of :mod:`armblocks.dynamics` use only these, so the sequence describes a joint type completely.

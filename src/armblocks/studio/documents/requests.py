@@ -134,7 +134,8 @@ class DocumentRequests:
         return await self._show_all(client, presenter.dropped(data, request.name))
 
     async def _show_all(self, client: StudioClient, opening: Opening[Any]) -> list[str]:
-        """Show the first document of a file in the client; its list of documents has the others."""
+        """Show the first document of a file in the client; its list of documents contains the other
+        documents."""
         await self.show(client, opening.opened[0], notes=opening.notes)
         return [open_file.key for open_file in opening.opened]
 

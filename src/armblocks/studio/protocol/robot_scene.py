@@ -62,7 +62,7 @@ class RobotScene:
     """Bodies, joints and size of a robot.
 
     ``reach`` (m) of the arm; ``foot`` (m): distance by which the bodies of the base extend below its frame.
-    ``rows`` is the number of poses: base, links and tool. ``joints`` are those with one axis. ``rest``: the
+    ``rows`` is the number of poses: base, links and tool. ``joints``: joints with one axis. ``rest``: the
     coordinates q of the pose that is shown without motion.
     """
 

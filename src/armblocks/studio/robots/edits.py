@@ -160,7 +160,7 @@ def _add_joint(edit: AddJoint, robot: Robot) -> Robot:
     convention = neighbour.convention if neighbour is not None else DhConvention.STANDARD
     name = _free_name(links)
     new_link = link_from_dh(name, DhRow(a=0.2, convention=convention), parent=after or None)
-    # In a tree, a link inserted at the base is a second root, not the parent of the others.
+    # In a tree, a link inserted at the base is a second root, not the parent of the other roots.
     is_inserted = bool(after) or _is_chain(robot)
     reparented = [
         replace(link, parent=name) if is_inserted and link.parent == new_link.parent else link

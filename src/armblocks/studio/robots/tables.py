@@ -109,7 +109,7 @@ def _inertia_findings(robot: Robot) -> list[robot_messages.RobotFinding]:
             columns=[*INERTIA_INDICES, *(["mass"] if "no mass" in finding.reason else [])],
             what=f"No rigid body has this inertia: {finding.reason} "
             f"(principal moments {', '.join(f'{moment:.4g}' for moment in finding.moments)} kg m²).",
-            fix="It is used as given. Give moments of which none exceeds the sum of the other two.",
+            fix="It is used as given. Give moments so that none exceeds the sum of the other two.",
         )
         for finding in inertia_findings(robot)
     ]

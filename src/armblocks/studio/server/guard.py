@@ -9,7 +9,7 @@ A request must pass all of these checks; only the routes in ``Guard.OPEN`` need 
 4. the session: the cookie from the one-time login link, or ``Authorization: Bearer TOKEN``;
 5. a request that changes something has the header ``X-Armblocks``, which a plain HTML form cannot send.
 
-The guard is an ASGI wrapper because the middleware of web frameworks does not see websockets
+The guard is an ASGI wrapper because the middleware of web frameworks does not process websockets
 (CVE-2026-39987, CVE-2024-28179).
 """
 

@@ -150,7 +150,7 @@ def with_consistent_sets(before: Diagram, after: Diagram, edit: object, path: Se
 def _adapted(
     entries: Mapping[str, Value], old: Diagram, new: Diagram, path_map: _PathMap
 ) -> dict[str, Value]:
-    """The entries of a set at their new paths, without those whose parameters the edit has removed."""
+    """The entries of a set at their new paths, without entries of removed parameters."""
     adapted: dict[str, Value] = {}
     for path, value in entries.items():
         moved = path_map(path)

@@ -67,12 +67,12 @@ def path_after(path: str, renamed: Mapping[str, str]) -> str:
 
 
 class PathNames:
-    """The paths that the blocks of a diagram had at the start of a run, and those that they have now."""
+    """The paths of the blocks of a diagram at the start of a run, and their present paths."""
 
     def __init__(self) -> None:
         self.renames: list[dict[str, str]] = []
         self.started = False
-        """Whether clients know the paths at the start of the run."""
+        """Whether the paths at the start of the run have been sent to clients."""
 
     def rename(self, renamed: Mapping[str, str]) -> None:
         """Add the next renames: old path to new path."""
