@@ -59,9 +59,10 @@ def build() -> None:
     if not installed.is_file() or installed.read_text(encoding="utf-8") != lock_digest:
         _call("download the libraries of the front end", [*npm, "ci", "--no-audit", "--no-fund"])
         installed.write_text(lock_digest, encoding="utf-8")
+    sources_digest = digest()  # sources that are changed during the build are built next time
     _call("build the front end", [*npm, "run", "build"])
     write_notices(PAGE_FOLDER)
-    SOURCES_HASH_FILE.write_text(digest(), encoding="utf-8")
+    SOURCES_HASH_FILE.write_text(sources_digest, encoding="utf-8")
 
 
 def _call(title: str, command: list[str]) -> None:

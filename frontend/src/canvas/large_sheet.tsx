@@ -5,6 +5,8 @@ import { useContext, useEffect, useLayoutEffect, useMemo, useRef, useState } fro
 import type { Rectangle } from '../model/free_place'
 import type { SheetBlock } from '../protocol'
 import { useStudio } from '../store'
+import { contains, visiblePart } from '../model/picture_region'
+import { MotionPicture } from './motion_picture'
 import { MotionContext, type SheetMotion } from './sheet_motion'
 
 /** Distance of the dots of the grid, px. */
@@ -38,6 +40,7 @@ export function LargeSheet() {
     <>
       <MovingGrid bounds={bounds} />
       <NoMultisampling />
+      <MotionPicture {...{ motion, bounds }} />
       <Overview {...{ blocks, bounds, motion }} />
     </>
   )
@@ -86,25 +89,12 @@ function Overview({ blocks, bounds, motion }: OverviewProps) {
   const [width, height] = [useStore((s) => s.width), useStore((s) => s.height)]
   const [shown, setShown] = useState(false)
   useLayoutEffect(() => {
-    const update = () => setShown(!contains(visiblePart(motion, width, height), bounds))
+    const update = () => setShown(!contains(visiblePart(motion.view, [width, height]), bounds))
     update()
     return motion.onView(update)
   }, [motion, bounds, width, height])
   return shown && <SheetMap {...{ blocks, bounds, motion }} panel={[width, height]} />
 }
-
-const visiblePart = ({ view: { x, y, zoom } }: SheetMotion, width: number, height: number): Rectangle => ({
-  x: -x / zoom,
-  y: -y / zoom,
-  width: width / zoom,
-  height: height / zoom,
-})
-
-const contains = (outer: Rectangle, inner: Rectangle): boolean =>
-  outer.x <= inner.x &&
-  outer.y <= inner.y &&
-  outer.x + outer.width >= inner.x + inner.width &&
-  outer.y + outer.height >= inner.y + inner.height
 
 function SheetMap({
   blocks,
@@ -134,7 +124,7 @@ function SheetMap({
   }, [blocks, left, top, scale, scheme])
   useLayoutEffect(() => {
     const update = () => {
-      const part = visiblePart(motion, width, height)
+      const part = visiblePart(motion.view, [width, height])
       const { style } = frame.current!
       style.transform = `translate(${left + scale * part.x}px, ${top + scale * part.y}px)`
       style.width = `${scale * part.width}px`

@@ -5,8 +5,10 @@ import { createContext, useEffect, useState, type RefObject } from 'react'
 const REST_MS = 150
 /** Number of blocks above which a sheet is moved as one layer and has a map. */
 const MANY_BLOCKS = 40
+/** Distance by which the pointer may be moved during a motion, px. */
+const POINTER_REST_PX = 4
 /** Events that end a motion, because their handlers use the present view. */
-const ENDING_EVENTS = ['pointerdown', 'keydown', 'dragenter', 'pagehide'] as const
+const ENDING_EVENTS = ['keydown', 'dragenter', 'pagehide'] as const
 
 /** The motion of the sheet that contains a component. */
 export const MotionContext = createContext<SheetMotion | null>(null)
@@ -25,14 +27,26 @@ export function useSheetMotion(
     motion.sheet = element
     const begin = (event: WheelEvent) => !event.buttons && motion.begin()
     element.addEventListener('wheel', begin, { capture: true, passive: true })
+    addEventListener('pointermove', motion.onPointer, true)
+    addEventListener('pointerdown', motion.onPress, true)
     for (const kind of ENDING_EVENTS) addEventListener(kind, motion.end, true)
     return () => {
       motion.end()
       element.removeEventListener('wheel', begin, true)
+      removeEventListener('pointermove', motion.onPointer, true)
+      removeEventListener('pointerdown', motion.onPress, true)
       for (const kind of ENDING_EVENTS) removeEventListener(kind, motion.end, true)
     }
   }, [sheet, motion])
   return motion
+}
+
+/** Dispatch an event of the pointer at the element that is now at its position, if this is another one. */
+function redirect(event: MouseEvent): void {
+  const target = document.elementFromPoint(event.clientX, event.clientY)
+  if (!event.isTrusted || !target || target === event.target) return
+  event.stopImmediatePropagation()
+  target.dispatchEvent(new (event.constructor as typeof MouseEvent)(event.type, event))
 }
 
 /**
@@ -48,6 +62,11 @@ export class SheetMotion {
   private layer: HTMLElement | null = null
   /** The timer of the end of the motion; 0: there is no motion. */
   private timer = 0
+  /** The position of the pointer, and that at the start of the motion, px. */
+  private pointer: readonly [number, number] = [0, 0]
+  private pointerAtStart: readonly [number, number] = [0, 0]
+  /** The number of motions until now. */
+  count = 0
   private readonly store
   private readonly listeners = new Set<() => void>()
 
@@ -62,12 +81,34 @@ export class SheetMotion {
     return () => this.listeners.delete(listener)
   }
 
+  /** Whether the sheet is being panned or zoomed. */
+  get isMoving(): boolean {
+    return this.timer !== 0
+  }
+
+  /** End the motion when the pointer is moved without a pressed button: it has to find what is below it. */
+  readonly onPointer = ({ clientX, clientY, buttons }: PointerEvent): void => {
+    this.pointer = [clientX, clientY]
+    const [x, y] = this.pointerAtStart
+    if (this.timer && !buttons && Math.hypot(clientX - x, clientY - y) > POINTER_REST_PX) this.end()
+  }
+
+  /** End the motion at a press, which belongs to the element that the picture of the sheet has covered. */
+  readonly onPress = (event: PointerEvent): void => {
+    if (!this.timer) return
+    this.end()
+    redirect(event)
+    addEventListener('mousedown', redirect, { capture: true, once: true })
+  }
+
   /** Start or continue a motion. */
   begin(): void {
     if (!this.isLarge || !this.sheet) return
     if (!this.timer) {
       this.layer = this.sheet.querySelector<HTMLElement>('.react-flow__viewport')
       this.sheet.classList.add('moving')
+      this.pointerAtStart = this.pointer
+      this.count++
     }
     clearTimeout(this.timer)
     this.timer = window.setTimeout(this.endAfterFrames, REST_MS)

@@ -41,7 +41,7 @@ export function SignalNames({ lines }: { lines: Lines }) {
 }
 
 /** The text at the line of a signal: its name, or `<name>` with its name on another sheet or at a Goto. */
-const shownName = ({ name, propagated_name }: WireLines): string =>
+export const shownName = ({ name, propagated_name }: WireLines): string =>
   name || (propagated_name ? `<${propagated_name}>` : '')
 
 /** The position of a name: on its line, or at the output of a signal without a line. */

@@ -14,7 +14,7 @@ import armblocks as ab
 from armblocks import blocks
 from conftest import Studio
 
-CHAINS, PER_CHAIN = 8, 10
+CHAINS, PER_CHAIN = 16, 10
 WHEEL = """(pane, [deltaX, deltaY, ctrlKey]) => {
     // A wheel event at the middle of the sheet.
     const { x, y, width, height } = pane.getBoundingClientRect()
@@ -29,6 +29,34 @@ LAYERS = """(pane) => {
     const during = layer()
     pane.dispatchEvent(new PointerEvent('pointerdown', { button: 2, buttons: 2, bubbles: true }))
     return [before, during, layer()]
+}"""
+PICTURED = """() => new Promise((done) => {
+    // The blocks whose middle the picture does not show, and the number of all blocks in view, in one task
+    // with a change of the view.
+    const pane = document.querySelector('.react-flow__pane')
+    pane.dispatchEvent(new WheelEvent('wheel', { deltaX: 8, bubbles: true, cancelable: true }))
+    const canvas = document.querySelector('.motion-picture canvas')
+    const [box, panel] = [canvas, pane].map((element) => element.getBoundingClientRect())
+    const numbers = (text) => text.match(/-?[\\d.]+(e-?\\d+)?/g).map(Number)
+    const view = numbers(document.querySelector('.react-flow__viewport').style.transform)
+    const scale = canvas.width / box.width
+    const missing = []
+    let count = 0
+    for (const node of document.querySelectorAll('.react-flow__node')) {
+        const [x, y] = numbers(node.style.transform)
+        const [width, height] = [parseFloat(node.style.width), parseFloat(node.style.height)]
+        const at = [x + width / 2, y + height / 2].map((value, k) => view[2] * value + view[k])
+        if (at[0] < 0 || at[1] < 0 || at[0] > panel.width || at[1] > panel.height) continue
+        count++
+        const spot = [at[0] + panel.x - box.x, at[1] + panel.y - box.y].map((value) => scale * value)
+        const pixel = canvas.getContext('2d').getImageData(spot[0], spot[1], 1, 1)
+        if (pixel.data[3] < 250) missing.push(node.dataset.id)
+    }
+    done([missing, count])
+})"""
+ZOOM_AT = """(pane, [clientX, clientY]) => {
+    const values = { clientX, clientY, deltaY: -4, ctrlKey: true, bubbles: true, cancelable: true }
+    pane.dispatchEvent(new WheelEvent('wheel', values))
 }"""
 TWO_FRAMES = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
@@ -121,6 +149,31 @@ def test_a_moved_view_is_the_same_picture_as_the_view_drawn_afresh(large: Page, 
 
 def test_the_sheet_moves_as_one_layer_until_it_is_pressed(large: Page) -> None:
     assert large.locator(".react-flow__pane").evaluate(LAYERS) == ["auto", "transform", "auto"]
+
+
+def test_a_picture_shows_all_blocks_at_their_places_during_a_motion(large: Page) -> None:
+    for down in (-6, 5):
+        wheel(large, 25, down)
+    missing, count = large.evaluate(PICTURED)
+    assert missing == []
+    assert count == CHAINS * PER_CHAIN
+    rest(large)
+
+
+def test_a_press_during_a_motion_finds_the_block_below_the_picture(large: Page) -> None:
+    name = block(large, "b 3 4")
+    x, y = middle(name)
+    large.mouse.move(x, y)
+    rest(large)
+    before = name.evaluate("(element) => element.style.transform")
+    large.locator(".react-flow__pane").evaluate(ZOOM_AT, [x, y])
+    large.mouse.down()
+    large.mouse.move(x + 30, y + 10, steps=3)
+    large.mouse.move(x + 60, y + 30, steps=3)
+    large.mouse.up()
+    assert name.evaluate("(element) => element.style.transform") != before
+    large.keyboard.press("Control+z")
+    wait_until(large, lambda: name.evaluate("(element) => element.style.transform") == before)
 
 
 def test_a_drag_immediately_after_a_motion_follows_the_pointer(large: Page) -> None:
