@@ -163,6 +163,25 @@ def test_lanes_compute_independently_and_share_control_flow(lanes: int) -> None:
     assert out[2] == tuple(b - 1.0 for b in second)
 
 
+@pytest.mark.parametrize("lanes", [1, 2, 8])
+def test_integers_in_lanes(lanes: int) -> None:
+    def run(r: Routine, rows: LaneArray, out: LaneArray) -> Integer:
+        counts = rows[0].bits()
+        more = select((counts & 3) == 0, 100 - counts, counts + 5)
+        out[0] = more.from_bits()
+        out[1] = inverse_root(rows[1], 5)
+        out[2] = select(rows[1] > 1.0, (rows[1].bits() - 1).from_bits(), 0.0)
+        out[3] = select(counts >= 7, counts & 0, counts.unsigned_quotient(3)).from_bits()
+        return (counts < 6).bits() + 1000 * (rows[1] > 1.0).bits()
+
+    numbers = tuple(np.arange(4, 4 + lanes).view(np.float64).tolist())
+    roots = (2.5, 1e-30, 3.0, 1.0, 1e30, 0.7, 32.0, 5.0)[:lanes]
+    expected = sum(1 << k for k in range(min(2, lanes)))
+    expected += 1000 * sum((root > 1.0) << k for k, root in enumerate(roots))
+    out = [(0.0,) * lanes] * 4
+    assert both(run, [numbers, roots], out, result=int, lanes=lanes) == expected
+
+
 @pytest.mark.parametrize("n", [0, 1, UNROLL, UNROLL + 1, 30])
 def test_unrolled_and_looped_iterations_are_equal(n: int) -> None:
     def run(r: Routine, x: Reals, y: Reals) -> Real:

@@ -18,7 +18,7 @@ from armblocks.routines.routine import Program
 from armblocks.routines.tree import Kind, Operation
 
 Address = tuple[list[Any], int]
-LANES = (Kind.LANES, Kind.MASK)
+LANES = (Kind.LANES, Kind.MASK, Kind.INTEGER_LANES)
 
 
 @dataclass
@@ -68,6 +68,7 @@ OPERATIONS: dict[Operation, Callable[..., Any]] = {
     Operation.OR: lambda a, b: a | b,
     Operation.NOT: lambda a: not a,
     Operation.ANY: any,
+    Operation.LANE_BITS: lambda mask: sum(bool(condition) << lane for lane, condition in enumerate(mask)),
     Operation.SELECT: lambda condition, a, b: a if condition else b,
     Operation.TO_REAL: float,
     Operation.TO_INTEGER: int,
@@ -146,6 +147,8 @@ class _Call:
                     outcome = (values[0],) * self.interpreter.program.lanes
                 elif result.kind in LANES:
                     outcome = tuple(OPERATIONS[operation](*lane) for lane in zip(*values, strict=True))
+                    if result.kind is Kind.INTEGER_LANES:
+                        outcome = tuple(map(_wrap_int64, outcome))
                 else:
                     outcome = OPERATIONS[operation](*values)
                 self.values[result] = _wrap_int64(outcome) if result.kind is Kind.INTEGER else outcome

@@ -9,13 +9,16 @@ from armblocks.compiler.tape_operations import Inputs, Registers, emit_operation
 from armblocks.compiler.tape_parts import emit_parts, is_long
 
 
-def emit_lane_function(module: Module, tape: Tape, name: str, lanes: int) -> None:
+def emit_lane_function(
+    module: Module, tape: Tape, name: str, lanes: int, *, reports_undecided: bool = False
+) -> None:
     """Add ``void @name(ptr in0, …, ptr out0, …)``: the tape in each lane.
 
     Each pointer points to rows of one double for each lane, aligned to the size of a row, with one row for
     each number of the slot. Outputs must not overlap inputs or each other. Unlike the functions of a batch,
     lanes with arguments that vector functions do not support, such as the sine of 1e300, are not evaluated
-    again. Their results are invalid; the caller must avoid such arguments.
+    again. Their results are invalid; the caller must avoid such arguments. With ``reports_undecided`` the
+    function returns these lanes: an integer (i64) with a bit for each lane.
     """
     pointers = [("ptr noalias readonly", f"%i{k}") for k in range(len(tape.input_sizes))]
     pointers += [("ptr noalias", f"%o{k}") for k in range(len(tape.outputs))]
@@ -52,14 +55,22 @@ def emit_lane_function(module: Module, tape: Tape, name: str, lanes: int) -> Non
         body = Body(module, lanes)
         if is_long(tape):
             groups = {place: (tape.outputs[slot][index],) for place, (slot, index) in places.items()}
-            emit_parts(body, tape, name, pointers, groups, inputs_of, store)
+            undecided = emit_parts(body, tape, name, pointers, groups, inputs_of, store)
         else:
             registers = emit_operations(body, tape, inputs_of(body))
             for place in places:
                 store(body, registers, place)
-        body.do("ret void")
+            undecided = None
+            if reports_undecided and body.undecided is not None:
+                undecided = body.let(f"bitcast {body.bit} {body.undecided} to i{lanes}")
+        result = "void"
+        if reports_undecided:
+            result = "i64"
+            body.do(f"ret i64 {body.let(f'zext i{lanes} {undecided} to i64') if undecided else '0'}")
+        else:
+            body.do("ret void")
         arguments = ", ".join(f"{kind} {pointer}" for kind, pointer in pointers)
-        head = f"define internal void @{name}({arguments}) nounwind {{\nentry:\n"
+        head = f"define internal {result} @{name}({arguments}) nounwind {{\nentry:\n"
         return head + "\n".join(body.lines) + "\n}"
 
     module.define(name, write)

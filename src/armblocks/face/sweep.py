@@ -27,6 +27,7 @@ from armblocks.simulation import SimulationResult
 from armblocks.sweeps.batch import RunProgram, RunRows
 from armblocks.sweeps.designs import make_design
 from armblocks.sweeps.files import SweepFile
+from armblocks.sweeps.lanes import lanes_of_host
 from armblocks.sweeps.measures import Measure, observe, signal_entries
 from armblocks.sweeps.scheduling import GroupsOf, RunGroup, Scheduler, default_threads
 from armblocks.sweeps.tables import Layout, concatenated
@@ -37,6 +38,9 @@ SweepProgress = Callable[[int, int, float, float], None]
 PART_SECONDS, PART_RUNS = 5.0, 100_000
 """A part of the results is written after this time (s) or this number of runs."""
 PROGRESS_SECONDS = 0.1
+LANE_RUNS = 500
+"""Number of runs of a model from which on they are computed in lanes by default. The compilation of the code
+takes some seconds for a large model, once."""
 VERSION = "1"
 """Version of the computation; files of another version are not continued."""
 
@@ -55,6 +59,7 @@ def sweep(
     parameters: Mapping[str, object] | None = None,
     max_steps: int | None = None,
     threads: int | None = None,
+    lanes: bool | None = None,
     out: str | PathLike[str] | None = None,
     progress: SweepProgress | None = None,
     **settings: Unpack[RunSettings],
@@ -72,7 +77,9 @@ def sweep(
     ``measures``: each name with a :class:`Measure`, the text of one, such as ``"overshoot(motor/speed,
     final=1)"``, or a Python function of the result that returns a number. ``keep``: signals whose samples are
     kept in memory or in the file. ``parameters``: parameter values for all runs. ``max_steps``: the maximum
-    number of steps of a run. ``threads``: by default the number of cores. ``settings``: as for
+    number of steps of a run. ``threads``: by default the number of cores. ``lanes``: whether each thread
+    computes several runs at a time in the lanes of vector registers, if the model and the solver allow it
+    (otherwise ``remark`` has the reason); by default for 500 runs or more. ``settings``: as for
     :func:`simulate`.
 
     ``out``: a ``.parquet`` or ``.csv`` file. The results are written during the sweep, so that the memory
@@ -92,7 +99,10 @@ def sweep(
     options = with_settings(model.diagram.settings, settings)
     functions, named = _split(measures or {})
     all_parameters = RunParameters(model, make_design(vary, runs, design, seed))
-    programs = _Programs(options, list(named.values()), list(functions.values()), keep, max_steps)
+    models = len({id(variant.model) for variant in all_parameters.variants})
+    many = all_parameters.design.count >= LANE_RUNS * models if lanes is None else lanes
+    width = lanes_of_host() if many else 1
+    programs = _Programs(options, list(named.values()), list(functions.values()), keep, max_steps, width)
     layout, time = programs.layout(all_parameters, (*named, *functions), text_file=_is_csv(out))
     file = None
     if out is not None:
@@ -129,8 +139,10 @@ class _Programs:
         functions: Sequence[Callable[[SimulationResult], float]],
         keep: Sequence[str],
         max_steps: int | None,
+        lanes: int,
     ) -> None:
         self._options = options
+        self._lanes = lanes
         self._measures = measures
         self._functions = functions
         self._keep = (keep,) if isinstance(keep, str) else tuple(keep)
@@ -195,6 +207,7 @@ class _Programs:
                 calls=calls,
                 max_steps=self._max_steps,
                 layout=layout,
+                lanes=self._lanes,
             )
             # The reference keeps the model alive, so that its id stays unique.
             entry = self._known[id(model)] = (model, program)
@@ -207,6 +220,11 @@ class _Programs:
         if any(program.calls for program in programs):
             return "the model calls Python functions"
         return "" if all(program.native for program in programs) else "the runs have no duration"
+
+    @property
+    def against_lanes(self) -> str:
+        """The reason why runs of a model are not computed in lanes; empty if there is none."""
+        return next((p.against_lanes for _, p in self._known.values() if p.against_lanes), "")
 
 
 class _Collected:
@@ -375,7 +393,9 @@ def _remark(
     reason = reason or programs.general_reason
     if reason:
         parts.append(f"all runs one after the other, because {reason}")
-    elif general:
+    elif programs.against_lanes:
+        parts.append(f"one run at a time in each thread, because {programs.against_lanes}")
+    if general and not reason:
         parts.append(f"{general} runs one after the other, because they failed, were stiff or too long")
     if parameters.recompiled:
         parts.append(f"{parameters.recompiled} models compiled, because constants of the equations vary")

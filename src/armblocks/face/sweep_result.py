@@ -49,7 +49,8 @@ class SweepResult(metaclass=ArgumentErrors):
     a run.
 
     ``complete``: whether all runs were computed; Ctrl-C ends a sweep early. ``planned``: the number of runs
-    of the design. ``remark``: the number of runs that the native loop did not compute, and the reason.
+    of the design. ``remark``: the number of runs that the native loop did not compute, the reason for this,
+    and the reason against lanes.
     """
 
     name: str

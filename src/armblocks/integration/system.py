@@ -151,6 +151,10 @@ class CompiledSystem:
         """One of the system's functions, ``derivative``, ``signals`` …, as a flat program."""
         return self._make_tape(function)
 
+    def digest(self, function: str) -> str:
+        """The digest of the tape of one of the system's functions, which identifies its equations."""
+        return self._digests[function]
+
     def _functions_of(self, names: Sequence[str], pointers: int) -> Mapping[str, Callable[..., None]]:
         """Some of the system's functions for single points, compiled with little optimisation: calls are
         rare."""

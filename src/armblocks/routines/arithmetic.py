@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import overload
+from typing import Any, cast, overload
 
-from armblocks.routines.lanes import Lanes, Mask
+from armblocks.routines.lanes import IntegerLanes, Lanes, Mask
 from armblocks.routines.memory import Address
 from armblocks.routines.tree import Constant, Operation
 from armblocks.routines.values import Boolean, Integer, NumberT, Real, Value
@@ -36,29 +36,37 @@ def select(condition: Boolean, yes: Real | float, no: Real | float) -> Real: ...
 @overload
 def select(condition: Boolean, yes: Address, no: Address) -> Address: ...
 @overload
+def select(condition: Mask, yes: IntegerLanes, no: IntegerLanes | int) -> IntegerLanes: ...
+@overload
 def select(condition: Mask, yes: Lanes | float, no: Lanes | float) -> Lanes: ...
 def select(
     condition: Boolean | Mask,
-    yes: Real | Integer | Address | Lanes | float,
-    no: Real | Integer | Address | Lanes | float,
-) -> Real | Integer | Address | Lanes:
+    yes: Real | Integer | Address | Lanes | IntegerLanes | float,
+    no: Real | Integer | Address | Lanes | IntegerLanes | float,
+) -> Real | Integer | Address | Lanes | IntegerLanes:
     """``yes`` where the condition holds, else ``no``; both are evaluated. Two Python numbers are reals."""
     known = next((x for x in (yes, no) if isinstance(x, Value)), None)
-    kind = Lanes if isinstance(condition, Mask) else Real if known is None else type(known)
-    number = int if kind is Integer else float
+    number_kind = Lanes if isinstance(condition, Mask) else Real
+    kind = number_kind if known is None else type(known)
+    number = int if kind in (Integer, IntegerLanes) else float
     operands = (x.operand if isinstance(x, Value) else Constant(kind.kind, number(x)) for x in (yes, no))
     writer = condition.writer
     return kind(writer, writer.compute(kind.kind, Operation.SELECT, condition.operand, *operands))
 
 
-def minimum(a: Real, b: Real | float) -> Real:
+def minimum(a: NumberT, b: NumberT | float) -> NumberT:
     """The smaller value; ``b`` if either is NaN."""
-    return select(a < b, a, b)
+    return _selected(a < b, a, b)
 
 
-def maximum(a: Real, b: Real | float) -> Real:
+def maximum(a: NumberT, b: NumberT | float) -> NumberT:
     """The larger value; ``b`` if either is NaN."""
-    return select(a > b, a, b)
+    return _selected(a > b, a, b)
+
+
+def _selected(condition: Any, yes: Any, no: Any) -> Any:
+    """``select`` of doubles, or of one in each lane."""
+    return cast("Any", select)(condition, yes, no)
 
 
 def sign(a: Real) -> Real:
@@ -66,15 +74,15 @@ def sign(a: Real) -> Real:
     return select(a > 0.0, 1.0, select(a < 0.0, -1.0, 0.0))
 
 
-def polynomial(x: Real, coefficients: Sequence[float]) -> Real | float:
+def polynomial(x: NumberT, coefficients: Sequence[float]) -> NumberT | float:
     """Horner's rule; coefficients from the constant term upwards. A single coefficient is the result."""
-    result: Real | float = coefficients[-1]
+    result: NumberT | float = coefficients[-1]
     for coefficient in reversed(coefficients[:-1]):
         result = fma(result, x, coefficient)
     return result
 
 
-def inverse_root(a: Real, k: int) -> Real:
+def inverse_root(a: NumberT, k: int) -> NumberT:
     """``a^(-1/k)`` for ``a`` in 1e-300 … 1e300, with an error of about one unit in the last place.
 
     The first guess divides the bits of ``a`` by k; the offset 0.064 balances its error. Two corrections ``y

@@ -7,8 +7,8 @@ and therefore the control flow are common to all lanes. A :class:`Mask` selects 
 from __future__ import annotations
 
 from armblocks.routines.memory import NumberArray, Reals
-from armblocks.routines.tree import Kind, Operation
-from armblocks.routines.values import Boolean, Condition, Number
+from armblocks.routines.tree import Constant, Kind, Operand, Operation
+from armblocks.routines.values import Boolean, Condition, Integer, Number, Value
 
 
 class Mask(Condition):
@@ -22,12 +22,72 @@ class Mask(Condition):
         """Whether the condition holds in any lane."""
         return Boolean(self.writer, self.writer.compute(Kind.BOOLEAN, Operation.ANY, self.operand))
 
+    def bits(self) -> Integer:
+        """An integer whose bit ``k`` is the condition of lane ``k``."""
+        return Integer(self.writer, self.writer.compute(Kind.INTEGER, Operation.LANE_BITS, self.operand))
+
 
 class Lanes(Number[Mask]):
     """A double in each lane. A Python number is the same in all lanes."""
 
     __slots__ = ()
     kind, condition = Kind.LANES, Mask
+
+    def bits(self) -> IntegerLanes:
+        """The bits as integers, see :meth:`armblocks.routines.values.Real.bits`."""
+        return IntegerLanes(
+            self.writer, self.writer.compute(Kind.INTEGER_LANES, Operation.BITS, self.operand)
+        )
+
+
+class IntegerLanes(Value):
+    """A 64-bit signed integer in each lane. A Python number is the same in all lanes."""
+
+    __slots__ = ()
+    kind = Kind.INTEGER_LANES
+
+    def __add__(self, other: IntegerLanes | int) -> IntegerLanes:
+        return self._integer(Operation.ADD, self, other)
+
+    def __sub__(self, other: IntegerLanes | int) -> IntegerLanes:
+        return self._integer(Operation.SUBTRACT, self, other)
+
+    def __rsub__(self, other: int) -> IntegerLanes:
+        return self._integer(Operation.SUBTRACT, other, self)
+
+    def __and__(self, other: IntegerLanes | int) -> IntegerLanes:
+        return self._integer(Operation.AND, self, other)
+
+    def __lt__(self, other: IntegerLanes | int) -> Mask:
+        return self._compare(Operation.LESS, other)
+
+    def __ge__(self, other: IntegerLanes | int) -> Mask:
+        return self._compare(Operation.GREATER_EQUAL, other)
+
+    def __eq__(self, other: IntegerLanes | int) -> Mask:  # type: ignore[override]
+        return self._compare(Operation.EQUAL, other)
+
+    __hash__ = object.__hash__
+
+    def unsigned_quotient(self, divisor: int) -> IntegerLanes:
+        """The unsigned quotient."""
+        return self._integer(Operation.DIVIDE_UNSIGNED, self, divisor)
+
+    def from_bits(self) -> Lanes:
+        """The doubles that have these bits."""
+        return Lanes(self.writer, self.writer.compute(Kind.LANES, Operation.FROM_BITS, self.operand))
+
+    def _integer(self, operation: Operation, *operands: IntegerLanes | int) -> IntegerLanes:
+        integers = map(_integer_operand, operands)
+        return IntegerLanes(self.writer, self.writer.compute(Kind.INTEGER_LANES, operation, *integers))
+
+    def _compare(self, operation: Operation, other: IntegerLanes | int) -> Mask:
+        result = self.writer.compute(Kind.MASK, operation, self.operand, _integer_operand(other))
+        return Mask(self.writer, result)
+
+
+def _integer_operand(value: IntegerLanes | int) -> Operand:
+    return value.operand if isinstance(value, IntegerLanes) else Constant(Kind.INTEGER_LANES, value)
 
 
 class LaneArray(NumberArray[Lanes]):

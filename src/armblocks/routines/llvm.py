@@ -44,7 +44,11 @@ _TYPES = {
     Kind.BOOLEAN: "i1",
     Kind.ADDRESS: "ptr",
 }
-_OF_EACH_LANE = {Kind.LANES: Kind.REAL, Kind.MASK: Kind.BOOLEAN}
+_OF_EACH_LANE = {Kind.LANES: Kind.REAL, Kind.MASK: Kind.BOOLEAN, Kind.INTEGER_LANES: Kind.INTEGER}
+_SAME_BITS = {
+    (Operation.BITS, Kind.LANES): Kind.INTEGER_LANES,
+    (Operation.FROM_BITS, Kind.INTEGER_LANES): Kind.LANES,
+}
 
 _TWO_REALS = {
     Operation.ADD: "fadd",
@@ -367,6 +371,10 @@ class _FunctionText:
             return f"select {self._type(kind)} {texts[0]}, {second} {texts[1]}, {second} {texts[2]}"
         if operation is Operation.ANY:
             return self._any(texts[0])
+        if operation is Operation.LANE_BITS:
+            return self._lane_bits(texts[0])
+        if (operation, kind) in _SAME_BITS:
+            return f"bitcast {self._type(kind)} {texts[0]} to {self._type(_SAME_BITS[operation, kind])}"
         if operation is Operation.SPREAD:
             return self._in_all_lanes(texts[0])
         if operation is Operation.FMA:
@@ -394,6 +402,12 @@ class _FunctionText:
             return f"or i1 {mask}, false"
         bits = self._append_value(f"bitcast {self._type(Kind.MASK)} {mask} to i{self.lanes}")
         return f"icmp ne i{self.lanes} {bits}, 0"
+
+    def _lane_bits(self, mask: str) -> str:
+        if self.lanes == 1:
+            return f"zext i1 {mask} to i64"
+        bits = self._append_value(f"bitcast {self._type(Kind.MASK)} {mask} to i{self.lanes}")
+        return f"zext i{self.lanes} {bits} to i64"
 
     def _fma(self, kind: Kind, operands: Sequence[str]) -> str:
         call = self._intrinsic("fma", kind, *operands)

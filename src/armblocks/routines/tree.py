@@ -29,6 +29,8 @@ class Kind(Enum):
     """A double in each lane of the program."""
     MASK = "mask"
     """A condition in each lane."""
+    INTEGER_LANES = "integer lanes"
+    """A 64-bit integer in each lane."""
 
 
 class Operation(Enum):
@@ -65,6 +67,8 @@ class Operation(Enum):
     NOT = "not"
     ANY = "any"
     """Whether a mask holds in any lane."""
+    LANE_BITS = "lane bits"
+    """An integer whose bit k is the condition of lane k."""
     SPREAD = "spread"
     """A double in all lanes."""
     SELECT = "select"

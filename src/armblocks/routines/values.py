@@ -180,6 +180,10 @@ class Number(Value, Generic[ConditionT]):
         """Whether the number is neither infinite nor NaN: ``0 a`` is zero."""
         return self * 0.0 == 0.0
 
+    def bits(self) -> Any:
+        """The bits as an integer, or as one in each lane."""
+        raise NotImplementedError
+
     def compute(self, operation: Operation, *operands: Self | float) -> Self:
         """An operation on numbers of this kind."""
         return type(self)(

@@ -24,6 +24,7 @@ from armblocks.simulation.result import SimulationResult
 from armblocks.simulation.simulation import Simulation
 from armblocks.sweeps.batch_places import Number, Outcome, Place, Report
 from armblocks.sweeps.batch_routine import batch_code
+from armblocks.sweeps.lanes import LaneArrays, LaneRuns, lanes_code, reason_against_lanes
 from armblocks.sweeps.measure_routines import OPTIONS
 from armblocks.sweeps.quantities import Observation
 
@@ -75,9 +76,12 @@ class RunProgram:
         calls: Sequence[CalledFunction] = (),
         max_steps: int | None = None,
         layout: Signature | None = None,
+        lanes: int = 1,
     ) -> None:
-        """``python_measures`` follow the measures of ``observation``. Raises ``InputError`` for invalid
-        options."""
+        """``python_measures`` follow the measures of ``observation``. ``lanes``: the number of runs that are
+        computed at a time, in lanes of vector registers, if the system allows it; a power of two. Raises
+        ``InputError`` for invalid options.
+        """
         self.compiled = compiled
         self.options = options
         self.observation = observation
@@ -91,6 +95,14 @@ class RunProgram:
         # The code is loaded before threads use it; two threads could load the same code twice.
         compiled.prepare(self.plan.tableau)
         _ = batch_code(), observation.expressions and observation.expressions.address
+        self.against_lanes = ""
+        """The reason why runs are not computed in lanes."""
+        self.lanes = 1
+        if lanes > 1 and self.native and not python_measures:
+            self.against_lanes = reason_against_lanes(compiled, self.plan, lanes)
+            self.lanes = 1 if self.against_lanes else lanes
+        if self.lanes > 1:
+            lanes_code(compiled, self.plan, self.lanes)
 
     @property
     def native(self) -> bool:
@@ -256,6 +268,7 @@ class NativeBatch:
         }
         self._numbers = np.array([numbers[place] for place in Number if place in numbers], dtype=np.int64)
         self._call = _RUNS(batch_code().address("runs"))
+        self._lanes = _lane_runs(program, doublings, steps) if program.lanes > 1 else None
 
     def enlarged(self) -> NativeBatch:
         """A batch with twice the memory for jumps if a run has needed more, up to the maximum of a run."""
@@ -282,8 +295,15 @@ class NativeBatch:
             (Place.KEPT_VALUES, rows.kept),
         ):
             self._addresses[place] = array.ctypes.data
-        self._call(self._addresses.ctypes.data, self._numbers.ctypes.data, 0, count)
         status = reports[:, Report.STATUS]
+        addresses, numbers = self._addresses.ctypes.data, self._numbers.ctypes.data
+        if self._lanes is None:
+            self._call(addresses, numbers, 0, count)
+        else:
+            status[:] = Outcome.OTHER
+            self._lanes.compute(self._addresses, self._numbers, count)
+            for row in np.flatnonzero(status == Outcome.OTHER).tolist():
+                self._call(addresses, numbers, row, row + 1)
         rows.steps[:], rows.events[:] = reports[:, Report.STEPS], reports[:, Report.EVENTS]
         states = reports[status == Outcome.OTHER, Report.GUARD]
         self._jumps_full = bool((states == Status.JUMPS_FULL).any())
@@ -371,6 +391,13 @@ def _run_memory(program: RunProgram, doublings: int) -> RunMemory:
         },
         integration=run,
     )
+
+
+def _lane_runs(program: RunProgram, doublings: int, max_steps: int) -> LaneRuns:
+    """The loop in lanes, with the arrays of a run for each lane."""
+    memories = [_run_memory(program, doublings) for _ in range(program.lanes)]
+    arrays = [LaneArrays(reals=memory.reals, counts=memory.counts, jumps=memory.jumps) for memory in memories]
+    return LaneRuns(program.compiled, program.options, program.plan, arrays, max_steps)
 
 
 def _run_arrays(memory: RunMemory) -> dict[Place, NDArray[np.generic]]:

@@ -256,7 +256,7 @@ def _write_kept(r: Routine, a: Addresses, n: Integers, run: Integer, count: Inte
 def _run(r: Routine, a: Addresses, n: Integers, run: Integer) -> None:
     """Compute one run, and write its row of results."""
     p = a[Place.PARAMETERS].reals.after(run * n[Number.PARAMETERS])
-    report, counts = a[Place.REPORTS].integers.after(run * Report.END), a[Place.COUNTS].integers
+    report = a[Place.REPORTS].integers.after(run * Report.END)
     report[Report.STATUS] = Outcome.OTHER
     with r.unless(r.call(r.program.define(_start), a, n, run, p)):
         r.return_()
@@ -265,7 +265,13 @@ def _run(r: Routine, a: Addresses, n: Integers, run: Integer) -> None:
         r.call(r.program.define(_sample), a, n)
     with r.otherwise():
         outcome.value = _integrate(r, a, n, p)
-    status, reals = outcome.value, a[Place.REALS].reals
+    r.call(r.program.define(_finish), a, n, run, p, outcome.value)
+
+
+def _finish(r: Routine, a: Addresses, n: Integers, run: Integer, p: Reals, status: Integer) -> None:
+    """Write the results of a run that has ended with a status of the loop."""
+    report, counts = a[Place.REPORTS].integers.after(run * Report.END), a[Place.COUNTS].integers
+    reals = a[Place.REALS].reals
     a[Place.END_TIMES].reals[run] = reals[Scalar.TIME]
     report[Report.STEPS], report[Report.EVENTS] = counts[Count.ACCEPTED], counts[Count.EVENTS]
     report[Report.GUARD] = status
@@ -302,9 +308,12 @@ def _runs(r: Routine, a: Addresses, n: Integers, first: Integer, stop: Integer) 
 
 @cache
 def batch_code() -> NativeCode:
-    """The functions ``runs`` and ``measure.*``; every model uses the same code."""
+    """The functions ``runs``, ``run.start``, ``run.finish`` and ``measure.*``; every model uses the same
+    code."""
     program = Program()
     program.define(_runs, "runs", public=True)
+    program.define(_start, "run.start", public=True)
+    program.define(_finish, "run.finish", public=True)
     define_measures(program)
     parts = definitions(program)
 
