@@ -992,7 +992,7 @@ export interface TypedValue {
   text: string;
 }
 /**
- * Check settings while they are typed; the reply has an error text for each invalid one, by name.
+ * Check settings while they are typed; the reply has an error text for each invalid setting, by name.
  */
 export interface TypedSettings {
   kind: "typed_settings";
@@ -1593,7 +1593,7 @@ export interface DataFile {
   size: number;
 }
 /**
- * Files of the project folder; ``recent`` are the recently used ones, the latest first.
+ * Files of the project folder; ``recent``: recently used files, the latest first.
  */
 export interface FileList {
   files: string[];
@@ -1681,7 +1681,7 @@ export interface SetParameter {
   tunable: boolean;
 }
 /**
- * The columns of a file, and the table of the chosen ones, or its ``fault``.
+ * The columns of a file, and the table of the chosen columns, or its ``fault``.
  *
  * ``time`` is the column of times, ``chosen`` are the columns of values. ``rows`` are the first rows of
  * these columns as text. ``times`` (s) and ``curves`` are points for a plot: minimum and maximum of groups

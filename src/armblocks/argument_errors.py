@@ -118,7 +118,7 @@ def check_arguments(
 
 
 def _shown_names(call: Callable[..., object], signature: inspect.Signature) -> list[str]:
-    """The names of the arguments, without internal fields: optional ones with ``repr=False``."""
+    """The names of the arguments, without internal fields, which are optional and have ``repr=False``."""
     fields: Mapping[str, Any] = getattr(call, "__dataclass_fields__", {})
     return [
         name

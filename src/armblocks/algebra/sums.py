@@ -99,8 +99,8 @@ class Sum:
     def contracted(self) -> Sum:
         """The sum with products of sines and cosines of two angles written with their sum or difference.
 
-        ``cos a cos b - sin a sin b = cos(a + b)``, ``cos² a + sin² a = 1``, and the like, where both products
-        occur with the same other factors and numbers.
+        ``cos a cos b - sin a sin b = cos(a + b)``, ``cos² a + sin² a = 1``, and similar identities, where
+        both products occur with the same other factors and numbers.
         """
         terms = dict(self.terms)
         while any(_contracted_once(terms, monomial) for monomial in list(terms)):

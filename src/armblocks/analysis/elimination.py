@@ -97,7 +97,7 @@ class SystemMatrix:
         _accumulate(self.values.T, self.variances.T, sources, target, factors, variances)
 
     def concentrate(self, states: Indices, column: int) -> None:
-        """Transform the states such that few of the given ones have an entry in this column.
+        """Transform the states such that few of the given states have an entry in this column.
 
         In each irreducible part with many entries, a Householder reflection leaves one of them.
         """

@@ -37,7 +37,7 @@ MAX_RESIDUAL = 1e-8
 def gramians(system: StateSpaceModel) -> tuple[Array, Array]:
     """The controllability and the observability Gramian (nx, nx), by the Lyapunov equations.
 
-    Raises ``InputError`` for a system that is not stable, and for one whose Gramians cannot be computed to 8
+    Raises ``InputError`` for a system that is not stable, or whose Gramians cannot be computed to 8
     digits of its Lyapunov equations.
     """
     if not is_stable(system):

@@ -73,7 +73,7 @@ def eigenvalues(matrix: Array) -> Complex:
 
 
 def _refined(matrix: Array, roots: Complex, k: int) -> complex:
-    """An improved eigenvalue; the same one if Newton's method does not converge near it."""
+    """An improved eigenvalue; unchanged if Newton's method does not converge near it."""
     start = root = complex(roots[k])
     others = np.delete(roots, k)
     gap = float(np.abs(others - root).min())

@@ -77,7 +77,7 @@ def _roots(loop: LinearSystem, gain: float) -> Complex:
 
 
 def _adaptive_gains(loop: LinearSystem, zeros: Complex) -> tuple[Array, list[Complex]]:
-    """Gains up to the one at which every root is next to a zero or outside the figure."""
+    """Gains up to the gain at which every root is next to a zero or outside the figure."""
     radius = extent(loop, zeros)
     last = 1e-6 / max(float(np.abs(loop.B).max() * np.abs(loop.C).max()), 1e-12)
     for _ in range(120):

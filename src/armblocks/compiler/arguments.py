@@ -34,7 +34,7 @@ def in_order(
     named: Mapping[str, ArrayLike],
     options: Sequence[str] = ("out", "threads"),
 ) -> tuple[ArrayLike, ...]:
-    """All inputs in the order of the slots: the first ones are ``values``, the others ``named``.
+    """All inputs in the order of the slots: first ``values``, then ``named``.
 
     Raises :class:`UnknownArgumentError` for a name that is neither an input nor one of the ``options`` of
     the call, :class:`ArgumentError` for a missing or duplicate input.

@@ -111,5 +111,5 @@ def _helpers() -> _Helpers:
 
 
 if hasattr(os, "register_at_fork"):
-    # Threads do not survive a fork: the child process starts new ones.
+    # Threads do not survive a fork: the child process starts new threads.
     os.register_at_fork(after_in_child=_helpers.cache_clear)

@@ -120,7 +120,7 @@ def _check_unlinked(outside: Outside, path: str) -> None:
         raise DiagramError(
             f"'{path}' is inside the library block '{library_diagram.link}'",
             where=f"block '{subsystem}'",
-            allowed=own or "nothing: the library block has no parameters",
+            allowed=own or "no parameters: the library block has none",
             fix="change a parameter of its mask, or break the link",
         )
 

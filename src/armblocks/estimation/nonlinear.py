@@ -185,7 +185,7 @@ def _summary(search: _Search, message: str, *, stopped: bool, known_noise: bool)
     half = Vt[:rank].T / s[:rank] / scale[:, None]
     freedom = sum(map(len, residuals)) - rank
     if freedom < 1 and not known_noise:
-        half = np.full_like(half, np.inf)  # the residuals are 0 whatever the noise is
+        half = np.full_like(half, np.inf)  # the residuals are 0 for any noise
     known = np.sqrt(np.sum(Vt[:rank] ** 2, axis=0)) > 1.0 - 1e-6
     covariance = np.where(known & known[:, None], half @ half.T, np.nan)
     return NonlinearFit(

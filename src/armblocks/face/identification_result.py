@@ -244,7 +244,7 @@ class IdentificationResult(metaclass=ArgumentErrors):
         """Sentences on filters, missing samples, parameters that are not identified, correlated noise."""
         found = list(self.notes)
         if self.dropped:
-            found.append(f"{counted(self.dropped, 'sample')} with missing values or at the ends left out")
+            found.append(f"{counted(self.dropped, 'sample')} with missing values or at the ends omitted")
         if self.not_identified:
             found.append(
                 "not identified, because the motion does not excite them: "

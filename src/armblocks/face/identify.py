@@ -53,7 +53,7 @@ def identify(
     ``data``: a log, or a list of logs of several experiments. A log is a dictionary with ``t`` (N,) s, ``q``
     (N, nq) rad or m, ``qd``, ``qdd`` (N, n) and ``tau`` (N, n) N m or N at the joints; the result of
     ``arm.fdyn``; a data frame or a file (``.csv``, ``.npz``, ``.mat``, ``.parquet``) with the columns t, q1
-    …, qd1 …, qdd1 …, tau1 …. NaN are missing values; their rows are left out. ``qd`` and ``qdd`` may be
+    …, qd1 …, qdd1 …, tau1 …. NaN are missing values; their rows are omitted. ``qd`` and ``qdd`` may be
     missing: they are computed from equally spaced positions by a low-pass filter without phase shift and
     central differences. ``cutoff`` (Hz) is the filter of the motion; by default complete logs are not
     filtered, and for other logs the cut-off follows from the spectrum. ``decimate=k`` filters torques and

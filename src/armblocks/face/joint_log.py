@@ -334,7 +334,7 @@ def _check_differentiable(log: JointLog, robot: Robot) -> None:
 def _with_derivatives(log: JointLog, part: slice, cutoff: float) -> Segment:
     """Filtered positions with their derivatives; measured speeds and accelerations are filtered alike.
 
-    The samples at both ends, about one period of the cut-off frequency, are left out.
+    The samples at both ends, about one period of the cut-off frequency, are omitted.
     """
     step = log.step
     q = low_passed(log.q[part], step, cutoff)

@@ -54,7 +54,7 @@ def rod_points(robot: Robot, frames: Sequence[_Array], size: float) -> LinkPoint
 
 
 def configurations(robot: Robot) -> _Array:
-    """Configurations (N, nq) near the neutral one, in which points of different links are apart."""
+    """Configurations (N, nq) near the neutral configuration, in which points of different links are apart."""
     rng = np.random.default_rng(0)
     return robot.neutral + 0.3 * rng.standard_normal((_SAMPLES, robot.nq))
 

@@ -22,12 +22,12 @@ def turning_points(path: PiecewisePolynomial, joints: NDArray[np.bool_]) -> Arra
     """
     c = np.zeros((len(path.coefficients), 4, np.count_nonzero(joints)))
     c[:, : path.coefficients.shape[1]] = path.coefficients[:, :, joints]
-    slope, half, three = c[:, 1], c[:, 2], 3.0 * c[:, 3]
-    root = np.sqrt(np.maximum(half * half - three * slope, 0.0))
-    # The two zeros of three u² + 2 half u + slope, without cancellation; NaN and infinity are omitted.
+    linear, half, three = c[:, 1], c[:, 2], 3.0 * c[:, 3]
+    root = np.sqrt(np.maximum(half * half - three * linear, 0.0))
+    # The two zeros of three u² + 2 half u + linear, without cancellation; NaN and infinity are omitted.
     larger = -(half + np.where(half >= 0.0, root, -root))
     with np.errstate(divide="ignore", invalid="ignore"):
-        u = np.stack([larger / three, slope / larger])
+        u = np.stack([larger / three, linear / larger])
     length = np.diff(path.times)[:, None]
     # A double zero is no change of direction.
     inside = (root > 0.0) & (u > 1e-9 * length) & (u < (1.0 - 1e-9) * length)

@@ -183,7 +183,7 @@ def extremes(curve: PiecewisePolynomial, order: int) -> tuple[Array, Array]:
         return low, high
     rows = np.moveaxis(derivative, 1, 2).reshape(K * n, degree + 1)
     largest = np.abs(rows).max(axis=1)
-    # A vanishing leading coefficient is replaced by a tiny one: its extra zero is far outside the piece.
+    # A tiny number replaces a leading coefficient of 0: its extra zero is far outside the piece.
     leading = rows[:, -1]
     tiny = 1e-12 * np.where(largest > 0.0, largest, 1.0)
     leading = np.where(np.abs(leading) < tiny, tiny, leading)

@@ -22,13 +22,13 @@ def cubic_spline(
     """
     count, n = points.shape
     h = np.diff(times)
-    slope = np.diff(points, axis=0) / h[:, None]
+    rate = np.diff(points, axis=0) / h[:, None]
     lower, diagonal, upper = np.zeros(count), np.zeros(count), np.zeros(count)
     right = np.zeros((count, n))
     lower[1:-1], upper[1:-1] = h[1:], h[:-1]
     diagonal[1:-1] = 2.0 * (h[:-1] + h[1:])
-    right[1:-1] = 3.0 * (h[1:, None] * slope[:-1] + h[:-1, None] * slope[1:])
-    for index, neighbour, speed, mean in ((0, upper, qd0, slope[0]), (-1, lower, qd1, slope[-1])):
+    right[1:-1] = 3.0 * (h[1:, None] * rate[:-1] + h[:-1, None] * rate[1:])
+    for index, neighbour, speed, mean in ((0, upper, qd0, rate[0]), (-1, lower, qd1, rate[-1])):
         if speed is None:
             diagonal[index], neighbour[index], right[index] = 2.0, 1.0, 3.0 * mean
         else:

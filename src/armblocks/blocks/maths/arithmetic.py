@@ -184,7 +184,7 @@ class Hypot(Block):
     title: ClassVar[str] = "Hypot"
     sign: ClassVar[FaceSign] = Words("√(u²+v²)")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows=("The hypotenuse of a right triangle with one leg of 3 and one that grows: it is 5 at 4 s."),
+        shows=("The hypotenuse of a right triangle with legs 3 and t: it is 5 at 4 s."),
         inputs={"u": driver("Ramp"), "v": driver("Constant", value=3.0)},
     )
 

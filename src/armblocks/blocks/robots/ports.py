@@ -85,7 +85,7 @@ def check_start(block: Block, robot: Robot, name: str) -> None:
     """Raise ``InputError`` unless a parameter has values of q.
 
     They are one number for each entry of q, or one number for all. With ball joints this number is 0 and
-    stands for the neutral coordinates, because a quaternion of zeros is not a rotation.
+    selects the neutral coordinates, because a quaternion of zeros is not a rotation.
     """
     if robot.nq == robot.nv:
         check_joint_values(block, robot, name)

@@ -374,7 +374,7 @@ class _Groups:
             self.join(weld.base, weld.follower)
 
     def leader(self, node: str) -> str:
-        """The node that stands for the group of a node."""
+        """The node that represents the group of a node."""
         while self._leaders.get(node, node) != node:
             node = self._leaders[node] = self._leaders.get(self._leaders[node], self._leaders[node])
         return node

@@ -13,10 +13,11 @@ from armblocks.robot.joints.motions import AxisMotion, BallMotion, Motion
 class Free(Joint):
     """No connection: six degrees of freedom relative to the parent, or to the world for a floating base.
 
-    The proximal frame is the joint frame that is fixed to the parent, the distal frame the one that is fixed
-    to the link. q (7,) = position x y z (m) of the distal frame in the proximal frame, then a quaternion w x
-    y z of length 1. qd (6,) = rate of the position, m/s, in *proximal* axes, then angular velocity, rad/s, in
-    *distal* axes. tau (6,): forces and moments in the same axes. These are the conventions of MuJoCo.
+    The proximal frame is the joint frame that is fixed to the parent, the distal frame the joint frame that
+    is fixed to the link. q (7,) = position x y z (m) of the distal frame in the proximal frame, then a
+    quaternion w x y z of length 1. qd (6,) = rate of the position, m/s, in *proximal* axes, then angular
+    velocity, rad/s, in *distal* axes. tau (6,): forces and moments in the same axes. These are the
+    conventions of MuJoCo.
     """
 
     letter: ClassVar[str] = "6"

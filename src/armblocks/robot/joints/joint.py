@@ -64,7 +64,7 @@ class Joint(ABC, metaclass=ArgumentErrors, methods=False):
                     f"{counted(len(entries), 'limit is', 'limits are')} given",
                     where="limits of a joint",
                     allowed=f"{self.nv} for a {type(self).__name__} joint, or one for all coordinates",
-                    fix="give JointLimits() where nothing is known",
+                    fix="give JointLimits() for unknown limits",
                 )
             object.__setattr__(self, "limits", entries[0] if len(set(entries)) == 1 else tuple(entries))
         axes = [isinstance(motion, AxisMotion) for motion in self.motions for _ in motion.speeds]

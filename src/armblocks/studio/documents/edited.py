@@ -82,7 +82,7 @@ class Edited(History[Value], ABC):
 
     @abstractmethod
     def mark_saved(self, value: Value, name: str) -> None:
-        """Mark ``value``, which is the present value or a former one, as the content of the file ``name``."""
+        """Mark ``value``, which is the present or a former value, as the content of the file ``name``."""
 
     def _check_kind(self, edit: Edit) -> None:
         if not isinstance(edit, self.edits):

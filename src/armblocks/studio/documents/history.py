@@ -46,7 +46,7 @@ class History(Generic[Value]):
 
     @property
     def dirty(self) -> bool:
-        """Whether the file contains another value than the present one."""
+        """Whether the file differs from the present value."""
         return self.value is not self.saved
 
     @property

@@ -41,7 +41,7 @@ class RecoverableFiles:
         return [*descriptions, *(self._unread_offer(key, path) for key, path in self._unread.items())]
 
     def take(self, key: str) -> JournaledFile[Any]:
-        """Return a recovered document and remove it from the recoverable ones.
+        """Return a recovered document and remove it from the recoverable documents.
 
         A journal that could not be read is read again: a missing file may exist by now. Raises
         ``UnknownNameError`` for an unknown key, ``ArmblocksError`` if the journal still cannot be read.

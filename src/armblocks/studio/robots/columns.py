@@ -26,7 +26,7 @@ class Quantity(Enum):
     ANGLE = "angle"
     """rad; displayed in degrees or radians."""
     COORDINATE = "coordinate"
-    """Joint coordinate: rad for a revolute joint, m for a prismatic one."""
+    """Joint coordinate: rad for a revolute joint, m for a prismatic joint."""
     RATE = "rate"
     """Joint speed: rad/s or m/s."""
     TEXT = "text"

@@ -53,7 +53,7 @@ class Document(Edited[Diagram]):
         self.perform(Change(document="", inside=list(path), edit=edit))
 
     def mark_saved(self, value: Diagram, name: str) -> None:
-        """Mark ``value``, which is the present diagram or a former one, as the content of the file ``name``.
+        """Mark ``value``, which is the present or a former diagram, as the content of the file ``name``.
 
         A diagram with another name is renamed, together with the diagrams for undo and redo.
         """

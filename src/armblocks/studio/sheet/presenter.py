@@ -73,7 +73,7 @@ class DiagramPresenter(Presenter[OpenDocument]):
         return Opening([self._documents.open_bytes(data, name)])
 
     def place(self, open_file: OpenDocument, requested: Place, *, known: bool) -> Place:
-        """Return the path of the sheet; the top sheet if a reconnecting client shows a deleted one."""
+        """Return the path of the sheet; the top sheet if a reconnecting client shows a deleted sheet."""
         try:
             inside(open_file.document.diagram, requested)
         except UnknownNameError:

@@ -41,7 +41,7 @@ class TableColumn(Message):
 
 
 class TablePreview(Message):
-    """The columns of a file, and the table of the chosen ones, or its ``fault``.
+    """The columns of a file, and the table of the chosen columns, or its ``fault``.
 
     ``time`` is the column of times, ``chosen`` are the columns of values. ``rows`` are the first rows of
     these columns as text. ``times`` (s) and ``curves`` are points for a plot: minimum and maximum of groups

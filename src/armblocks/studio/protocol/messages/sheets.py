@@ -341,7 +341,7 @@ class TypedValue(Request[Any]):
 
 
 class TypedSettings(Request[dict[str, str]]):
-    """Check settings while they are typed; the reply has an error text for each invalid one, by name."""
+    """Check settings while they are typed; the reply has an error text for each invalid setting, by name."""
 
     kind: Literal["typed_settings"] = "typed_settings"
     document: str

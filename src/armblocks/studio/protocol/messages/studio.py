@@ -35,7 +35,7 @@ class Ping(Request[None]):
 
 
 class FileList(Message):
-    """Files of the project folder; ``recent`` are the recently used ones, the latest first."""
+    """Files of the project folder; ``recent``: recently used files, the latest first."""
 
     files: list[str]
     recent: list[str]

@@ -92,7 +92,7 @@ class MotionRequest(TeachingRequest[ReplyT], Generic[ReplyT]):
     """A request about a motion through all recorded poses of a robot.
 
     ``course``: joint motions or straight lines of the tool, with a stop at each pose, or a spline in joint
-    space without stops. ``duration`` s; ``None``: the least one under the limits of speed and torque.
+    space without stops. ``duration`` s; ``None``: the least duration under the limits of speed and torque.
     """
 
     course: Literal["joint", "line", "spline"]
