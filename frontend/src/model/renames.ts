@@ -9,6 +9,10 @@ export function pathAfter(path: string, renamed: Renamed): string {
   return path
 }
 
+/** A message about a run in which quoted paths, such as `'plant/arm'`, have the names after a rename. */
+export const textAfter = (text: string, renamed: Renamed): string =>
+  text.replace(/'([^'\n]+)'/g, (_, path: string) => `'${pathAfter(path, renamed)}'`)
+
 /** A record with the paths of its keys after blocks were renamed. */
 export const withKeysAfter = <T>(record: Readonly<Record<string, T>>, renamed: Renamed): Record<string, T> =>
   Object.fromEntries(Object.entries(record).map(([path, value]) => [pathAfter(path, renamed), value]))

@@ -1,5 +1,5 @@
 import type { EventOf } from '../messages'
-import { pathAfter, pathsAfter, withKeysAfter, type Renamed } from '../model/renames'
+import { pathAfter, pathsAfter, textAfter, withKeysAfter, type Renamed } from '../model/renames'
 import type { SinkView } from '../protocol'
 import { scheduleFrame } from '../frames'
 import { useStudio, type RunView } from '../store'
@@ -29,6 +29,12 @@ function storedAfter(run: StoredRun, renamed: Renamed): StoredRun {
 /** The displayed data of a run after blocks were renamed. */
 export const runViewAfter = (run: RunView, renamed: Renamed): RunView => ({
   ...run,
+  message: textAfter(run.message, renamed),
+  fault: run.fault && {
+    ...run.fault,
+    what: textAfter(run.fault.what, renamed),
+    where: textAfter(run.fault.where, renamed),
+  },
   views: viewsAfter(run.views, renamed),
   channels: run.channels.map((channel) => ({ ...channel, name: pathAfter(channel.name, renamed) })),
   tunables: run.tunables.map((tunable) => ({ ...tunable, path: pathAfter(tunable.path, renamed) })),
@@ -52,6 +58,9 @@ export function onBlocksRenamed(document: string, inside: string[], renamed: Ren
   usePinnedParameters.setState(({ pinned, ranges }) => ({
     pinned: pathsAfter(pinned, renamed),
     ranges: withKeysAfter(ranges, renamed),
+  }))
+  useStudio.setState(({ notices }) => ({
+    notices: notices.map((notice) => ({ ...notice, what: textAfter(notice.what, renamed) })),
   }))
   useShownValues.setState(({ pinned }) => ({ pinned: pathsAfter(pinned, renamed) }))
   const prefix = inside.map((name) => `${name}/`).join('')

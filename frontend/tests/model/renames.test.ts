@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest'
 import { freeShift } from '../../src/model/free_place'
-import { pathAfter, pathsAfter, withKeysAfter } from '../../src/model/renames'
+import { pathAfter, pathsAfter, textAfter, withKeysAfter } from '../../src/model/renames'
 import { RunSamples } from '../../src/model/run_samples'
 import type { Channel } from '../../src/protocol'
 
@@ -25,6 +25,13 @@ test('blocks, ports, parameters and inner blocks follow a rename; similar paths 
     'b.gain': 3,
   })
   expect(pathsAfter(['plant/arm/y', 'b/y'], renamed)).toEqual(new Set(['plant/robot/y', 'b/y']))
+})
+
+test('quoted paths in messages follow a rename', () => {
+  const renamed = { 'plant/arm': 'plant/robot', u: 'v' }
+  expect(
+    textAfter("block 'plant/arm' (Gain): input 'plant/arm/u' of 'arm' isn't finite at 2 s", renamed),
+  ).toBe("block 'plant/robot' (Gain): input 'plant/robot/u' of 'arm' isn't finite at 2 s")
 })
 
 test('samples are found by the new name and alias, and later frames have the same columns', () => {

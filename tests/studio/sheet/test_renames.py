@@ -18,6 +18,7 @@ from armblocks.studio.protocol.messages.sheet_edits import (
     GroupBlocks,
     MoveBlocks,
     NewBlock,
+    PasteBlocks,
     Place,
     RemoveBlocks,
     Rename,
@@ -25,7 +26,9 @@ from armblocks.studio.protocol.messages.sheet_edits import (
     Wire,
 )
 from armblocks.studio.server.hub import Hub
+from armblocks.studio.sheet.clipping import clipped
 from armblocks.studio.sheet.document import Document
+from armblocks.studio.sheet.nesting import inside
 from armblocks.studio.sheet.renames import PathNames, path_after, renamed_paths
 
 
@@ -80,6 +83,45 @@ def test_blocks_that_are_grouped_and_ungrouped_by_undo_are_followed() -> None:
     assert renamed_paths(after, before) == {"S/a": "a", "S/c": "c"}
     document.edit(GroupBlocks(blocks=["a"], name="T"), ("S",))
     assert renamed_paths(after, document.diagram) == {"S/a": "S/T/a"}
+
+
+def test_blocks_that_are_cut_and_pasted_on_other_sheets_are_followed_also_by_undo() -> None:
+    """The view of a run that shows ``c`` follows it to a subsystem, to another one, and back."""
+    document = drawing()
+    document.edit(GroupBlocks(blocks=["a"], name="S"))
+    document.edit(GroupBlocks(blocks=["z"], name="T"))
+    shown, places = "c", ["c"]
+
+    def follow(step: Callable[[], object]) -> None:
+        nonlocal shown
+        before = document.diagram
+        step()
+        shown = path_after(shown, document.renamed(before))
+
+    def move(name: str, source: tuple[str, ...], target: tuple[str, ...], new_name: str) -> None:
+        text = clipped(inside(document.diagram, source), [name], [], load_robot)
+        follow(lambda: document.edit(RemoveBlocks(blocks=[name]), source))
+        follow(lambda: document.edit(PasteBlocks(text=text, names={name: new_name}), target))
+        places.append(shown)
+
+    move("c", (), ("S",), "c 2")
+    move("c 2", ("S",), ("T",), "c")
+    assert places == ["c", "S/c 2", "T/c"]
+    names = PathNames()
+    names.rename({"c": "S/c 2"})
+    names.rename({"S/c 2": "c"})
+    names.rename({"S/c 2": "T/c", "c": "T/c"})
+    assert names.original("T/c.gain") == "c.gain"
+    for expected in ("c", "S/c 2", "c", "c"):
+        follow(document.undo)
+        assert shown == expected
+    for _ in range(4):
+        follow(document.redo)
+    assert shown == "T/c"
+    # A copy is another block, and so is an equal block that is added later.
+    text = clipped(inside(document.diagram, ("T",)), ["c"], [], load_robot)
+    follow(lambda: document.edit(PasteBlocks(text=text, names={"c": "copy"})))
+    assert shown == "T/c"
 
 
 def test_paths_follow_renames_forward_and_back() -> None:

@@ -10,12 +10,18 @@ from armblocks.formats.data_files import DataFiles
 from armblocks.studio.documents.aspects import Aspect, changed_aspects
 from armblocks.studio.documents.edited import Edited, Outcome
 from armblocks.studio.protocol.messages.documents import Change
-from armblocks.studio.protocol.messages.sheet_edits import DiagramEdit, ModelEdit
+from armblocks.studio.protocol.messages.sheet_edits import (
+    DiagramEdit,
+    ModelEdit,
+    PasteBlocks,
+    RemoveBlocks,
+)
 from armblocks.studio.sheet.clipping import ReadDiagram, reader
 from armblocks.studio.sheet.edits import EDITS, EditContext
 from armblocks.studio.sheet.nesting import check_editable, inside, with_inside
 from armblocks.studio.sheet.parameter_sets import with_consistent_sets
 from armblocks.studio.sheet.parameter_values import ResolveRobot
+from armblocks.studio.sheet.renames import MovedBlocks
 from armblocks.studio.sheet.scope_triggers import with_consistent_trigger
 
 
@@ -36,6 +42,7 @@ class Document(Edited[Diagram]):
         data: DataFiles | None = None,
     ) -> None:
         super().__init__(diagram, version=version)
+        self._moved = MovedBlocks()
         self._context = EditContext(resolve_robot, read_diagram or reader(resolve_robot), data)
 
     @property
@@ -70,7 +77,20 @@ class Document(Edited[Diagram]):
         sheet = EDITS.applied(edit, inside(self.diagram, request.inside), self._context)
         after = with_inside(self.diagram, request.inside, sheet)
         after = with_consistent_sets(self.diagram, after, edit, request.inside)
-        return Outcome(title, with_consistent_trigger(self.diagram, after), request.gesture)
+        prefix = "".join(f"{name}/" for name in request.inside)
+        if isinstance(edit, RemoveBlocks):
+            self._moved.remove(inside(self.diagram, request.inside), sheet, prefix)
+        elif isinstance(edit, PasteBlocks):
+            old_names = {new: old for old, new in edit.names.items()}
+            added = sheet.blocks.keys() - inside(self.diagram, request.inside).blocks.keys()
+            names = {old_names.get(name, name): name for name in sorted(added)}
+            self._moved.paste(names, after, sheet, prefix)
+        after = with_consistent_trigger(after, self._moved.renamed(self.diagram, after))
+        return Outcome(title, after, request.gesture)
+
+    def renamed(self, before: Diagram) -> dict[str, str]:
+        """Return the paths of the blocks that the last step has renamed or moved: old path to new path."""
+        return self._moved.renamed(before, self.diagram)
 
     def aspects(self, before: Diagram, after: Diagram) -> set[Aspect]:
         """Return the aspects in which two diagrams differ."""

@@ -119,7 +119,7 @@ class DiagramPresenter(Presenter[OpenDocument]):
             settings=dataclasses.asdict(diagram.settings),
             scope_trigger=trigger_settings(diagram),
             outer_comment=outer_comment(diagram, place),
-            renamed=renamed_paths(before, diagram),
+            renamed=open_file.document.renamed(before),
         )
 
     def place_after(self, open_file: OpenDocument, before: Diagram, place: Place) -> Place:
@@ -135,7 +135,7 @@ class DiagramPresenter(Presenter[OpenDocument]):
 
     async def on_edited(self, open_file: OpenDocument, before: Diagram) -> None:
         """Notify the run of the diagram about renamed blocks, and start the background check."""
-        if renamed := renamed_paths(before, open_file.document.diagram):
+        if renamed := open_file.document.renamed(before):
             await self._runs.rename(open_file.key, renamed)
         self.on_changed(open_file)
 

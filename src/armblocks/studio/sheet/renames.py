@@ -1,4 +1,7 @@
-"""Blocks that an edit, an undo or a redo has renamed, for views that identify blocks by their paths."""
+"""Blocks that an edit, an undo or a redo has renamed, for views that identify blocks by their paths.
+
+A block that is cut and pasted on another sheet of its diagram is renamed, too: see :class:`MovedBlocks`.
+"""
 
 from __future__ import annotations
 
@@ -64,6 +67,57 @@ def path_after(path: str, renamed: Mapping[str, str]) -> str:
         if path == old or path.startswith((f"{old}/", f"{old}.")):
             return new + path.removeprefix(old)
     return path
+
+
+class MovedBlocks:
+    """The blocks of a diagram that were removed from one sheet and pasted on another one."""
+
+    def __init__(self) -> None:
+        self._removed: dict[str, Block] = {}
+        self._moves: list[tuple[str, str]] = []
+
+    def remove(self, before: Diagram, after: Diagram, path: str) -> None:
+        """Store the blocks that an edit has removed from a sheet; ``path`` is its prefix, ``"a/b/"``."""
+        for name in before.blocks.keys() - after.blocks.keys():
+            self._removed.pop(path + name, None)
+            self._removed[path + name] = before.blocks[name]
+
+    def paste(self, names: Mapping[str, str], after: Diagram, sheet: Diagram, path: str) -> None:
+        """Find the removed blocks among pasted ones: the same block under its old name.
+
+        ``names`` are the old and new names, ``sheet`` is the sheet after the edit, at the prefix ``path``.
+        """
+        for old_name, new_name in names.items():
+            new = path + new_name
+            for old, block in reversed(self._removed.items()):
+                is_same = old.rpartition("/")[2] == old_name and block == sheet.blocks.get(new_name)
+                if is_same and old != new and not _exists(after, old):
+                    del self._removed[old]
+                    earlier_paths = [first for first, last in self._moves if last == old]
+                    self._moves += [(one, new) for one in (old, *earlier_paths)]
+                    break
+
+    def renamed(self, before: Diagram, after: Diagram) -> dict[str, str]:
+        """Return the paths of renamed and of moved blocks: old path to new path."""
+        if before is after:
+            return {}
+        renamed = renamed_paths(before, after)
+        for old, new in () if renamed else self._moves:
+            had, has = _exists(before, new), _exists(after, new)
+            if has and not had and not _exists(after, old):
+                renamed[old] = new
+            elif had and not has and not _exists(before, old):
+                renamed[new] = old
+        return renamed
+
+
+def _exists(diagram: Diagram, path: str) -> bool:
+    """Whether a diagram has a block at a path."""
+    first, _, rest = path.partition("/")
+    block = diagram.blocks.get(first)
+    if block is None or not rest:
+        return block is not None
+    return isinstance(block, DiagramBlock) and _exists(block.diagram, rest)
 
 
 class PathNames:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 
 from armblocks.diagram import Diagram, ScopeTrigger
 from armblocks.studio.protocol.messages.sheet_edits import ScopeTriggerSettings, SetScopeTrigger
-from armblocks.studio.sheet.renames import path_after, renamed_paths
+from armblocks.studio.sheet.renames import path_after
 
 
 def with_trigger(edit: SetScopeTrigger, diagram: Diagram, _context: object) -> Diagram:
@@ -21,12 +22,9 @@ def trigger_settings(diagram: Diagram) -> ScopeTriggerSettings | None:
     return ScopeTriggerSettings(**dataclasses.asdict(trigger)) if trigger else None
 
 
-def with_consistent_trigger(before: Diagram, after: Diagram) -> Diagram:
-    """Return the diagram after an edit; the signal of its trigger has the new name of a renamed block."""
-    trigger = after.scope_trigger
-    if trigger is None:
-        return after
-    signal = path_after(trigger.signal, renamed_paths(before, after))
-    if signal == trigger.signal:
-        return after
-    return dataclasses.replace(after, scope_trigger=dataclasses.replace(trigger, signal=signal))
+def with_consistent_trigger(diagram: Diagram, renamed: Mapping[str, str]) -> Diagram:
+    """Return the diagram with the signal of its trigger under the new path of a renamed block."""
+    trigger = diagram.scope_trigger
+    if trigger is None or (signal := path_after(trigger.signal, renamed)) == trigger.signal:
+        return diagram
+    return dataclasses.replace(diagram, scope_trigger=dataclasses.replace(trigger, signal=signal))
