@@ -11,14 +11,21 @@ from numpy.typing import NDArray
 
 from armblocks.argument_errors import ArgumentErrors
 from armblocks.diagram import Diagram
-from armblocks.errors import InputError, UnknownNameError, counted, shortened_list
-from armblocks.estimation.student_t import t_factor
-from armblocks.face.identification_result import with_gaps
+from armblocks.errors import counted, shortened_list
+from armblocks.face.estimates import (
+    Comparison,
+    cell,
+    comparison_chart,
+    confidence_intervals,
+    correlations,
+    standard_errors,
+    summary_line,
+    value_of,
+)
 from armblocks.face.trajectory_report import save_picture, text_table
 from armblocks.pictures.numbers import table_number
 from armblocks.pictures.picture import Picture
 from armblocks.pictures.style import FIGURE_WIDTH
-from armblocks.report.charts.time_chart import Panel, Trace, time_chart
 
 Array = NDArray[np.float64]
 
@@ -84,14 +91,12 @@ class FitResult(metaclass=ArgumentErrors):
 
     def __getitem__(self, parameter: str) -> float:
         """The value of a parameter. Raises UnknownNameError."""
-        if parameter not in self.parameters:
-            raise UnknownNameError("fitted parameter", parameter, self.parameters, where=self.diagram.name)
-        return float(self.values[self.parameters.index(parameter)])
+        return value_of(parameter, self.parameters, self.values, "fitted parameter", self.diagram.name)
 
     @property
     def standard_errors(self) -> Array:
         """The standard errors (k,); NaN for parameters that the measurements do not determine."""
-        return np.sqrt(np.diag(self.covariance))
+        return standard_errors(self.covariance)
 
     @property
     def not_identified(self) -> tuple[str, ...]:
@@ -110,8 +115,7 @@ class FitResult(metaclass=ArgumentErrors):
     @property
     def correlation(self) -> Array:
         """The correlations (k, k) of the estimates."""
-        errors = self.standard_errors
-        return self.covariance / np.outer(errors, errors)
+        return correlations(self.covariance)
 
     def confidence_intervals(self, level: float = 0.95) -> Array:
         """Lower and upper ends (k, 2) of the intervals that contain each parameter with this probability.
@@ -119,15 +123,7 @@ class FitResult(metaclass=ArgumentErrors):
         They are valid for independent, normally distributed noise, and where the signals are nearly linear in
         the parameters within the intervals.
         """
-        if not 0.0 < level < 1.0:
-            raise InputError(
-                f"level = {level!r}",
-                where="confidence_intervals",
-                allowed="a probability between 0 and 1",
-                fix="use 0.95",
-            )
-        half = t_factor(level, float(max(self.degrees_of_freedom, 1))) * self.standard_errors
-        return np.stack([self.values - half, self.values + half], axis=1)
+        return confidence_intervals(self.values, self.covariance, self.degrees_of_freedom, level)
 
     def table(self) -> list[dict[str, float | str]]:
         """One row for each parameter."""
@@ -175,23 +171,18 @@ class FitResult(metaclass=ArgumentErrors):
         """Measured and fitted signals over time, one panel for each signal; experiments in sequence."""
         names = list(dict.fromkeys(signal.name for signal in self.signals))[:_MOST_PANELS]
         units = {signal.name: signal.unit for signal in self.signals}
-        panels: list[Panel] = []
-        time, breaks = with_gaps(np.concatenate(list(self._times.values())))
-        for name in names:
-            values = [self._series(name, line) for line in ("measured", "fitted", "residuals")]
-            values = [np.insert(value, breaks, np.nan) if len(breaks) else value for value in values]
-            traces = tuple(
-                Trace(label=label, values=value, index=k)
-                for k, (label, value) in enumerate(zip(("measured", "fitted", "residual"), values))
+        rows = [
+            Comparison(
+                quantity=name,
+                unit=units[name],
+                measured=self._series(name, "measured"),
+                fitted=self._series(name, "fitted"),
             )
-            panels.append(Panel(quantity=name, unit=units[name], traces=traces))
-        return time_chart(
-            time,
-            panels,
-            title=f"Fit of {self.diagram.name}",
-            description="Measured and fitted signals and their differences.",
-            width=width,
-        )
+            for name in names
+        ]
+        description = "Measured and fitted signals and their differences."
+        time = np.concatenate(list(self._times.values()))
+        return comparison_chart(time, rows, f"Fit of {self.diagram.name}", description, width)
 
     @property
     def _times(self) -> dict[int, Array]:
@@ -218,7 +209,7 @@ class FitResult(metaclass=ArgumentErrors):
     def __str__(self) -> str:
         names = ("value", "standard error", "lower 95 %", "upper 95 %", "start")
         heads = ["parameter", *names]
-        rows = [[str(row["parameter"]), *(_cell(row[name]) for name in names)] for row in self.table()]
+        rows = [[str(row["parameter"]), *(cell(row[name], 5) for name in names)] for row in self.table()]
         evaluations = counted(self.evaluations, "evaluation")
         lines = [f"{self.diagram.name}: {self.message} after {evaluations}", *text_table(heads, rows), ""]
         signal_rows = [
@@ -231,13 +222,9 @@ class FitResult(metaclass=ArgumentErrors):
             for signal in self.signals
         ]
         lines += text_table(["signal", "noise", "unit", "explained"], signal_rows)
-        lines += ["", f"condition number {self.condition:.4g}, {self.degrees_of_freedom} degrees of freedom"]
+        lines += ["", summary_line(self.condition, self.degrees_of_freedom)]
         return "\n".join([*lines, *self.findings])
 
     @property
     def _several(self) -> bool:
         return any(signal.experiment > 1 for signal in self.signals)
-
-
-def _cell(value: float | str) -> str:
-    return table_number(value, 5) if isinstance(value, float) and np.isfinite(value) else ""

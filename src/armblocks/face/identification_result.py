@@ -10,14 +10,22 @@ from numpy.typing import NDArray
 
 from armblocks.argument_errors import ArgumentErrors
 from armblocks.errors import InputError, UnknownNameError, counted, shortened_list
-from armblocks.estimation.student_t import t_factor
 from armblocks.face.arm import Arm
+from armblocks.face.estimates import (
+    Comparison,
+    cell,
+    comparison_chart,
+    confidence_intervals,
+    correlations,
+    standard_errors,
+    summary_line,
+    value_of,
+)
 from armblocks.face.joint_log import LogSource, prepared, read_logs
 from armblocks.face.trajectory_report import save_picture, text_table
 from armblocks.pictures.numbers import table_number
 from armblocks.pictures.picture import Picture
 from armblocks.pictures.style import FIGURE_WIDTH
-from armblocks.report.charts.time_chart import Panel, Trace, time_chart
 from armblocks.robot import Robot
 
 Array = NDArray[np.float64]
@@ -84,7 +92,7 @@ class IdentificationResult(metaclass=ArgumentErrors):
     @property
     def standard_errors(self) -> Array:
         """The standard errors (b,) of the values; NaN for parameters that are not identified."""
-        return np.sqrt(np.diag(self.covariance))
+        return standard_errors(self.covariance)
 
     @property
     def not_identified(self) -> tuple[str, ...]:
@@ -98,9 +106,7 @@ class IdentificationResult(metaclass=ArgumentErrors):
 
     def __getitem__(self, parameter: str) -> float:
         """The value of a base parameter. Raises UnknownNameError."""
-        if parameter not in self.parameters:
-            raise UnknownNameError("base parameter", parameter, self.parameters, where=self.name)
-        return float(self.values[self.parameters.index(parameter)])
+        return value_of(parameter, self.parameters, self.values, "base parameter", self.name)
 
     @property
     def arm(self) -> Arm:
@@ -121,23 +127,14 @@ class IdentificationResult(metaclass=ArgumentErrors):
     @property
     def correlation(self) -> Array:
         """The correlations (b, b) of the estimates; NaN for parameters that are not identified."""
-        errors = self.standard_errors
-        return self.covariance / np.outer(errors, errors)
+        return correlations(self.covariance)
 
     def confidence_intervals(self, level: float = 0.95) -> Array:
         """Lower and upper ends (b, 2) of the intervals that contain each parameter with this probability.
 
         They are valid for independent, normally distributed noise of the torques and an exact motion.
         """
-        if not 0.0 < level < 1.0:
-            raise InputError(
-                f"level = {level!r}",
-                where="confidence_intervals",
-                allowed="a probability between 0 and 1",
-                fix="use 0.95",
-            )
-        half = t_factor(level, float(self.degrees_of_freedom)) * self.standard_errors
-        return np.stack([self.values - half, self.values + half], axis=1)
+        return confidence_intervals(self.values, self.covariance, self.degrees_of_freedom, level)
 
     def validate(self, data: LogSource, *, cutoff: float | None = None) -> Array:
         """Root mean square (n,) of measured minus computed torques of ``robot`` for other logs, N m or N.
@@ -184,25 +181,18 @@ class IdentificationResult(metaclass=ArgumentErrors):
             if joint not in self.joints:
                 raise UnknownNameError("joint", joint, self.joints, where="IdentificationResult.picture")
         shown = [j for j, joint in enumerate(self.joints) if not joints or joint in joints]
-        panels: list[Panel] = []
-        time, breaks = with_gaps(self.time)
-        for j in shown:
-            traces = (
-                Trace(label="measured", values=_with_breaks(self.tau[:, j], breaks), index=0),
-                Trace(label="fitted", values=_with_breaks(self.fitted[:, j], breaks), index=1),
-                Trace(label="residual", values=_with_breaks(self.residuals[:, j], breaks), index=2),
+        rows = [
+            Comparison(
+                quantity=f"{'Force' if self.joint_units[j] == 'N' else 'Torque'} of {self.joints[j]}",
+                unit=self.joint_units[j],
+                measured=self.tau[:, j],
+                fitted=self.fitted[:, j],
             )
-            quantity = "Force" if self.joint_units[j] == "N" else "Torque"
-            panels.append(
-                Panel(quantity=f"{quantity} of {self.joints[j]}", unit=self.joint_units[j], traces=traces)
-            )
-        return time_chart(
-            time,
-            panels,
-            title=f"Identification of {self.name}: torques",
-            description="Measured and fitted joint torques and their differences.",
-            width=width,
-        )
+            for j in shown
+        ]
+        title = f"Identification of {self.name}: torques"
+        description = "Measured and fitted joint torques and their differences."
+        return comparison_chart(self.time, rows, title, description, width)
 
     def plot(self, *, save: str | PathLike[str] | None = None) -> Picture:
         """The picture of torques and residuals; ``save``: the ``.svg`` or ``.png`` file to write."""
@@ -222,7 +212,7 @@ class IdentificationResult(metaclass=ArgumentErrors):
         rows = [
             [
                 str(row["parameter"]),
-                *(_cell(row[name]) for name in ("value", "standard error", "%", "description")),
+                *(cell(row[name], 4) for name in ("value", "standard error", "%", "description")),
                 str(row["unit"]),
                 _shortened(str(row["sum"])),
             ]
@@ -235,7 +225,7 @@ class IdentificationResult(metaclass=ArgumentErrors):
             for j, joint in enumerate(self.joints)
         ]
         lines += text_table(["joint", "noise", "unit", "of torque"], joint_rows)
-        lines += ["", f"condition number {self.condition:.4g}, {self.degrees_of_freedom} degrees of freedom"]
+        lines += ["", summary_line(self.condition, self.degrees_of_freedom)]
         lines += self.findings
         return "\n".join(lines)
 
@@ -285,27 +275,6 @@ def lag_correlations(time: Array, residuals: Array) -> Array:
         square = float(before[:, j] @ before[:, j])
         correlations[j] = float(before[:, j] @ after[:, j]) / square if square > 0.0 else 0.0
     return correlations
-
-
-def with_gaps(time: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Times for a chart: later experiments follow the earlier ones; and where lines are interrupted."""
-    steps = np.diff(time)
-    usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 1.0
-    restart = np.flatnonzero(steps <= 0.0)
-    shifted = time.copy()
-    for k in restart.tolist():
-        shifted[k + 1 :] += shifted[k] - time[k + 1] + usual
-    gaps = np.flatnonzero(np.diff(shifted) > 3.0 * usual)
-    breaks = np.union1d(restart, gaps) + 1
-    return np.insert(shifted, breaks, shifted[breaks - 1] if len(breaks) else []), breaks
-
-
-def _with_breaks(values: Array, breaks: NDArray[np.intp]) -> Array:
-    return np.insert(values, breaks, np.nan) if len(breaks) else values
-
-
-def _cell(value: float | str) -> str:
-    return table_number(value, 4) if isinstance(value, float) and np.isfinite(value) else ""
 
 
 def _shortened(text: str) -> str:
