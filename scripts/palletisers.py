@@ -15,7 +15,7 @@ import numpy as np
 
 from armblocks.files import write_atomically
 from armblocks.formats.canonical_json import canonical_bytes
-from armblocks.formats.robot_json import robot_to_json
+from armblocks.formats.robot_json import is_one_line, robot_to_json
 from armblocks.robot import JointLimits, Link, Robot
 from armblocks.robot.palletiser import LEVER, TRIANGLE, AxisConvention, Masses, palletiser
 
@@ -125,7 +125,7 @@ class Arm:
             **({"checked": self.checked} if self.checked else {}),
         }
         document = {**robot_to_json(self.robot), "facts": facts, "notes": self.notes}
-        return canonical_bytes(document, one_line=lambda path: path[-1:] == ("position",))
+        return canonical_bytes(document, one_line=is_one_line)
 
 
 MODEL_NAME = "The payload follows from the model's name."

@@ -85,6 +85,7 @@ def print_robot(robot: Robot, console: Console) -> None:
         note = f"Motors, before the gear (friction model: {robot.friction_model.value})"
         _print_links(robot, console, note, _MOTORS)
     _print_limits(robot, console)
+    _print_configurations(robot, console)
     _print_constraints(robot, console)
     _print_springs(robot, console)
     _print_named_frames(robot, console)
@@ -275,6 +276,18 @@ def _print_limits(robot: Robot, console: Console) -> None:
     console.print()
     console.print("Limits", style=STRONG)
     console.print(shown)
+
+
+def _print_configurations(robot: Robot, console: Console) -> None:
+    """Print the named configurations, angles in degrees."""
+    if not robot.configurations:
+        return
+    from armblocks.robot.dh_table import configuration_lines
+
+    console.print()
+    console.print("Configurations", style=STRONG)
+    for line in configuration_lines(robot):
+        console.print(line, highlight=False, markup=False)
 
 
 def _print_frames(robot: Robot, console: Console) -> None:

@@ -30,8 +30,8 @@ from armblocks.face.ikine_branches import IkineBranches
 from armblocks.face.ikine_result import IkineResult
 from armblocks.face.native_functions import NativeFunctions
 from armblocks.face.parametric import ParametricArm
-from armblocks.robot import FrictionModel, Link, Robot
-from armblocks.robot.dh_table import kinematics_text
+from armblocks.robot import Configurations, FrictionModel, Link, Robot
+from armblocks.robot.dh_table import configuration_lines, kinematics_text
 from armblocks.robot.fields import check_kind
 
 if TYPE_CHECKING:
@@ -98,6 +98,18 @@ class Arm(NativeFunctions):
     def nv(self) -> int:
         """Number of joint speeds, ``n``."""
         return self.robot.nv
+
+    @property
+    def q(self) -> Configurations:
+        """The named configurations: ``arm.fkine(arm.q["ready"])``. Each access is a new array (nq,)."""
+        return self.robot.configurations
+
+    def with_configuration(self, name: str, q: ArrayLike) -> Arm:
+        """The arm with the named configuration ``q`` (nq,), rad or m, which replaces one of this name.
+
+        ``arm.robot`` has it for files. Raises RobotError for another number of coordinates and for NaN.
+        """
+        return Arm(self.robot.with_configuration(name, q), self._near)
 
     def neutral(self) -> Array:
         """The coordinates q (nq,) without joint motion: 0, and the quaternion 1 0 0 0 of a ball joint."""
@@ -345,8 +357,8 @@ class Arm(NativeFunctions):
         return f"<Arm {self.name}: {counted(len(self.robot.joints), 'joint')} {self.robot.joint_letters}>"
 
     def __str__(self) -> str:
-        """The text for ``print``: the D-H table, or a table of links and joints."""
-        return f"{self!r}\n{kinematics_text(self.robot)}"
+        """The text for ``print``: the D-H table, or a table of links and joints; named configurations."""
+        return "\n".join([repr(self), kinematics_text(self.robot), *configuration_lines(self.robot)])
 
     def _repr_html_(self) -> str:
         """The notebook view: a picture of the arm with all joints at zero, and its table."""

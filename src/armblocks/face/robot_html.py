@@ -9,6 +9,7 @@ import numpy as np
 
 from armblocks.errors import counted
 from armblocks.robot import Link, Robot
+from armblocks.robot.dh_table import coordinate_text
 
 STYLE = """
 .ab-robot{font:13px/1.45 system-ui,-apple-system,"Segoe UI",Roboto,sans-serif;color:inherit}
@@ -20,6 +21,8 @@ STYLE = """
 .ab-robot th:first-child,.ab-robot td:first-child{text-align:left}
 """
 
+MAX_SHOWN = 20
+"""Maximum number of named configurations in a view."""
 HEADINGS = ("link", "joint", "α °", "a m", "θ °", "d m", "range", "speed", "mass kg", "G")
 
 
@@ -31,8 +34,21 @@ def robot_html(robot: Robot, picture_svg: str) -> str:
         f'<div class="ab-robot"><style>{STYLE}</style>{picture_svg}<div>'
         f"<h3>{escape(robot.name)}</h3><p>{counted(len(robot.joints), 'joint')} {robot.joint_letters}"
         f"{' · ' + escape(about) if about else ''}</p>"
-        f"<table>{_row('th', HEADINGS)}{rows}</table></div></div>"
+        f"<table>{_row('th', HEADINGS)}{rows}</table>{_configurations(robot)}</div></div>"
     )
+
+
+def _configurations(robot: Robot) -> str:
+    """A table of the named configurations, in degrees or m; at most ``MAX_SHOWN`` of them."""
+    entries = robot.configurations.entries
+    if not entries:
+        return ""
+    heads = ("configuration", *(entry.name for entry in robot.positions))
+    units = [entry.unit for entry in robot.positions]
+    rows = "".join(_row("td", (name, *map(coordinate_text, q, units))) for name, q in entries[:MAX_SHOWN])
+    more = len(entries) - MAX_SHOWN
+    note = f"<p>and {counted(more, 'other configuration')}</p>" if more > 0 else ""
+    return f'<table style="margin-top:12px">{_row("th", heads)}{rows}</table>{note}'
 
 
 def _row(kind: str, cells: Sequence[str]) -> str:

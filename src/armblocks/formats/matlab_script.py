@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.errors import warn
 from armblocks.robot import FrictionModel, Robot
+
+_CONFIGURATION = re.compile(r"q(?!d{1,2}$)(?!lim)(?!\w*deg)\w+")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,6 +39,9 @@ def read_script(
     the model of releases 9.5 to 10 for scripts of all releases: the formulas of older releases have wrong
     signs or powers of the gear ratio; :class:`armblocks.robot.FrictionModel` lists them. The sign of gravity
     is reversed, because the toolbox's vector points up. Links are named ``link1``, ``link2`` …
+
+    Vectors whose names begin with ``q``, such as ``qz`` and ``qn``, with one number for each joint of a robot
+    are its named configurations, except ``q``, ``qd``, ``qdd``, ``qlim`` and names with ``deg``.
 
     Raises ``FormatError`` with file, line and text at the first invalid or unsupported line. Issues a
     warning for lines that a printed page splits, which are joined.
@@ -62,8 +69,24 @@ def read_script(
     for variable, value in interpreter.variables.items():
         if isinstance(value, RobotRecord):
             robot = robot_from_record(value, friction_model)
+            robot = _with_configurations(robot, interpreter.variables)
             if robot not in robots.values():
                 robots[variable] = robot
         elif isinstance(value, np.ndarray | str):
             variables[variable] = value
     return Script(robots=robots, variables=variables)
+
+
+def _with_configurations(robot: Robot, variables: Mapping[str, object]) -> Robot:
+    """The robot with the configurations that a script defines as vectors such as ``qz``."""
+    matrices = {
+        name: cast("NDArray[np.float64]", value)
+        for name, value in variables.items()
+        if _CONFIGURATION.fullmatch(name) and isinstance(value, np.ndarray)
+    }
+    found = {
+        name: value.ravel()
+        for name, value in matrices.items()
+        if value.shape in ((1, robot.nq), (robot.nq, 1)) and np.isfinite(value).all()
+    }
+    return replace(robot, configurations=found) if found else robot

@@ -4,8 +4,8 @@ Angles may be texts such as ``"90 deg"``, and angular speeds such as ``"105 deg/
 where they have few digits and read back exactly. A link with a ``dh`` row takes its joint and transforms from
 it. Unknown keys are errors that suggest the nearest known key, because ignoring a misspelt key would give a
 wrong robot. ``notes`` is a comment; :mod:`armblocks.formats.robot_facts` reads ``facts``. Neither
-is preserved. ``poses`` are the taught poses of the studio (:mod:`armblocks.formats.robot_poses`), which are
-checked here and are not part of the ``Robot``.
+is preserved. ``configurations`` is a list of objects with ``name`` and ``q``, because keys are sorted; older
+files name it ``poses``.
 
 The JSON Schema is ``formats/schema/robot.schema.json``.
 """
@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import cast
 
@@ -22,12 +23,12 @@ import numpy as np
 from armblocks.errors import ArmblocksError, FormatError, RobotError, UnknownNameError, counted
 from armblocks.formats.canonical_json import canonical_bytes
 from armblocks.formats.constraint_json import constraint_from_json, part_to_json, spring_from_json
-from armblocks.formats.json_document import Node, closed_members, read_document
-from armblocks.formats.robot_facts import facts_from_json
-from armblocks.formats.robot_poses import MAX_BYTES, TaughtPose, poses_from_json, poses_to_json
+from armblocks.formats.json_document import KeyPath, Node, closed_members, read_document
+from armblocks.formats.robot_facts import MAX_BYTES, facts_from_json
 from armblocks.formats.shapes_json import shape_from_json, shape_to_json
 from armblocks.robot import (
     JOINT_TYPES,
+    Configuration,
     DhConvention,
     DhRow,
     FrictionModel,
@@ -60,6 +61,7 @@ _ROBOT_KEYS = (
     "constraints",
     "frames",
     "springs",
+    "configurations",
     "poses",
 )
 _MASS_KEYS = ("mass", "centre_of_mass", "inertia")
@@ -118,21 +120,23 @@ def robot_from_json(node: Node) -> Robot:
             frames=frames,
             springs=springs,
         )
+        if named := _configurations_from_json(members, robot):
+            robot = replace(robot, configurations=named)
     except (RobotError, UnknownNameError) as error:
         raise FormatError(
             f"{error.where}: {error.what}", where=node.where, allowed=error.allowed, fix=error.fix
         ) from error
-    if "poses" in members:
-        poses_from_json(members["poses"], robot.nq)
     return robot
 
 
-def write_robot(robot: Robot, poses: tuple[TaughtPose, ...] = ()) -> bytes:
-    """The canonical document of a robot and its taught poses. Reading it gives an equal robot."""
-    document = robot_to_json(robot)
-    if poses:
-        document["poses"] = poses_to_json(poses)
-    return canonical_bytes(document, one_line=lambda path: path[-1:] == ("position",))
+def write_robot(robot: Robot) -> bytes:
+    """The canonical document of a robot. Reading it gives an equal robot."""
+    return canonical_bytes(robot_to_json(robot), one_line=is_one_line)
+
+
+def is_one_line(path: KeyPath) -> bool:
+    """Whether a list of a robot document, with angles as texts, is written on one line."""
+    return path[-1:] in (("position",), ("q",))
 
 
 def robot_to_json(robot: Robot) -> dict[str, object]:
@@ -156,6 +160,10 @@ def robot_to_json(robot: Robot) -> dict[str, object]:
         document["frames"] = [_frame_to_json(frame) for frame in robot.frames]
     if robot.springs:
         document["springs"] = [part_to_json(spring, _transform_to_json) for spring in robot.springs]
+    if robot.configurations:
+        document["configurations"] = [
+            _configuration_to_json(entry, robot) for entry in robot.configurations.entries
+        ]
     return {key: _without_signed_zeros(value) for key, value in document.items()}
 
 
@@ -164,7 +172,33 @@ def _frame_to_json(frame: NamedFrame) -> dict[str, object]:
     return {"name": frame.name, "link": frame.link, **pose}
 
 
+def _configuration_to_json(configuration: Configuration, robot: Robot) -> dict[str, object]:
+    units = [entry.unit for entry in robot.positions]
+    q = [_angle_to_json(value) if unit == "rad" else value for value, unit in zip(configuration.q, units)]
+    return {"name": configuration.name, "q": q}
+
+
 # -- reading -----------------------------------------------------------------------------------------------
+
+
+def _configurations_from_json(members: Mapping[str, Node], robot: Robot) -> list[tuple[str, list[float]]]:
+    """The named configurations; ``poses`` is the name of the key in older files."""
+    keys = [key for key in ("configurations", "poses") if key in members]
+    if len(keys) > 1:
+        raise members["poses"].error(
+            "the file has both 'configurations' and 'poses', the older name of the same list",
+            allowed="one of them",
+            fix="move the entries of 'poses' to 'configurations'",
+        )
+    units = [entry.unit for entry in robot.positions]
+    found: list[tuple[str, list[float]]] = []
+    for element in members[keys[0]].elements() if keys else ():
+        entry = closed_members(element, ("name", "q"), required=("name", "q"))
+        numbers = entry["q"].elements()
+        angular = [unit == "rad" for unit in units] if len(numbers) == len(units) else [False] * len(numbers)
+        q = [_angle_from_json(n) if is_angle else n.number() for n, is_angle in zip(numbers, angular)]
+        found.append((entry["name"].text(), q))
+    return found
 
 
 def _frame_from_json(node: Node) -> NamedFrame:

@@ -9,6 +9,7 @@ from typing import Any
 from armblocks.formats.canonical_json import canonical_bytes
 from armblocks.formats.file_corrections import Change, Correction, are_degrees
 from armblocks.formats.file_findings import FileFinding
+from armblocks.formats.robot_json import is_one_line
 from armblocks.formats.robot_rules import IMPLAUSIBLE
 
 
@@ -32,6 +33,4 @@ def corrected_json(data: bytes, name: str, findings: Sequence[FileFinding]) -> C
         changes.append(Change(finding, f"limits {ends[0]:g} and {ends[1]:g} marked as degrees"))
     if not changes:
         return Correction(data)
-    return Correction(
-        canonical_bytes(document, one_line=lambda path: path[-1:] == ("position",)), tuple(changes)
-    )
+    return Correction(canonical_bytes(document, one_line=is_one_line), tuple(changes))

@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
-from armblocks.errors import FormatError, counted, warn
+from armblocks.errors import FormatError, counted, shortened_list, warn
 from armblocks.robot import Closure, Coupling, Joint, JointLimits, Link, PrescribedMotion, Robot, with_tip
 from armblocks.robot.shapes import Shape
 from armblocks.spatial import Transform
@@ -190,6 +190,14 @@ def quoted(name: str, robot: Robot) -> str:
             fix="rename the link",
         )
     return quoteattr(name)
+
+
+def warn_of_configurations(robot: Robot, format: str) -> None:
+    """Warn that a format has no element for named configurations."""
+    if robot.configurations:
+        count = counted(len(robot.configurations), "named configuration is", "named configurations are")
+        names = shortened_list(list(robot.configurations))
+        warn_of_loss(f"robot '{robot.name}'", f"{count} not part of the {format} file: {names}")
 
 
 def warn_of_loss(where: str, what: str) -> None:

@@ -1,5 +1,6 @@
 """Robot descriptions: immutable values, and their numbered form for algorithms."""
 
+from armblocks.robot.configurations import Configuration, Configurations
 from armblocks.robot.constraints import (
     CONSTRAINT_TYPES,
     Attachment,
@@ -52,6 +53,8 @@ __all__ = [
     "SPRING_TYPES",
     "Attachment",
     "Closure",
+    "Configuration",
+    "Configurations",
     "Constraint",
     "Coupling",
     "Cylindrical",

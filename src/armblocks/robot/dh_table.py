@@ -1,7 +1,8 @@
-"""The kinematics of a robot as a table of plain text."""
+"""The kinematics and the named configurations of a robot as tables of plain text."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from armblocks.robot.joints import Joint
@@ -58,3 +59,23 @@ def kinematics_text(robot: Robot) -> str:
         rows.append((link.name, link.parent or "(base)", kind, axis, f"{x:.5g}, {y:.5g}, {z:.5g}"))
     widths = [max(map(len, column)) for column in zip(*rows)]
     return "\n".join("  ".join(c.ljust(w) for c, w in zip(row, widths)).rstrip() for row in rows)
+
+
+def configuration_lines(robot: Robot) -> list[str]:
+    """A line for each named configuration, with angles in degrees and lengths in m, in aligned columns."""
+    units = [entry.unit for entry in robot.positions]
+    rows = [
+        [name, *(coordinate_text(value, unit) for value, unit in zip(q, units))]
+        for name, q in robot.configurations.entries
+    ]
+    widths = [max(map(len, column)) for column in zip(*rows)]
+    return [
+        "  ".join([row[0].ljust(widths[0]), *(cell.rjust(w) for cell, w in zip(row[1:], widths[1:]))])
+        for row in rows
+    ]
+
+
+def coordinate_text(value: float, unit: str) -> str:
+    """A coordinate with five digits: in degrees if the unit is rad, else with its unit."""
+    shown, mark = (math.degrees(value), "\N{DEGREE SIGN}") if unit == "rad" else (value, f" {unit}".rstrip())
+    return f"{shown + 0.0:.5g}{mark}"

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from armblocks.errors import warn
 from armblocks.robot.coupled_limits import common_range
+from armblocks.robot.dh_table import coordinate_text
 from armblocks.robot.joints import JointLimits
 from armblocks.robot.link import Link
 from armblocks.robot.robot import Robot
@@ -47,7 +48,7 @@ def plausibility_findings(robot: Robot) -> tuple[PlausibilityFinding, ...]:
 
     Findings are: limits of revolute joints beyond a full turn (degrees?), a reach beyond 20 m and inertias
     that are far too large for the robot's size (millimetres?), gravity that points upwards, limits of coupled
-    joints that :attr:`Robot.limits` cannot include.
+    joints that :attr:`Robot.limits` cannot include, named configurations outside the limits.
     """
     return tuple(_findings(robot))
 
@@ -82,6 +83,7 @@ def _findings(robot: Robot) -> Iterator[PlausibilityFinding]:
                     question="Is this in degrees? It is used as given.",
                 )
     yield from _limits_left_out(robot)
+    yield from _configurations_outside(robot)
     reach = max(_reaches(robot).values())
     if reach > MAX_REACH:
         yield PlausibilityFinding(
@@ -133,6 +135,31 @@ def _limits_left_out(robot: Robot) -> Iterator[PlausibilityFinding]:
                 what=f"its range from {low:g} to {high:g} has no common value with the range of joint "
                 f"'{names[k]}', on which it depends",
                 question="Is a sign of the coupling or of the range wrong? The range is not checked.",
+            )
+
+
+def _configurations_outside(robot: Robot) -> Iterator[PlausibilityFinding]:
+    """Named configurations outside the limits of the joints.
+
+    An angle that is within the limits after one full turn is the same pose, such as 180 degrees for joint 3
+    of the Puma 560 in its published configuration ``qn``.
+    """
+    if not robot.configurations.entries:
+        return
+    limits = robot.qlim.tolist()
+    coordinates = robot.positions
+    for name, q in robot.configurations.entries:
+        for value, (low, high), coordinate in zip(q, limits, coordinates):
+            margin = 1e-9 * max(1.0, abs(value))  # rounding errors of degrees
+            turns = (0.0, 2 * math.pi, -2 * math.pi) if coordinate.unit == "rad" else (0.0,)
+            if any(low - margin <= value + turn <= high + margin for turn in turns):
+                continue
+            texts = [coordinate_text(number, coordinate.unit) for number in (value, low, high)]
+            yield PlausibilityFinding(
+                robot=robot.name,
+                what=f"coordinate '{coordinate.name}' of the configuration '{name}' is {texts[0]}, outside "
+                f"its limits from {texts[1]} to {texts[2]}",
+                question="Is this in degrees, or are the limits too narrow? It is used as given.",
             )
 
 

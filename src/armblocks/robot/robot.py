@@ -6,12 +6,13 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from armblocks.argument_errors import ArgumentErrors
 from armblocks.errors import UnknownNameError
 from armblocks.lazy_exports import display_method
 from armblocks.robot.checks import check_robot
+from armblocks.robot.configurations import Configurations, configurations_of, of_tree
 from armblocks.robot.constraint_checks import check_constraints
 from armblocks.robot.constraints import Closure, Constraint, Coupling, PrescribedMotion
 from armblocks.robot.coordinate_map import CoordinateMap, coordinate_map, dependent_joints
@@ -38,15 +39,17 @@ class Robot(metaclass=ArgumentErrors):
     couplings of joints. ``frames``: named frames on the links, such as end effectors; each link's own frame
     has the name of the link. ``springs``: at joints and between two points. The joint coordinates q (nq,) and
     speeds qd (nv,) are in the order of the moving links. A joint has the name of its link.
+    ``configurations``: named coordinates, rad or m; also a mapping such as ``{"ready": (0.0, 1.5)}``. In a
+    copy with other links, by ``dataclasses.replace``, they follow the joints by name.
 
     Robots are values: two robots are equal and have the same hash if all their numbers and names are equal.
     ``source`` (the origin of the numbers) is not compared.
 
     Raises RobotError that names robot, link and field for no or too many links, names that occur twice,
     unknown or circular parents, numbers that are not finite, zero axes, reversed limits, a gear ratio of
-    zero, a negative mass, a D-H row that disagrees with the transforms. Warns if friction accelerates a
-    joint. Physically impossible inertias are accepted, because some published models have them;
-    :func:`armblocks.robot.inertia_findings` lists them.
+    zero, a negative mass, a D-H row that disagrees with the transforms, configurations of
+    another length. Warns if friction accelerates a joint. Physically impossible inertias are accepted,
+    because some published models have them; :func:`armblocks.robot.inertia_findings` lists them.
     """
 
     name: str
@@ -60,6 +63,7 @@ class Robot(metaclass=ArgumentErrors):
     constraints: tuple[Constraint, ...] = ()
     frames: tuple[NamedFrame, ...] = ()
     springs: tuple[Spring, ...] = ()
+    configurations: Configurations = field(default_factory=Configurations, repr=False)
     source: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
@@ -82,6 +86,9 @@ class Robot(metaclass=ArgumentErrors):
         check_springs(self.name, self.links, self.springs)
         if self.couplings:
             _ = self.coordinate_map  # raises RobotError for couplings that contradict each other
+        joints = {link.name: link.joint for link in self.moving_links}
+        named = configurations_of(self.configurations, joints, f"robot '{self.name}'")
+        object.__setattr__(self, "configurations", named)
 
     _repr_html_ = display_method("armblocks.face.notebook_views", "robot_view")
 
@@ -128,7 +135,8 @@ class Robot(metaclass=ArgumentErrors):
             for link in self.links
         )
         springs = tuple(spring.with_offsets(offsets) for spring in self.springs)
-        return replace(self, links=links, constraints=self.closures, springs=springs)
+        named = of_tree(self.configurations, self.coordinate_map)
+        return replace(self, links=links, constraints=self.closures, springs=springs, configurations=named)
 
     @cached_property
     def coordinate_map(self) -> CoordinateMap:
@@ -274,6 +282,10 @@ class Robot(metaclass=ArgumentErrors):
         """A copy with changed fields of the named link, given by name as for ``dataclasses.replace``."""
         changed = replace(self.link(name), **changes)  # pyright: ignore[reportArgumentType] - fields by name
         return replace(self, links=tuple(changed if link.name == name else link for link in self.links))
+
+    def with_configuration(self, name: str, q: ArrayLike) -> Robot:
+        """A copy with the named configuration ``q`` (nq,), rad or m, which replaces one of this name."""
+        return replace(self, configurations=self.configurations.with_entry(name, q))
 
     def with_friction_model(self, model: FrictionModel) -> Robot:
         """A copy with another friction formula."""

@@ -12,7 +12,8 @@ from armblocks.robot.robot import Robot
 def with_tip(robot: Robot, tip: str) -> Robot:
     """The robot with the link named ``tip`` as its last link; the other links keep their order.
 
-    If the joint of that link moves, its coordinate becomes the last one in q. Raises UnknownNameError.
+    If the joint of that link moves, its coordinate becomes the last one in q, also in named configurations.
+    Raises UnknownNameError.
     """
     last = robot.link(tip)
     return replace(robot, links=(*(link for link in robot.links if link is not last), last))

@@ -44,6 +44,9 @@ def test_the_tool_is_dragged_four_poses_are_recorded_and_the_motion_runs(page: P
     editor.get_by_text("Teach", exact=True).click()
     tool, poses, motion = (editor.get_by_role("region", name=name) for name in ("Tool", "Poses", "Motion"))
     record = poses.get_by_role("button", name="Record")
+    for name in ("qz", "qr", "qs", "qn"):  # the named configurations of the robot
+        poses.get_by_role("button", name=f"Delete {name}").click()
+    expect(poses.get_by_role("listitem")).to_have_count(0)
     for joint, angle in ((2, 60), (3, -165), (5, 45)):
         editor.get_by_role("textbox", name=f"q of link{joint} as a number").fill(str(angle))
     x, z = (tool.get_by_role("textbox", name=f"{axis} of the tool", exact=True) for axis in "xz")

@@ -216,7 +216,7 @@ def test_two_pages_show_each_other_s_edits(tmp_path: Path) -> None:
             pose = await client.ask("pose", document=key, q=[0.0] * 6)
             await client.ask("scene", document=key)
         assert other_received[-1]["state"]["version"] == 8
-        arm = ab.Arm(client.hub.documents[key].document.value.robot)
+        arm = ab.Arm(client.hub.documents[key].document.value)
         assert_allclose(pose, arm.link_poses([0.0] * 6), atol=1e-14)
         client.hub.remove_client(other)
         late: list[dict[str, Any]] = []

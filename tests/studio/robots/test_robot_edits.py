@@ -64,7 +64,7 @@ def test_angles_are_read_in_the_column_unit_or_in_their_own_unit(text: str, unit
 def test_the_tables_of_the_paper_can_be_typed_in() -> None:
     """From a new robot to the arm of the paper, cell by cell, with the texts of its script."""
     expected = load_robot("kr180")
-    robot = KIND.new().robot
+    robot = KIND.new()
     for _ in range(2):
         robot = edited(robot, "add_joint", after=robot.links[-1].name)
     for link, text in zip(
@@ -123,7 +123,7 @@ def test_cells_without_a_value_can_be_emptied() -> None:
     motor = typed(without_motors, name, "Jm", "2e-4").link(name).motor
     assert motor is not None
     assert (motor.inertia, motor.gear_ratio) == (2e-4, 1.0)
-    alone = typed(KIND.new().robot, "link1", "highest", "90").link("link1")
+    alone = typed(KIND.new(), "link1", "highest", "90").link("link1")
     assert alone.joint.limits.position == (-math.pi / 2, math.pi / 2)
 
 
@@ -188,7 +188,7 @@ def test_a_joint_changed_to_prismatic_loses_its_angular_limits() -> None:
 
 
 def test_dh_cells_are_locked_for_a_link_placed_by_a_transform() -> None:
-    robot = replace(KIND.new().robot, links=(Link(name="plain"), Link(name="next", parent="plain")))
+    robot = replace(KIND.new(), links=(Link(name="plain"), Link(name="next", parent="plain")))
     shown = robot_content(robot)
     assert "not by a D-H row" in shown.links[0].locked["alpha"]
     assert shown.convention == ""
@@ -208,7 +208,7 @@ def test_non_physical_values_are_marked_at_their_cells() -> None:
         bad = typed(robot, "link2", "Tc-", "0.1")
     findings_shown = robot_content(bad).findings
     assert [(f.link, f.columns) for f in findings_shown if "Friction" in f.what] == [("link2", ["Tc-"])]
-    one_link = replace(KIND.new().robot, links=(standard_dh("link1", a=1.0),))
+    one_link = replace(KIND.new(), links=(standard_dh("link1", a=1.0),))
     assert "The last joint has no inertia" in robot_content(one_link).findings[0].what
 
 

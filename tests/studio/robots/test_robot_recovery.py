@@ -17,7 +17,6 @@ from armblocks.studio.protocol.messages import documents as document_messages
 from armblocks.studio.protocol.messages.robot_edits import AddJoint, RenameLink, SetCell
 from armblocks.studio.protocol.messages.sheet_edits import ArrangeBlocks, Rename
 from armblocks.studio.robots.open_robots import OpenRobot
-from armblocks.studio.robots.taught_robot import TaughtRobot
 
 
 def content(open_file: OpenRobot) -> bytes:
@@ -202,7 +201,7 @@ def test_a_page_finds_its_robot_after_a_server_restart(disk: Disk) -> None:
 def test_a_dropped_robot_is_journaled_before_its_first_edit(disk: Disk, tmp_path: Path) -> None:
     async def scenario() -> None:
         robots = disk.robots()
-        open_file = robots.open_value(TaughtRobot(robot=load_robot("kr180")))
+        open_file = robots.open_value(load_robot("kr180"))
         assert open_file.document.dirty
         with pytest.raises(InputError, match="has unsaved edits"):
             robots.close(open_file, discard=False)

@@ -16,9 +16,10 @@ from pydantic import ValidationError
 from test_robot_documents import Client, run_scenario
 
 import armblocks as ab
-from armblocks.errors import ArmblocksError, FormatError, InputError, UnknownNameError
-from armblocks.formats import load_robot, read_robots, write_robot
-from armblocks.formats.robot_poses import MAX_POSES, TaughtPose, read_poses
+from armblocks.errors import ArmblocksError, InputError, RobotError, UnknownNameError
+from armblocks.formats import load_robot
+from armblocks.robot import Configuration, Robot
+from armblocks.robot.configurations import MAX_CONFIGURATIONS
 from armblocks.spatial import Transform, trotx, trotz
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol.messages import pose_edits
@@ -32,13 +33,11 @@ from armblocks.studio.protocol.messages.robot_edits import (
 )
 from armblocks.studio.protocol.messages.teaching import AskMotion
 from armblocks.studio.robots.document import RobotDocument
-from armblocks.studio.robots.edits import ROBOT_EDITS
 from armblocks.studio.robots.motions import plan, planned_motion, workspace
 from armblocks.studio.robots.open_robots import OpenRobot
 from armblocks.studio.robots.pose_edits import POSE_EDITS
 from armblocks.studio.robots.reaching import FARTHEST, followed_directions, reached
 from armblocks.studio.robots.robot_kind import RobotKind
-from armblocks.studio.robots.taught_robot import TaughtRobot
 
 Q = [0.1, 1.0, -2.9, 0.2, 0.8, 0.1]
 KIND = RobotKind(ProjectFolder("."))
@@ -55,8 +54,8 @@ def kuka() -> ab.Arm:
     return ab.load_robot("panda")
 
 
-def taught(arm: ab.Arm, *rows: Any) -> tuple[TaughtPose, ...]:
-    return tuple(TaughtPose(name=f"P{k}", q=tuple(map(float, q))) for k, q in enumerate(rows, start=1))
+def taught(arm: ab.Arm, *rows: Any) -> tuple[Configuration, ...]:
+    return tuple(Configuration(f"P{k}", tuple(map(float, q))) for k, q in enumerate(rows, start=1))
 
 
 # -- the dragged tool ----------------------------------------------------------------------------------------
@@ -166,12 +165,17 @@ def change(document: RobotDocument, edit: Any) -> None:
     document.perform(Change(document="d", edit=edit))
 
 
+def bare(robot: Robot, **configurations: Any) -> Robot:
+    """A robot with these configurations instead of its own."""
+    return replace(robot, configurations=configurations)
+
+
 def names(document: RobotDocument) -> list[str]:
-    return [pose.name for pose in document.value.poses]
+    return list(document.value.configurations)
 
 
 def test_poses_are_recorded_named_moved_updated_removed_and_undone() -> None:
-    document = RobotDocument(TaughtRobot(robot=load_robot("puma560")))
+    document = RobotDocument(bare(load_robot("puma560")))
     for k in range(3):
         change(document, pose_edits.RecordPose(q=[0.1 * k] * 6))
     change(document, pose_edits.RenamePose(name="P2", to=" above "))
@@ -181,7 +185,7 @@ def test_poses_are_recorded_named_moved_updated_removed_and_undone() -> None:
     change(document, pose_edits.UpdatePose(name="above", q=[2.0] * 6))
     change(document, pose_edits.RemovePose(name="P1"))
     assert names(document) == ["P3", "P2", "above"]
-    assert document.value.poses[2].q == (2.0,) * 6
+    assert document.value.configurations.entries[2].q == (2.0,) * 6
     assert document.undo_title == "remove P1"
     files: list[str] = []
     while document.undo_title:
@@ -197,26 +201,28 @@ def test_poses_are_recorded_named_moved_updated_removed_and_undone() -> None:
 @pytest.mark.parametrize(
     ("edit", "words"),
     [
-        (pose_edits.RecordPose(q=[0.0]), "the pose 'P2' has 1 coordinate"),
-        (pose_edits.RecordPose(q=[0.0] * 6, name="P1"), "the name 'P1' of a pose is empty or used twice"),
-        (pose_edits.RenamePose(name="P1", to=" "), "the name '' of a pose is empty or used twice"),
+        (pose_edits.RecordPose(q=[0.0]), "configuration 'P2': it has 1 coordinate. Allowed: 6"),
+        (pose_edits.RecordPose(q=[0.0] * 6, name="P1"), "two configurations are named 'P1'"),
+        (pose_edits.RenamePose(name="P1", to=" "), "'' is not a name of a configuration"),
         (pose_edits.MovePose(name="P1", by=1), "there is no pose on that side"),
         (pose_edits.RemovePose(name="P9"), "there is no pose named 'P9'"),
     ],
 )
 def test_edits_that_give_invalid_poses_are_refused(edit: Any, words: str) -> None:
-    value = TaughtRobot(robot=load_robot("puma560"), poses=(TaughtPose(name="P1", q=(0.0,) * 6),))
-    with pytest.raises((InputError, UnknownNameError), match=words):
+    value = bare(load_robot("puma560"), P1=(0.0,) * 6)
+    with pytest.raises((InputError, RobotError, UnknownNameError), match=words):
         POSE_EDITS.applied(edit, value)
-    many = tuple(TaughtPose(name=str(k), q=(0.0,) * 6) for k in range(MAX_POSES))
-    with pytest.raises(InputError, match="there are 1001 poses"):
-        POSE_EDITS.applied(pose_edits.RecordPose(q=[0.0] * 6), replace(value, poses=many))
+
+
+def test_a_robot_has_at_most_1000_configurations() -> None:
+    many = bare(load_robot("puma560"), **{str(k): (0.0,) * 6 for k in range(MAX_CONFIGURATIONS)})
+    with pytest.raises(RobotError, match="there are 1001 named configurations"):
+        POSE_EDITS.applied(pose_edits.RecordPose(q=[0.0] * 6), many)
 
 
 def test_poses_follow_the_joints_of_an_edited_robot() -> None:
-    robot = load_robot("puma560")
+    robot = bare(load_robot("puma560"), P1=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
     first = robot.joint_names[0]
-    value = TaughtRobot(robot=robot, poses=(TaughtPose(name="P1", q=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)),))
     expected: list[tuple[Any, tuple[float, ...]]] = [
         (AddJoint(after=first), (1.0, 0.0, 2.0, 3.0, 4.0, 5.0, 6.0)),
         (RemoveJoint(link=robot.joint_names[1]), (1.0, 3.0, 4.0, 5.0, 6.0)),
@@ -228,30 +234,18 @@ def test_poses_follow_the_joints_of_an_edited_robot() -> None:
         ),
     ]
     for edit, q in expected:
-        after = value.with_robot(ROBOT_EDITS.applied(edit, robot))
-        assert after.poses[0].q == q
-        assert len(q) == after.robot.nq
-
-
-def test_poses_are_saved_with_the_robot_and_not_part_of_it() -> None:
-    robot = load_robot("puma560")
-    poses = (TaughtPose(name="home", q=(0.1, 0.2, 1 / 3, -0.0, 5.0, 6.0)),)
-    data = write_robot(robot, poses)
-    assert read_poses(data, "arm.json", 6) == poses
-    assert list(read_robots(data, "arm.json").values()) == [robot]
-    for wrong, words in (
-        (b'"q": [0.1]', "the pose 'home' has 1 coordinate"),
-        (b'"q": ["a"]', "expected a number|not a number|number"),
-    ):
-        broken = data[: data.index(b'"q": [')] + wrong + data[data.index(b"]", data.index(b'"q": [')) + 1 :]
-        with pytest.raises(FormatError, match=words):
-            read_robots(broken, "arm.json")
+        document = RobotDocument(robot)
+        change(document, edit)
+        assert document.value.configurations.entries == (("P1", q),)
+        assert KIND.from_text(KIND.to_text(document.value), "here") == document.value
+        document.undo()
+        assert document.value == robot
 
 
 # -- motions -------------------------------------------------------------------------------------------------
 
 
-def line_poses(arm: ab.Arm, q: Any) -> tuple[TaughtPose, ...]:
+def line_poses(arm: ab.Arm, q: Any) -> tuple[Configuration, ...]:
     rows = [list(q)]
     for shift in ((-0.05, 0.1, 0.0), (-0.08, 0.0, 0.08), (0.0, -0.1, -0.08)):
         target = arm.fkine(rows[-1])
@@ -366,7 +360,9 @@ def test_poses_are_taught_and_the_motion_is_saved_and_inserted(tmp_path: Path) -
         for q in (Q, found["q"]):
             await client.ask("change", document=key, key=str(q), edit={"kind": "record_pose", "q": q})
         shown = client.shown()
-        assert [pose["name"] for pose in shown["poses"]] == ["P1", "P2"]
+        assert [pose["name"] for pose in shown["poses"]] == ["qz", "qr", "qs", "qn", "P1", "P2"]
+        for name in ("qz", "qr", "qs", "qn"):
+            await client.ask("change", document=key, key=name, edit={"kind": "remove_pose", "name": name})
         assert shown["undo"] == "record a pose"
         choice = {"document": key, "course": "line", "duration": 2.0}
         motion = await client.ask("motion", **choice)
@@ -394,7 +390,7 @@ def test_poses_are_taught_and_the_motion_is_saved_and_inserted(tmp_path: Path) -
 
     run_scenario(tmp_path, scenario)
     again = KIND.from_file((tmp_path / "taught.json").read_bytes(), tmp_path / "taught.json")
-    assert [pose.name for pose in again.poses] == ["P1", "P2"]
+    assert list(again.configurations) == ["P1", "P2"]
 
 
 def test_a_motion_that_waits_for_another_request_is_that_of_the_present_robot(tmp_path: Path) -> None:

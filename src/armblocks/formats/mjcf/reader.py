@@ -2,7 +2,8 @@
 
 A body with several joints becomes a series of links: a massless link for each joint except the last, with the
 name of the joint, and then the link of the body, with the name of the body. A free body is at its initial
-pose at the neutral coordinates. Shapes of the world itself are surroundings and not part of the robot.
+pose at the neutral coordinates. Key frames become named configurations. Shapes of the world itself are
+surroundings and not part of the robot.
 
 Source: MuJoCo documentation, *XML reference* and *Modeling* (versions 3.x).
 """
@@ -19,6 +20,7 @@ from armblocks.formats.mjcf.equality import Parts, constraints_of
 from armblocks.formats.mjcf.includes import with_includes
 from armblocks.formats.mjcf.inertials import mass_properties
 from armblocks.formats.mjcf.joints import actuated_joints, actuation_of, joint_of
+from armblocks.formats.mjcf.keyframes import with_keyframes
 from armblocks.formats.mjcf.meshes import MeshAssets
 from armblocks.formats.mjcf.poses import pose_of
 from armblocks.formats.mjcf.rules import NAME, STIFFNESS, UNREAD
@@ -93,7 +95,7 @@ def read_mjcf(data: bytes, file: str, context: FileContext) -> Robot:
             frames=model.frames(),
             springs=springs,
         )
-        return with_tip(robot, deepest_tip(links))
+        return with_tip(with_keyframes(robot, root, context), deepest_tip(links))
     except RobotError as error:
         raise FormatError(
             f"{error.where}: {error.what}", where=file, allowed=error.allowed, fix=error.fix

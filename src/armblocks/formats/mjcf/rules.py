@@ -55,5 +55,11 @@ NAME = Rule(
     remedy="rename one of the bodies",
 )
 
-MJCF_RULES = (*(STIFFNESS, EQUALITY, TENDON, LIMIT, FRICTION, INERTIA, MESH, SHAPE, UNREAD, NAME),)
+KEYFRAME = Rule(
+    code="mjcf-keyframe",
+    allowed="key frames with one number in qpos for each coordinate of the joints that are read",
+    remedy="record the configuration again, by arm.with_configuration(name, q)",
+)
+
+MJCF_RULES = (*(STIFFNESS, EQUALITY, TENDON, LIMIT, FRICTION, INERTIA, MESH, SHAPE, UNREAD, NAME, KEYFRAME),)
 """All rules of this format."""

@@ -17,6 +17,7 @@ import numpy as np
 from armblocks.errors import FormatError
 from armblocks.formats.file_findings import FileContext
 from armblocks.formats.mjcf.equality_writing import CLOSURES, add_site, equality_lines, placed, tendon_lines
+from armblocks.formats.mjcf.keyframes import key_lines
 from armblocks.formats.mjcf.reader import MAX_NAME, read_mjcf
 from armblocks.formats.robot_writing import (
     check_joint,
@@ -95,6 +96,12 @@ def write_mjcf(robot: Robot) -> bytes:
         head += ["  <asset>", *(f"    {mesh}" for mesh in meshes), "  </asset>"]
     tail = ["  <tendon>", *tendons, "  </tendon>"] if tendons else []
     tail += ["  <equality>", *equality, "  </equality>"] if equality else []
+    if robot.configurations:
+        proximal = {
+            link.name: robot.base @ link.before for link in robot.links
+        }  # of free joints, at the base
+        keys = key_lines(robot, _joint_order(bodies, roots), proximal)
+        tail += ["  <keyframe>", *(f"  {key}" for key in keys), "  </keyframe>"]
     text = "\n".join([*head, "  <worldbody>", *sites[None], *lines, "  </worldbody>", *tail, "</mujoco>"])
     data = f'<?xml version="1.0"?>\n{text}\n'.encode()
     tip = names[robot.links[-1].name] if robot.tool.is_identity else _tool_name(robot, names)
@@ -236,6 +243,17 @@ def _nested(
         waiting.append(("", depth))
         waiting += [(child, depth + 1) for child in reversed(body.children)]
     return lines
+
+
+def _joint_order(bodies: Mapping[str, _Body], roots: Sequence[str]) -> list[Link]:
+    """The links with joints in the order of the file."""
+    order: list[Link] = []
+    waiting = list(reversed(roots))
+    while waiting:
+        body = bodies[waiting.pop()]
+        order += [link for link, _ in body.joints]
+        waiting += reversed(body.children)
+    return order
 
 
 def _body_lines(robot: Robot, body: _Body, names: Mapping[str | None, str], meshes: list[str]) -> list[str]:

@@ -30,6 +30,7 @@ from armblocks.formats.robot_writing import (
     mimics_of,
     numbers,
     quoted,
+    warn_of_configurations,
     warn_of_loss,
     warn_of_order,
     warn_of_shapes,
@@ -84,9 +85,10 @@ def write_sdf(robot: Robot) -> bytes:
     Raises ``FormatError`` for constraints and joint types that SDF does not have, and for loops that are not
     closed with all joints at zero. Warns of data that SDF does not have: the tip and the order of the
     coordinates of some trees, Coulomb friction that depends on the direction, friction that accelerates a
-    joint, meshes and housings, names that SDF reserves.
+    joint, meshes and housings, named configurations, names that SDF reserves.
     """
     mimics = mimics_of(robot, "SDF", tuple(_CLOSURES))
+    warn_of_configurations(robot, "SDF")
     warn_of_shapes(robot, (Box, Cylinder, Sphere), "SDF")
     names = file_names(robot, _is_reserved, "SDF")
     used = set(names.values()) | {link.name for link in robot.links}

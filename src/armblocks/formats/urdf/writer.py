@@ -24,6 +24,7 @@ from armblocks.formats.robot_writing import (
     mimics_of,
     numbers,
     quoted,
+    warn_of_configurations,
     warn_of_loss,
     warn_of_order,
     warn_of_shapes,
@@ -49,9 +50,9 @@ def write_urdf(robot: Robot) -> bytes:
     """The URDF of a robot. Reading it gives the same kinematics and dynamics up to rounding.
 
     Raises ``FormatError`` for joint types and constraints that URDF does not have. Warns of data that URDF
-    does not have: link frames that are not at the joint, another gravity, springs, the tip and the order of
-    the coordinates of some trees, Coulomb friction that depends on the direction, friction that accelerates a
-    joint, meshes and housings.
+    does not have: link frames that are not at the joint, another gravity, springs, named configurations, the
+    tip and the order of the coordinates of some trees, Coulomb friction that depends on the direction,
+    friction that accelerates a joint, meshes and housings.
     """
     if not np.allclose(robot.gravity, STANDARD_GRAVITY, rtol=1e-15, atol=0.0):
         what = f"gravity {robot.gravity} is not part of a URDF file, which is read with -9.81 along z"
@@ -74,6 +75,7 @@ def write_urdf(robot: Robot) -> bytes:
         if link is not own_root:
             parts += _joint_lines(robot, link, root, mimics.get(link.name))
     _warn_of_frames(robot)
+    warn_of_configurations(robot, "URDF")
     last = robot.links[-1]
     tip, end = last.name, last.after @ robot.tool
     if not end.is_identity:

@@ -15,38 +15,37 @@ from armblocks.studio.robots.columns import ROBOT_COLUMNS
 from armblocks.studio.robots.edits import ROBOT_EDITS
 from armblocks.studio.robots.link_columns import LINK_COLUMNS
 from armblocks.studio.robots.pose_edits import POSE_EDITS
-from armblocks.studio.robots.taught_robot import TaughtRobot
 
 
-class RobotDocument(Edited[TaughtRobot]):
+class RobotDocument(Edited[Robot]):
     """One open robot; see :class:`~armblocks.studio.documents.edited.Edited`."""
 
     kind = "robot"
     edits = RobotEdit
     noun = "robot"
 
-    def outcome(self, request: Change) -> Outcome[TaughtRobot]:
+    def outcome(self, request: Change) -> Outcome[Robot]:
         """Return title, new robot and edited cell of a change."""
         if isinstance(request.edit, PoseEdit):
-            taught = POSE_EDITS.applied(request.edit, self.value)
-            return Outcome(POSE_EDITS.title(request.edit), taught, request.gesture)
+            after = POSE_EDITS.applied(request.edit, self.value)
+            return Outcome(POSE_EDITS.title(request.edit), after, request.gesture)
         with warnings.catch_warnings():  # the tables show these warnings as findings
             warnings.simplefilter("ignore", ArmblocksWarning)
-            after = ROBOT_EDITS.applied(request.edit, self.value.robot)
-        return Outcome(ROBOT_EDITS.title(request.edit), self.value.with_robot(after), request.gesture)
+            after = ROBOT_EDITS.applied(request.edit, self.value)
+        return Outcome(ROBOT_EDITS.title(request.edit), after, request.gesture)
 
-    def aspects(self, before: TaughtRobot, after: TaughtRobot) -> set[Aspect]:
+    def aspects(self, before: Robot, after: Robot) -> set[Aspect]:
         """Return the cells that differ, links and poses that were added, removed or changed, and changes of
         the order of links or poses."""
-        return _pose_aspects(before, after) | _robot_aspects(before.robot, after.robot)
+        return _pose_aspects(before, after) | _robot_aspects(before, after)
 
-    def mark_saved(self, value: TaughtRobot, name: str) -> None:
+    def mark_saved(self, value: Robot, name: str) -> None:
         """Mark ``value`` as saved; the name of a robot does not depend on its file name."""
         self.saved = value
 
 
-def _pose_aspects(before: TaughtRobot, after: TaughtRobot) -> set[Aspect]:
-    old, new = ({pose.name: pose for pose in taught.poses} for taught in (before, after))
+def _pose_aspects(before: Robot, after: Robot) -> set[Aspect]:
+    old, new = ({pose.name: pose for pose in robot.configurations.entries} for robot in (before, after))
     changed: set[Aspect] = {
         ("/", "pose", name) for name in old.keys() | new.keys() if old.get(name) != new.get(name)
     }

@@ -18,7 +18,7 @@ from armblocks.face.least_time import check_joint_space, fastest_motion, grid_of
 from armblocks.face.toolbox_trajectories import ctraj
 from armblocks.face.trajectory import JointTrajectory, sampled
 from armblocks.face.trajectory_report import TrajectoryReport, trajectory_report
-from armblocks.formats.robot_poses import TaughtPose
+from armblocks.robot import Configuration
 from armblocks.spatial import Transform
 from armblocks.studio.protocol.messages.teaching import JointPeaks, PlannedMotion
 from armblocks.studio.robots.reaching import followed_directions, same_configuration, solved
@@ -51,7 +51,7 @@ class Plan(NamedTuple):
     via: list[float]
 
 
-def plan(arm: Arm, poses: Sequence[TaughtPose], course: Course, duration: float | None) -> Plan:
+def plan(arm: Arm, poses: Sequence[Configuration], course: Course, duration: float | None) -> Plan:
     """The motion from rest to rest through ``poses``, in ``duration`` (s) or in the least time.
 
     Raises InputError for fewer than two poses, for equal neighbours, and for a straight line that the arm
@@ -105,7 +105,7 @@ def plan(arm: Arm, poses: Sequence[TaughtPose], course: Course, duration: float 
     return Plan(sampled(chained(motions), 0.01), via.tolist())
 
 
-def _line(arm: Arm, first: TaughtPose, second: TaughtPose, where: str) -> PiecewisePolynomial:
+def _line(arm: Arm, first: Configuration, second: Configuration, where: str) -> PiecewisePolynomial:
     """The joint path (s from 0 to 1) of a straight line of the tool."""
     directions = followed_directions(arm)
     start, goal = (arm.fkine(pose.q) for pose in (first, second))

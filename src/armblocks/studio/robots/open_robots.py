@@ -6,7 +6,7 @@ import asyncio
 import dataclasses
 
 from armblocks.face.arm import Arm
-from armblocks.robot import Robot
+from armblocks.robot import Configurations, Robot
 from armblocks.studio.documents.open_files import OpenFile, OpenFiles
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.documents.state_folder import StateFolder
@@ -26,13 +26,14 @@ class OpenRobot(OpenFile[RobotDocument]):
     @property
     def robot(self) -> Robot:
         """The present robot."""
-        return self.document.value.robot
+        return self.document.value
 
     @property
     def arm(self) -> Arm:
-        """The compiled equations of the present robot, compiled at first use."""
-        if self._arm is None or self._arm.robot is not self.robot:
-            self._arm = Arm(self.robot)
+        """The compiled equations of the present robot without its configurations, compiled at first use."""
+        robot = dataclasses.replace(self.robot, configurations=Configurations())
+        if self._arm is None or self._arm.robot != robot:
+            self._arm = Arm(robot)
         return self._arm
 
 

@@ -1,11 +1,11 @@
-"""The edits of the recorded poses of a robot; each is a pure function from one list of poses to the next."""
+"""The edits of the named configurations of a robot, its recorded poses; each is a pure function."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 from armblocks.errors import InputError, UnknownNameError
-from armblocks.formats.robot_poses import TaughtPose, check_poses
+from armblocks.robot import Configuration, Configurations, Robot
 from armblocks.studio.documents.edit_table import EditTable
 from armblocks.studio.protocol.messages.pose_edits import (
     MovePose,
@@ -14,41 +14,40 @@ from armblocks.studio.protocol.messages.pose_edits import (
     RenamePose,
     UpdatePose,
 )
-from armblocks.studio.robots.taught_robot import TaughtRobot
 
-POSE_EDITS: EditTable[TaughtRobot, []] = EditTable()
+POSE_EDITS: EditTable[Robot, []] = EditTable()
 
 
 @POSE_EDITS.on(RecordPose, lambda edit: f"record {edit.name or 'a pose'}")
-def _record(edit: RecordPose, taught: TaughtRobot) -> TaughtRobot:
+def _record(edit: RecordPose, robot: Robot) -> Robot:
     """Append the pose, or insert it after another one."""
-    poses = list(taught.poses)
-    place = _index(taught, edit.after) + 1 if edit.after else len(poses)
-    name = edit.name.strip() or _free_name(taught)
-    poses.insert(place, TaughtPose(name=name, q=tuple(edit.q)))
-    return _with_poses(taught, poses)
+    poses = list(robot.configurations.entries)
+    place = _index(robot, edit.after) + 1 if edit.after else len(poses)
+    name = edit.name.strip() or _free_name(robot)
+    poses.insert(place, Configuration(name, tuple(edit.q)))
+    return _with_poses(robot, poses)
 
 
 @POSE_EDITS.on(UpdatePose, lambda edit: f"update {edit.name}")
-def _update(edit: UpdatePose, taught: TaughtRobot) -> TaughtRobot:
-    poses = list(taught.poses)
-    place = _index(taught, edit.name)
-    poses[place] = replace(poses[place], q=tuple(edit.q))
-    return _with_poses(taught, poses)
+def _update(edit: UpdatePose, robot: Robot) -> Robot:
+    poses = list(robot.configurations.entries)
+    place = _index(robot, edit.name)
+    poses[place] = Configuration(edit.name, tuple(edit.q))
+    return _with_poses(robot, poses)
 
 
 @POSE_EDITS.on(RenamePose, lambda edit: f"name of {edit.name}")
-def _rename(edit: RenamePose, taught: TaughtRobot) -> TaughtRobot:
-    poses = list(taught.poses)
-    place = _index(taught, edit.name)
-    poses[place] = replace(poses[place], name=edit.to.strip())
-    return _with_poses(taught, poses)
+def _rename(edit: RenamePose, robot: Robot) -> Robot:
+    poses = list(robot.configurations.entries)
+    place = _index(robot, edit.name)
+    poses[place] = Configuration(edit.to.strip(), poses[place].q)
+    return _with_poses(robot, poses)
 
 
 @POSE_EDITS.on(MovePose, lambda edit: f"move {edit.name}")
-def _move(edit: MovePose, taught: TaughtRobot) -> TaughtRobot:
-    poses = list(taught.poses)
-    place = _index(taught, edit.name)
+def _move(edit: MovePose, robot: Robot) -> Robot:
+    poses = list(robot.configurations.entries)
+    place = _index(robot, edit.name)
     if not 0 <= place + edit.by < len(poses):
         raise InputError(
             "there is no pose on that side",
@@ -57,28 +56,28 @@ def _move(edit: MovePose, taught: TaughtRobot) -> TaughtRobot:
             fix="move it the other way",
         )
     poses.insert(place + edit.by, poses.pop(place))
-    return _with_poses(taught, poses)
+    return _with_poses(robot, poses)
 
 
 @POSE_EDITS.on(RemovePose, lambda edit: f"remove {edit.name}")
-def _remove(edit: RemovePose, taught: TaughtRobot) -> TaughtRobot:
-    place = _index(taught, edit.name)
-    return _with_poses(taught, [*taught.poses[:place], *taught.poses[place + 1 :]])
+def _remove(edit: RemovePose, robot: Robot) -> Robot:
+    place = _index(robot, edit.name)
+    poses = robot.configurations.entries
+    return _with_poses(robot, [*poses[:place], *poses[place + 1 :]])
 
 
-def _with_poses(taught: TaughtRobot, poses: list[TaughtPose]) -> TaughtRobot:
-    check_poses(tuple(poses), taught.robot.nq, f"robot '{taught.name}'")
-    return replace(taught, poses=tuple(poses))
+def _with_poses(robot: Robot, poses: list[Configuration]) -> Robot:
+    return replace(robot, configurations=Configurations(poses, where=f"robot '{robot.name}'"))
 
 
-def _index(taught: TaughtRobot, name: str) -> int:
-    names = [pose.name for pose in taught.poses]
+def _index(robot: Robot, name: str) -> int:
+    names = list(robot.configurations)
     if name not in names:
-        raise UnknownNameError("pose", name, names, where=f"robot '{taught.name}'")
+        raise UnknownNameError("pose", name, names, where=f"robot '{robot.name}'")
     return names.index(name)
 
 
-def _free_name(taught: TaughtRobot) -> str:
+def _free_name(robot: Robot) -> str:
     """The first of the names P1, P2 … that is not in use."""
-    used = {pose.name for pose in taught.poses}
+    used = set(robot.configurations)
     return next(name for k in range(1, len(used) + 2) if (name := f"P{k}") not in used)

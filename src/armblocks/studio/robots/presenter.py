@@ -16,7 +16,6 @@ from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol.messages.robots import RobotChange, RobotContent
 from armblocks.studio.robots.open_robots import OpenRobot, OpenRobots
 from armblocks.studio.robots.tables import robot_content
-from armblocks.studio.robots.taught_robot import TaughtRobot
 
 Result = TypeVar("Result")
 
@@ -56,7 +55,7 @@ class RobotPresenter(Presenter[OpenRobot]):
         """Return the tables of a robot."""
         return _content(open_file)
 
-    def change(self, open_file: OpenRobot, before: TaughtRobot, place: Place) -> RobotChange:
+    def change(self, open_file: OpenRobot, before: Robot, place: Place) -> RobotChange:
         """Return the complete robot; changes are not split."""
         return RobotChange(content=_content(open_file))
 
@@ -68,15 +67,14 @@ class RobotPresenter(Presenter[OpenRobot]):
 
     def _opened_without_file(self, robots: Iterable[Robot], notes: tuple[str, ...]) -> Opening[OpenRobot]:
         """Open robots that have no file."""
-        opened = [self.files.open_value(TaughtRobot(robot=robot)) for robot in robots]
+        opened = [self.files.open_value(robot) for robot in robots]
         for open_file in opened:
             open_file.notes = notes
         return Opening(opened, notes)
 
 
 def _content(open_file: OpenRobot) -> RobotContent:
-    taught = open_file.document.value
-    return robot_content(taught.robot, taught.poses)
+    return robot_content(open_file.robot)
 
 
 def _read(data: bytes, name: str, context: FileContext) -> tuple[Mapping[str, Robot], tuple[str, ...]]:

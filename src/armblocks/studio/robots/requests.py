@@ -20,7 +20,6 @@ from armblocks.studio.robots.presenter import RobotPresenter
 from armblocks.studio.robots.readings import readings
 from armblocks.studio.robots.scene import link_frames_of, scene_of
 from armblocks.studio.robots.tables import robot_tables
-from armblocks.studio.robots.taught_robot import TaughtRobot
 from armblocks.studio.sheet.nesting import inside
 from armblocks.studio.sheet.open_documents import OpenDocuments
 
@@ -59,9 +58,8 @@ class RobotRequests:
             opening = self._presenter.open_file(path.relative_to(self._folder.root).as_posix())
             return await self._documents.show(client, opening.opened[0], notes=opening.notes)
         is_shipped = robot.source in formats.list_robots()
-        value = TaughtRobot(robot=robot)
         open_file = (
-            self._robots.add(value, origin=robot.source) if is_shipped else self._robots.open_value(value)
+            self._robots.add(robot, origin=robot.source) if is_shipped else self._robots.open_value(robot)
         )
         return await self._documents.show(client, open_file)
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Literal
 
-from armblocks.formats.robot_poses import TaughtPose
 from armblocks.robot import DhConvention, Link, Robot, inertia_findings, plausibility_findings, serial_chain
 from armblocks.studio.protocol.messages import robots as robot_messages
 from armblocks.studio.robots.columns import ROBOT, ROBOT_COLUMNS, Column, Owner
@@ -29,8 +27,8 @@ def robot_tables() -> robot_messages.RobotTables:
     )
 
 
-def robot_content(robot: Robot, poses: Sequence[TaughtPose] = ()) -> robot_messages.RobotContent:
-    """Return the data of a robot and its recorded poses that a client displays."""
+def robot_content(robot: Robot) -> robot_messages.RobotContent:
+    """Return the data of a robot that a client displays; its named configurations are the poses."""
     return robot_messages.RobotContent(
         name=robot.name,
         convention=_convention(robot),
@@ -38,7 +36,7 @@ def robot_content(robot: Robot, poses: Sequence[TaughtPose] = ()) -> robot_messa
         links=[_row(link) for link in robot.links],
         coordinates=_coordinates(robot),
         speeds=_speeds(robot),
-        poses=[robot_messages.Pose(name=pose.name, q=list(pose.q)) for pose in poses],
+        poses=[robot_messages.Pose(name=name, q=list(q)) for name, q in robot.configurations.entries],
         fields={name: column.read(robot) for name, column in ROBOT_COLUMNS.items()},
         findings=[
             *_inertia_findings(robot),

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from armblocks.errors import FormatError
 from armblocks.face.arm import Arm
-from armblocks.formats.robot_poses import TaughtPose
+from armblocks.robot import Configuration
 from armblocks.studio.documents.project_folder import ProjectFolder, check_file_name
 from armblocks.studio.protocol.answers import Answers
 from armblocks.studio.protocol.clients import StudioClient
@@ -73,9 +73,9 @@ class TeachingRequests:
         return await self._computed(request.document, lambda arm, _: workspace(arm))
 
     async def _computed(
-        self, document: str, compute: Callable[[Arm, tuple[TaughtPose, ...]], Result]
+        self, document: str, compute: Callable[[Arm, tuple[Configuration, ...]], Result]
     ) -> Result:
         """The result of a computation with the compiled arm and its recorded poses, in a thread."""
         open_file = self._robots[document]
         async with open_file.reading:  # concurrent requests compile the arm only once
-            return await asyncio.to_thread(compute, open_file.arm, open_file.document.value.poses)
+            return await asyncio.to_thread(compute, open_file.arm, open_file.robot.configurations.entries)
