@@ -3,8 +3,8 @@
 ``python3 scripts/test.py`` runs all steps, also after a failure. The exit code is 1 if a step failed.
 ``python3 scripts/test.py format types`` runs only the named steps.
 
-The static checks run in two parallel rows, then the tests run. The output has the order of the steps: the
-output of the first unfinished step is shown immediately, that of later steps is buffered.
+The static checks run two at a time, then the tests run. The output has the order of the steps: the output of
+the first unfinished step is shown immediately, that of later steps is buffered.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from threading import Event
 
@@ -37,14 +37,17 @@ STEPS: dict[str, tuple[str | object, ...]] = {
     "docs": (PYTHON, "docs/build_site.py"),
     "tests": (PYTHON, "-m", "pytest", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"),
 }
-FIRST_STEPS = ("page",)
-"""Steps whose results the other steps need."""
+NEEDED = {"web types": "page", "web lint": "page", "web format": "page", "web tests": "page"}
+"""Steps that wait for another step: the page downloads the libraries that they use."""
 STAGES = (
-    (("types",), ("web types", "web lint", "web format", "web tests", "lint", "format", "layers", "docs")),
-    (("tests",),),
+    ("page", "docs", "types", "web tests", "web format", "web lint", "web types", "layers", "lint", "format"),
+    ("tests",),
 )
-"""Stages run in sequence. In a stage, the rows run in parallel, and the steps of a row in sequence.
-The tests have a separate stage, because browser tests need all cores."""
+"""Stages run in sequence. The steps of a stage start in this order, long steps first, two at a time.
+The tests have a separate stage: browser tests need all cores, and the wheel is built from page and docs."""
+PARALLEL_STEPS = 2
+LIBRARIES_WITH_ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
+"""Each core has its own test process; threads of OpenBLAS that wait for each other take processor time."""
 POLL_SECONDS = 0.1
 """Interval at which new output of a step is shown, s."""
 
@@ -70,7 +73,7 @@ class Step:
                 self._process = subprocess.Popen(
                     self.command,
                     cwd=ROOT,
-                    env=ENVIRONMENT,
+                    env={**LIBRARIES_WITH_ONE_THREAD, **ENVIRONMENT},
                     stdin=subprocess.DEVNULL,
                     stdout=output,
                     stderr=subprocess.STDOUT,
@@ -82,6 +85,10 @@ class Step:
         finally:
             self.seconds = time.perf_counter() - start
             self._ended.set()
+
+    def wait(self) -> None:
+        """Wait until the command has ended."""
+        self._ended.wait()
 
     def follow(self) -> None:
         """Show the existing output, and new output until the command ends."""
@@ -96,34 +103,32 @@ class Step:
                     return
 
     def end(self) -> None:
-        """Stop the command if it is running."""
+        """Stop the command if it is running; steps that wait for it do not start."""
         if self._process is not None and self._process.poll() is None:
             self._process.terminate()
+        self._ended.set()
 
 
 def run_steps(names: Sequence[str]) -> list[Step]:
     """Run these steps, each once, and show their output in the order of ``STEPS``."""
-    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor() as pool:
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(PARALLEL_STEPS) as pool:
         steps = {name: Step(name, Path(folder)) for name in names}
-
         stopped = Event()
 
-        def run_row(row: Sequence[str]) -> None:
-            for name in row:
-                if name in steps and not stopped.is_set():
-                    steps[name].run()
+        def run_step(name: str) -> None:
+            if (needed := steps.get(NEEDED.get(name, ""))) is not None:
+                needed.wait()  # has started before: it precedes this step in its stage
+            if not stopped.is_set():
+                steps[name].run()
 
         try:
-            for name in names:
-                if name in FIRST_STEPS:
-                    pool.submit(steps[name].run)
-                    steps[name].follow()
             for stage in STAGES:
-                for row in stage:
-                    pool.submit(run_row, row)
+                running: list[Future[None]] = [pool.submit(run_step, name) for name in stage if name in steps]
                 for name in names:
-                    if any(name in row for row in stage):
+                    if name in stage:
                         steps[name].follow()
+                for future in running:
+                    future.result()
         except BaseException:
             stopped.set()
             for step in steps.values():
@@ -144,8 +149,10 @@ def main() -> int:
     for name in requested:
         if name not in STEPS:
             parser.error(f"there is no step named '{name}'; the steps are {', '.join(STEPS)}")
-    prepare("test")
-    prepare_browser()
+    with ThreadPoolExecutor() as pool:
+        browser = pool.submit(prepare_browser)  # the downloads of both take most of the time
+        prepare("test")
+        browser.result()
     start = time.perf_counter()
     results = run_steps([name for name in STEPS if not requested or name in requested])
     print_line("== summary")

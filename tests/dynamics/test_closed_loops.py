@@ -231,13 +231,15 @@ def test_couplings_equal_multipliers() -> None:
         expected = accelerations(replace(robot.uncoupled, constraints=couplings), tree_q, tree_qd, tree_tau)
         (qdd,) = trace_accel(robot)(q, qd, tau)
         assert coordinates.speeds @ qdd == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
-        assert trace_rne(robot)(q, qd, qdd)[0] == pytest.approx(tau, abs=1e-9)
+        torque = trace_rne(robot)
+        assert torque(q, qd, qdd)[0] == pytest.approx(tau, abs=1e-9)
         (inertia,) = trace_inertia(robot)(q)
         no_speed = np.zeros(robot.nv)
-        columns = [trace_rne(robot)(q, no_speed, e)[0] for e in np.eye(robot.nv)]
-        still = trace_rne(robot)(q, no_speed, no_speed)[0]
+        columns = [torque(q, no_speed, e)[0] for e in np.eye(robot.nv)]
+        still = torque(q, no_speed, no_speed)[0]
         assert inertia == pytest.approx(np.array(columns).T - still[:, None], abs=1e-9)
-        T0, T1 = (trace_fkine(robot)(q + h * qd)[0] for h in (-1e-6, 1e-6))
+        pose = trace_fkine(robot)
+        T0, T1 = (pose(q + h * qd)[0] for h in (-1e-6, 1e-6))
         (J,) = trace_jacob0(robot)(q)
         assert (J @ qd)[:3] == pytest.approx((T1 - T0)[:3, 3] / 2e-6, abs=1e-6)
 
