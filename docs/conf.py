@@ -61,12 +61,33 @@ python_maximum_signature_line_length = 110
 add_module_names = False
 
 
+navigation_of_folder = {}
+"""The navigation of the pages outside the table of contents, for each folder."""
+
+
+def share_navigation(app, pagename, templatename, context, doctree):
+    """Create the navigation of the pages of all blocks once: the links in it are the same for a folder."""
+    if "orphan" in app.env.metadata.get(pagename, {}):
+        folder, create = pagename.rpartition("/")[0], context["toctree"]
+
+        def navigation(**options):
+            key = folder, *sorted(options.items())
+            if key not in navigation_of_folder:
+                navigation_of_folder[key] = create(**options)
+            return navigation_of_folder[key]
+
+        context["toctree"] = navigation
+
+
 def setup(app):
     """Connect the functions of this folder to the events of Sphinx, which calls this function."""
     shorten_annotations()
     app.connect("autodoc-process-signature", readable_signature)
     app.connect("source-read", link_names)
     app.connect("source-read", show_by_theme)
+    app.connect(
+        "html-page-context", share_navigation, priority=100
+    )  # before the theme reads it
 
 
 # Called before Sphinx searches for sources and static files.
