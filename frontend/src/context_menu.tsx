@@ -3,6 +3,9 @@ import { Kbd, Menu } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { closeMenu, useContextMenu, type Entries, type Entry } from './context_menu_state'
 
+/** A menu that is too long for the room below and above the pointer is moved until all of it is visible. */
+const INSIDE_WINDOW = { shift: { crossAxis: true } }
+
 /** The open context menu, at the pointer. */
 export function ContextMenu() {
   const { opened, label, at, entries, openCount } = useContextMenu()
@@ -22,6 +25,7 @@ export function ContextMenu() {
       shadow="md"
       returnFocus={false}
       transitionProps={{ duration: 0 }}
+      middlewares={INSIDE_WINDOW}
     >
       <Menu.Target>
         <div className="menu-anchor" style={{ left: at.x, top: at.y }} aria-hidden />

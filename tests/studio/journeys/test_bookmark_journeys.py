@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import json
 import re
-from contextlib import suppress
 
 import pytest
 from accessibility import axe
-from building import DIALOG, block, keep_view, middle, select_block, wait_until
-from playwright.sync_api import Locator, Page, TimeoutError, expect
+from building import DIALOG, block, keep_view, select_block, wait_until
+from playwright.sync_api import Locator, Page, expect
 
 from conftest import Studio
 
+EMPTY_POINT = """(pane) => {
+    // A point of the sheet in its lower half without a block or wire.
+    const { x, y, width, height } = pane.getBoundingClientRect()
+    for (let down = y + height - 20; down > y + height / 2; down -= 10)
+        for (let right = x + 20; right < x + width; right += 10)
+            if (document.elementFromPoint(right, down) === pane) return [right, down]
+}"""
+
 View = tuple[float, ...]
-RETRY_MS = 5000
 
 
 def view(page: Page) -> View:
@@ -152,18 +158,11 @@ def test_bookmarks_are_used_with_the_mouse(sheet: Page, studio: Studio) -> None:
     first = view(sheet)
 
     def choose_in_menu(entry: str) -> None:
-        """Right-click the sheet until the menu opens the dialog: a click is lost while the focus returns."""
+        """Choose an entry of the menu of the sheet, which is longer than the room below the pointer."""
         expect(sheet.locator(DIALOG)).to_have_count(0)
-        x, y = middle(sheet.locator(".react-flow__controls"))
-
-        def opens_dialog() -> bool:
-            sheet.mouse.click(x + 60, y + 30, button="right")
-            with suppress(TimeoutError):
-                sheet.get_by_role("menuitem", name=entry).click(timeout=RETRY_MS)
-                sheet.locator(DIALOG).wait_for(timeout=RETRY_MS)
-            return sheet.locator(DIALOG).is_visible()
-
-        wait_until(sheet, opens_dialog)
+        sheet.mouse.click(*sheet.locator(".react-flow__pane").evaluate(EMPTY_POINT), button="right")
+        sheet.get_by_role("menuitem", name=entry).click()
+        expect(sheet.locator(DIALOG)).to_be_visible()
 
     dialog = sheet.locator(DIALOG)
     choose_in_menu("Bookmark this view")
