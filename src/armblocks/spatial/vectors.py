@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import NamedTuple, TypeAlias
 
-from casadi import SX
+from casadi import OP_ADD, OP_MUL, OP_SUB, SX
 
 Scalar: TypeAlias = SX | float
 Vector: TypeAlias = tuple[Scalar, Scalar, Scalar]
@@ -31,29 +31,52 @@ class Symmetric(NamedTuple):
     xz: Scalar
 
 
+def plus(a: Scalar, b: Scalar) -> Scalar:
+    """The sum a + b.
+
+    CasADi's operators try several types of numbers first, which takes seven times as long as ``SX.binary``.
+    The expressions are the same.
+    """
+    return SX.binary(OP_ADD, a, b) if isinstance(a, SX) or isinstance(b, SX) else a + b
+
+
+def minus(a: Scalar, b: Scalar) -> Scalar:
+    """The difference a - b, computed as in :func:`plus`."""
+    return SX.binary(OP_SUB, a, b) if isinstance(a, SX) or isinstance(b, SX) else a - b
+
+
+def times(a: Scalar, b: Scalar) -> Scalar:
+    """The product a b, computed as in :func:`plus`."""
+    return SX.binary(OP_MUL, a, b) if isinstance(a, SX) or isinstance(b, SX) else a * b
+
+
 def add(a: Vector, b: Vector) -> Vector:
     """The sum a + b."""
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+    return plus(a[0], b[0]), plus(a[1], b[1]), plus(a[2], b[2])
 
 
 def subtract(a: Vector, b: Vector) -> Vector:
     """The difference a - b."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return minus(a[0], b[0]), minus(a[1], b[1]), minus(a[2], b[2])
 
 
 def scale(k: Scalar, a: Vector) -> Vector:
     """The vector a times the scalar k."""
-    return k * a[0], k * a[1], k * a[2]
+    return times(k, a[0]), times(k, a[1]), times(k, a[2])
 
 
 def dot(a: Vector, b: Vector) -> Scalar:
     """The dot product a' b."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return plus(plus(times(a[0], b[0]), times(a[1], b[1])), times(a[2], b[2]))
 
 
 def cross(a: Vector, b: Vector) -> Vector:
     """The cross product a x b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    return (
+        minus(times(a[1], b[2]), times(a[2], b[1])),
+        minus(times(a[2], b[0]), times(a[0], b[2])),
+        minus(times(a[0], b[1]), times(a[1], b[0])),
+    )
 
 
 def rotate(R: Matrix, a: Vector) -> Vector:
@@ -78,11 +101,7 @@ def multiply(A: Matrix, B: Matrix) -> Matrix:
 
 def multiply_symmetric(S: Symmetric, a: Vector) -> Vector:
     """The product S a."""
-    return (
-        S.xx * a[0] + S.xy * a[1] + S.xz * a[2],
-        S.xy * a[0] + S.yy * a[1] + S.yz * a[2],
-        S.xz * a[0] + S.yz * a[1] + S.zz * a[2],
-    )
+    return rotate(((S.xx, S.xy, S.xz), (S.xy, S.yy, S.yz), (S.xz, S.yz, S.zz)), a)
 
 
 def rotate_symmetric(R: Matrix, S: Symmetric) -> Symmetric:
@@ -100,7 +119,7 @@ def rotate_symmetric(R: Matrix, S: Symmetric) -> Symmetric:
 
 def add_symmetric(A: Symmetric, B: Symmetric) -> Symmetric:
     """The sum A + B."""
-    return Symmetric(*(a + b for a, b in zip(A, B)))
+    return Symmetric(*(plus(a, b) for a, b in zip(A, B)))
 
 
 class RotationZ(NamedTuple):
@@ -115,26 +134,30 @@ class RotationZ(NamedTuple):
 
     def rotate(self, a: Vector) -> Vector:
         """The product Rz a."""
-        return self.c * a[0] - self.s * a[1], self.s * a[0] + self.c * a[1], a[2]
+        c, s = self
+        x = minus(times(c, a[0]), times(s, a[1]))
+        return x, plus(times(s, a[0]), times(c, a[1])), a[2]
 
     def rotate_back(self, a: Vector) -> Vector:
         """The product Rz' a."""
-        return self.c * a[0] + self.s * a[1], self.c * a[1] - self.s * a[0], a[2]
+        c, s = self
+        x = plus(times(c, a[0]), times(s, a[1]))
+        return x, minus(times(c, a[1]), times(s, a[0])), a[2]
 
     def rotate_symmetric(self, S: Symmetric) -> Symmetric:
         """The product Rz S Rz', with six products for the 2x2 block, which rotates by twice the angle."""
         c, s = self
-        difference = S.yy - S.xx
-        doubled = S.xy + S.xy
-        even = s * (s * difference - c * doubled)
-        odd = s * (c * difference + s * doubled)
+        difference = minus(S.yy, S.xx)
+        doubled = plus(S.xy, S.xy)
+        even = times(s, minus(times(s, difference), times(c, doubled)))
+        odd = times(s, plus(times(c, difference), times(s, doubled)))
         return Symmetric(
-            xx=S.xx + even,
-            yy=S.yy - even,
+            xx=plus(S.xx, even),
+            yy=minus(S.yy, even),
             zz=S.zz,
-            xy=S.xy - odd,
-            yz=s * S.xz + c * S.yz,
-            xz=c * S.xz - s * S.yz,
+            xy=minus(S.xy, odd),
+            yz=plus(times(s, S.xz), times(c, S.yz)),
+            xz=minus(times(c, S.xz), times(s, S.yz)),
         )
 
 
