@@ -212,7 +212,7 @@ def test_an_addition_in_one_file_is_available_everywhere(
     place: str, file: str, use: str, tmp_path: Path
 ) -> None:
     copy = tmp_path / "armblocks"
-    shutil.copytree(ROOT / "src" / "armblocks", copy, ignore=shutil.ignore_patterns("__pycache__", "web"))
+    shutil.copytree(ROOT / "src" / "armblocks", copy, ignore=shutil.ignore_patterns("web"))
     shutil.copytree(ROOT / "robots", copy / "shipped" / "robots")
     (copy / place).write_text(file, encoding="utf-8")
     run = subprocess.run(
