@@ -16,6 +16,7 @@ from armblocks.diagram.conditional import (
     ResettableSubsystem,
     TriggeredSubsystem,
 )
+from armblocks.diagram.connection_port import ConnectionPort
 from armblocks.diagram.structure import Inport, Outport, Subsystem
 from armblocks.diagram.virtual_wiring import BusAssignment, BusCreator, BusSelector, From, Goto
 from armblocks.package_folder import classes_with
@@ -29,6 +30,7 @@ FAMILIES = (
     "routing",
     "structure",
     "transforms",
+    "mechanics",
     "robots",
     "sinks",
     "matrices",
@@ -42,6 +44,7 @@ _DIAGRAM_LAYER_TYPES: dict[str, tuple[type[Block], ...]] = {
     "routing": (BusAssignment, BusCreator, BusSelector, From, Goto, Merge),
     "structure": (
         ActionSubsystem,
+        ConnectionPort,
         EnabledSubsystem,
         EnabledTriggeredSubsystem,
         Inport,

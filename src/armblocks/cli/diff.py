@@ -21,7 +21,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from armblocks.diagram import Block, Diagram
-    from armblocks.diagram.difference import DiagramDifference, PlacedPort, PlacedWire, ValueChange
+    from armblocks.diagram.difference import (
+        DiagramDifference,
+        PlacedLine,
+        PlacedPort,
+        PlacedWire,
+        ValueChange,
+    )
 
 DIFFERENT = 1
 _MAX_TEXT_LENGTH = 160
@@ -86,6 +92,8 @@ def print_difference(difference: DiagramDifference, before: str, after: str, con
     _print_group("Parameter sets", (("~", sets),), console)
     wires = (("-", _wires(difference.wires_removed)), ("+", _wires(difference.wires_added)))
     _print_group("Wires", wires, console)
+    lines = (("-", _frame_lines(difference.lines_removed)), ("+", _frame_lines(difference.lines_added)))
+    _print_group("Frame lines", lines, console)
     logged = (("-", _ports(difference.logged_removed)), ("+", _ports(difference.logged_added)))
     _print_group("Logged", logged, console)
     _print_group("Settings", (("~", settings),), console)
@@ -110,6 +118,10 @@ def _print_group(title: str, entries: Sequence[tuple[str, Sequence[str]]], conso
 
 def _wires(wires: Sequence[PlacedWire]) -> list[str]:
     return [f"{f'in {entry.path}: ' if entry.path else ''}{entry.wire}" for entry in wires]
+
+
+def _frame_lines(lines: Sequence[PlacedLine]) -> list[str]:
+    return [f"{f'in {entry.path}: ' if entry.path else ''}{entry.line}" for entry in lines]
 
 
 def _ports(ports: Sequence[PlacedPort]) -> list[str]:
@@ -233,6 +245,10 @@ def difference_document(difference: DiagramDifference) -> dict[str, object]:
         "wires_added": [{"path": entry.path, "wire": str(entry.wire)} for entry in difference.wires_added],
         "wires_removed": [
             {"path": entry.path, "wire": str(entry.wire)} for entry in difference.wires_removed
+        ],
+        "lines_added": [{"path": entry.path, "line": str(entry.line)} for entry in difference.lines_added],
+        "lines_removed": [
+            {"path": entry.path, "line": str(entry.line)} for entry in difference.lines_removed
         ],
         "logged_added": [{"path": entry.path, "port": str(entry.port)} for entry in difference.logged_added],
         "logged_removed": [

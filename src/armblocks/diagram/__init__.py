@@ -15,6 +15,7 @@ from armblocks.diagram.conditional import (
     ResettableSubsystem,
     TriggeredSubsystem,
 )
+from armblocks.diagram.connection_port import ConnectionPort
 from armblocks.diagram.content_key import content_key
 from armblocks.diagram.diagram import (
     BLOCK_COLOURS,
@@ -27,6 +28,7 @@ from armblocks.diagram.diagram import (
 )
 from armblocks.diagram.difference import DiagramDifference, diagram_difference
 from armblocks.diagram.features import SlotKind
+from armblocks.diagram.frames import FrameLine, FramePort, frames_of
 from armblocks.diagram.hierarchy import (
     FlatForm,
     diagram_views,
@@ -90,6 +92,7 @@ __all__ = [
     "Comment",
     "Condition",
     "Connection",
+    "ConnectionPort",
     "DelayLine",
     "Diagram",
     "DiagramBlock",
@@ -102,6 +105,8 @@ __all__ = [
     "ExampleBlock",
     "FileSettings",
     "FlatForm",
+    "FrameLine",
+    "FramePort",
     "From",
     "Goto",
     "Guard",
@@ -146,6 +151,7 @@ __all__ = [
     "flat_diagram",
     "flatten_hierarchy",
     "formula",
+    "frames_of",
     "infer_shapes",
     "infer_units",
     "integral_unit",

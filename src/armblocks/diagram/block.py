@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from abc import ABC
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, ClassVar, Self
@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Self
 from casadi import SX, logic_or
 
 from armblocks.argument_errors import ArgumentErrors
+from armblocks.diagram.frames import FramePort
 from armblocks.diagram.mask import ParameterFormula, Scope, formula_names, formula_value
 from armblocks.diagram.parameter import Parameter, Value, shape_of
 from armblocks.diagram.port import Condition, DelayLine, Guard, Port, State, View, name_before
@@ -77,6 +78,12 @@ class Block(ABC, metaclass=ArgumentErrors, methods=False):
     implicit_outputs: ClassVar[tuple[str, ...]] = ()
     """Implicit outputs: ``outputs`` returns their residual. The solver finds the value
     that makes it zero. Newton's method starts from ``initial_guesses``."""
+    gathers: ClassVar[Callable[[Any], Any] | None] = None
+    """The pass that makes equations of all physical blocks of a family, such as bodies and joints.
+
+    The equations of a physical block follow from its network, and a family of such blocks is above the
+    diagram layer: the blocks bring their pass, a function from a netlist to a netlist, which reads
+    :meth:`part`. A physical block is virtual; see :mod:`armblocks.diagram.passes.physical_networks`."""
     sampled: ClassVar[bool] = False
     """Whether the block is sampled: active at the ticks of a clock, with the parameter ``sample_time``."""
     reads_next_period: ClassVar[bool] = False
@@ -232,6 +239,14 @@ class Block(ABC, metaclass=ArgumentErrors, methods=False):
     def output_ports(self) -> tuple[Port, ...]:
         """The output ports, in order."""
         return ()
+
+    def frame_ports(self) -> tuple[FramePort, ...]:
+        """The frame ports: physical connections without direction, see :mod:`armblocks.diagram.frames`."""
+        return ()
+
+    def part(self) -> object:
+        """What a physical block contributes to its network, as data that the pass ``gathers`` reads."""
+        return None
 
     def bus_inputs(self) -> tuple[str, ...]:
         """Inputs that may be buses with equal elements, for blocks that select, delay or hold signals.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NoReturn
 
 from armblocks.argument_errors import ArgumentErrors
 from armblocks.diagram.block import Block
@@ -13,6 +13,7 @@ from armblocks.diagram.bookmarks import Bookmark, check_bookmark_name
 from armblocks.diagram.check import check_diagram
 from armblocks.diagram.comments import Comment, check_comment
 from armblocks.diagram.diagram import Connection, Diagram, Note, Placement, block_in_scope
+from armblocks.diagram.frames import FrameLine
 from armblocks.diagram.mask import ParameterFormula, checked_mask, formula, mask_parameter, values_of
 from armblocks.diagram.names import check_block_name, check_signal_names, folded
 from armblocks.diagram.parameter import Parameter, Value
@@ -40,7 +41,9 @@ class BlockHandle(metaclass=ArgumentErrors):
 
     def __getitem__(self, port: str) -> PortRef:
         """The port of this name; raises ``UnknownNameError`` with the nearest name."""
-        port_names = [entry.name for entry in (*self.block.output_ports(), *self.block.input_ports())]
+        block = self.block
+        ports = (*block.output_ports(), *block.input_ports(), *block.frame_ports())
+        port_names = [entry.name for entry in ports]
         if port not in port_names:
             raise UnknownNameError("port", port, port_names, where=_where(self.name, self.block))
         return PortRef(self.name, port)
@@ -50,7 +53,9 @@ class BlockHandle(metaclass=ArgumentErrors):
 
 
 Source = PortRef | BlockHandle
-"""A signal source for an input: an output port, or a block with exactly one output."""
+"""A signal source for an input: an output port, or a block with exactly one output.
+
+Where a frame port is expected: a frame port, or a block with exactly one frame port."""
 
 
 class DiagramBuilder(metaclass=ArgumentErrors):
@@ -99,6 +104,8 @@ class DiagramBuilder(metaclass=ArgumentErrors):
         self._ports: dict[str, tuple[dict[str, None], dict[str, None]]] = {}  # names of inputs, of outputs
         self._used_names: dict[str, str] = {}
         self._wires: dict[PortRef, PortRef] = {}
+        self._frames: dict[str, dict[str, None]] = {}  # names of frame ports
+        self._lines: dict[FrameLine, None] = {}
         self._layout: dict[str, Placement] = {}
         self._bends: dict[Connection, tuple[float, ...]] = {}
         self._notes: dict[str, Note] = {}
@@ -137,6 +144,7 @@ class DiagramBuilder(metaclass=ArgumentErrors):
     def add(self, name: str, block: Block, *inputs: Source, **inputs_by_port: Source) -> BlockHandle:
         """Add a block under a new name and connect its inputs, in order or by port name.
 
+        The name of a frame port draws a frame line: ``builder.add("hinge", RevoluteJoint(), B=world)``.
         In and Out blocks without a number get the next one.
         """
         where = f"diagram '{self.name}'"
@@ -170,6 +178,7 @@ class DiagramBuilder(metaclass=ArgumentErrors):
             dict.fromkeys(port.name for port in ports),
             dict.fromkeys(port.name for port in block.output_ports()),
         )
+        self._frames[name] = dict.fromkeys(port.name for port in block.frame_ports())
         handle = BlockHandle(name, block)
         for port, source in zip(ports, inputs):
             self.connect(source, PortRef(name, port.name))
@@ -198,7 +207,14 @@ class DiagramBuilder(metaclass=ArgumentErrors):
         self.add(name, block, *inputs, **inputs_by_port)
 
     def connect(self, source: Source, target: Source) -> None:
-        """Connect an output port to an input port; a block means its only output or only input."""
+        """Connect an output port to an input port; a block means its only output or only input.
+
+        Between two frame ports, this draws a frame line, which has no direction: both are then the same
+        frame. A block with frame ports then means its only frame port.
+        """
+        if self._frame(source) is not None or self._frame(target) is not None:
+            self.draw_line(source, target)
+            return
         driver = self._resolve(source, output=True)
         driven = self._resolve(target, output=False)
         other = self._wires.get(driven)
@@ -210,6 +226,36 @@ class DiagramBuilder(metaclass=ArgumentErrors):
                 fix="remove one of the connections, or join the signals with a Sum or a Mux",
             )
         self._wires[driven] = driver
+
+    def draw_line(self, first: Source, second: Source) -> None:
+        """Draw a frame line between two frame ports, which are then the same frame.
+
+        A block means its only frame port. Raises ``DiagramError`` if an end is not a frame port.
+        """
+        self._lines[FrameLine(self._frame_end(first, second), self._frame_end(second, first))] = None
+
+    def _frame_end(self, end: Source, other: Source) -> PortRef:
+        """The frame port at one end of a line to ``other``. Raises ``DiagramError`` for a signal port."""
+        frame = self._frame(end) or self._only_frame(end)
+        if frame is None:
+            self._refuse_line(end, other)
+        return frame
+
+    def _refuse_line(self, end: Source, other: Source) -> NoReturn:
+        """Raise ``DiagramError`` for an end of a line that is not one frame port."""
+        name = end.block if isinstance(end, PortRef) else end.name
+        self._known(name)
+        frames = ", ".join(f"'{name}/{port}'" for port in self._frames[name])
+        raise DiagramError(
+            f"'{_end_text(other)}' is connected to '{_end_text(end)}', which is not a frame port"
+            if isinstance(end, PortRef) or not frames
+            else f"'{_end_text(other)}' is connected to '{name}', which has several frame ports",
+            where=_where(name, self._blocks[name]),
+            allowed=f"frame lines between frame ports: {frames}"
+            if frames
+            else "frame lines between frame ports; the block has none",
+            fix="name a frame port at both ends of the line, or signal ports at both ends of a connection",
+        )
 
     def place(
         self,
@@ -345,6 +391,26 @@ class DiagramBuilder(metaclass=ArgumentErrors):
             mask=tuple(self._mask),
             mask_values=self._mask_values,
             parameter_sets=self._parameter_sets,
+            frame_lines=tuple(self._lines),
+        )
+
+    def _frame(self, end: object) -> PortRef | None:
+        """The frame port that an end means; ``None`` for a signal port."""
+        if isinstance(end, PortRef) and end.block in self._blocks:
+            signals = self._ports[end.block]
+            known = end.port in self._frames[end.block]
+            return end if known and not any(end.port in names for names in signals) else None
+        if isinstance(end, BlockHandle) and not any(self._ports.get(end.name, ())):
+            return self._only_frame(end)
+        return None
+
+    def _only_frame(self, end: object) -> PortRef | None:
+        """The frame port of a block with exactly one."""
+        frames = self._frames.get(end.name, {}) if isinstance(end, BlockHandle) else {}
+        return (
+            PortRef(end.name, next(iter(frames)))
+            if isinstance(end, BlockHandle) and len(frames) == 1
+            else None
         )
 
     def _next_port(self, kind: type[Inport | Outport]) -> int:
@@ -381,6 +447,10 @@ class DiagramBuilder(metaclass=ArgumentErrors):
                 fix='name the port: handle["port"]',
             )
         return PortRef(name, next(iter(ports)))
+
+
+def _end_text(end: Source) -> str:
+    return str(end) if isinstance(end, PortRef) else end.name
 
 
 def _check_block(block: object, where: str) -> None:

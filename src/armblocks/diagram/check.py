@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from armblocks.diagram.comments import active_levels, check_connected
+from armblocks.diagram.connection_port import ConnectionPort
 from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.levels import levels_of
 from armblocks.diagram.model import diagram_model
@@ -25,8 +26,9 @@ def check_diagram(diagram: Diagram) -> None:
 
 
 def _is_part(diagram: Diagram) -> bool:
-    """Whether a signal enters from outside: by an In block, or by a From tag without a Goto inside."""
-    if any(isinstance(block, Inport) for block in diagram.blocks.values()):
+    """Whether a signal or a frame comes from outside: by an In block or a Connection Port, or by a From tag
+    without a Goto inside."""
+    if any(isinstance(block, Inport | ConnectionPort) for block in diagram.blocks.values()):
         return True
     if not any(block.virtual for block in diagram.blocks.values()):
         return False

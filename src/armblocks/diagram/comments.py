@@ -12,6 +12,7 @@ from collections.abc import Collection, Iterator, Mapping
 from typing import Literal
 
 from armblocks.diagram.block import Block
+from armblocks.diagram.connection_port import ConnectionPort
 from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.levels import joined, level_of
 from armblocks.diagram.port import Port, PortRef
@@ -30,15 +31,22 @@ def check_comment(name: str, block: Block, comment: str) -> Comment:
         raise DiagramError(
             f"the comment is '{comment}'", where=where, allowed="out, through", fix="choose one of them"
         )
-    if isinstance(block, Inport | Outport):
+    if isinstance(block, Inport | Outport | ConnectionPort):
         raise DiagramError(
             "a port of a subsystem is commented",
             where=where,
-            allowed="all blocks except In and Out",
+            allowed="all blocks except In, Out and Connection Port",
             fix="comment the subsystem, or the block at the other end of the wire",
         )
     if comment == "out":
         return comment
+    if block.frame_ports():
+        raise DiagramError(
+            "a block with frame ports is commented through",
+            where=where,
+            allowed="blocks with signal ports only: frames have no direction in which they pass",
+            fix="comment it out, and draw a frame line past it",
+        )
     into, out = len(data_inputs(block)), len(block.output_ports())
     if not 0 < out <= into:
         raise DiagramError(

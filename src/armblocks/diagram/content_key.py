@@ -93,7 +93,8 @@ class _Content:
         ]
         comments = sorted(diagram.commented.items())
         names = [(*_port(ref), name) for ref, name in diagram.signal_names.items()]
-        self.add(("diagram", diagram.name, diagram.blocks, wires, gates, comments, names))
+        lines = [(*_port(line.first), *_port(line.second)) for line in diagram.frame_lines]
+        self.add(("diagram", diagram.name, diagram.blocks, wires, lines, gates, comments, names))
 
     def _add_object(self, value: object) -> None:
         """Digest an object (block, diagram, robot) once: several blocks may share a robot."""

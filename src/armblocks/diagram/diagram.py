@@ -13,6 +13,7 @@ from typing import Any, TypeVar, cast
 from armblocks.argument_errors import ArgumentErrors
 from armblocks.diagram.block import Block
 from armblocks.diagram.bookmarks import Bookmark
+from armblocks.diagram.frames import FrameLine
 from armblocks.diagram.mask import Scope, checked_mask, values_of
 from armblocks.diagram.names import check_signal_names
 from armblocks.diagram.parameter import Parameter, Value
@@ -174,6 +175,8 @@ class Diagram(metaclass=ArgumentErrors):
     """Parts of this sheet by name, see :mod:`armblocks.diagram.bookmarks`."""
     scope_trigger: ScopeTrigger | None = None
     """The trigger of the scopes of the studio; ``None`` for the default, which is off."""
+    frame_lines: tuple[FrameLine, ...] = ()
+    """The lines between frame ports, sorted, see :mod:`armblocks.diagram.frames`."""
     shares: Mapping[str, str] = field(default_factory=dict[str, str])
     """For a flat diagram: blocks that share the parameters of the block of the given name."""
     _cache: dict[str, object] = field(
@@ -204,6 +207,8 @@ class Diagram(metaclass=ArgumentErrors):
             object.__setattr__(self, name, _read_only(getattr(self, name), levels))
         object.__setattr__(self, "connections", tuple(sorted(self.connections)))
         object.__setattr__(self, "logged", tuple(sorted(self.logged)))
+        if self.frame_lines:
+            object.__setattr__(self, "frame_lines", tuple(sorted(set(self.frame_lines))))
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state for pickling and copying: the fields without cached results."""

@@ -10,6 +10,7 @@ from typing import cast
 from armblocks.argument_errors import ArgumentErrors
 from armblocks.diagram.block import Block
 from armblocks.diagram.diagram import Connection, Diagram
+from armblocks.diagram.frames import FrameLine
 from armblocks.diagram.parameter import Parameter, ParameterKind
 from armblocks.diagram.port import PortRef
 from armblocks.equations import SimulationOptions
@@ -62,6 +63,14 @@ class PlacedWire:
 
 
 @dataclass(frozen=True, kw_only=True)
+class PlacedLine:
+    """A frame line that only one of two diagrams has, named like a :class:`PlacedWire`."""
+
+    path: str
+    line: FrameLine
+
+
+@dataclass(frozen=True, kw_only=True)
 class PlacedPort:
     """An output that only one of two diagrams logs, named like the ends of a :class:`PlacedWire`."""
 
@@ -91,6 +100,8 @@ class DiagramDifference(metaclass=ArgumentErrors):
     parameter_sets: tuple[ValueChange, ...] = ()
     wires_added: tuple[PlacedWire, ...] = ()
     wires_removed: tuple[PlacedWire, ...] = ()
+    lines_added: tuple[PlacedLine, ...] = ()
+    lines_removed: tuple[PlacedLine, ...] = ()
     logged_added: tuple[PlacedPort, ...] = ()
     logged_removed: tuple[PlacedPort, ...] = ()
     settings: tuple[ValueChange, ...] = ()
@@ -109,8 +120,8 @@ class DiagramDifference(metaclass=ArgumentErrors):
 def diagram_difference(before: Diagram, after: Diagram) -> DiagramDifference:
     """The changes that lead from ``before`` to ``after``.
 
-    Compared are blocks with their types, parameters and comments, connections, logged outputs, settings,
-    descriptions and the text of annotations, including subsystems. Not compared are the layout, the
+    Compared are blocks with their types, parameters and comments, connections, frame lines, logged outputs,
+    settings, descriptions and the text of annotations, including subsystems. Not compared are the layout, the
     bookmarks, the trigger of the scopes, the name of the diagram (a file without one is named after the file)
     and unknown keys of a file. A removed and an added block count as one renamed block if type, parameters
     and all connections agree. The connected blocks may be renamed too.
@@ -141,6 +152,8 @@ class _Findings:
     parameter_sets: list[ValueChange] = field(default_factory=list[ValueChange])
     wires_added: list[PlacedWire] = field(default_factory=list[PlacedWire])
     wires_removed: list[PlacedWire] = field(default_factory=list[PlacedWire])
+    lines_added: list[PlacedLine] = field(default_factory=list[PlacedLine])
+    lines_removed: list[PlacedLine] = field(default_factory=list[PlacedLine])
     logged_added: list[PlacedPort] = field(default_factory=list[PlacedPort])
     logged_removed: list[PlacedPort] = field(default_factory=list[PlacedPort])
     settings: list[ValueChange] = field(default_factory=list[ValueChange])
@@ -171,6 +184,11 @@ def _compare_levels(before: Diagram, after: Diagram, path: str, findings: _Findi
     findings.wires_added += (PlacedWire(path=path, wire=wire) for wire in sorted(wires_after - wires_before))
     findings.wires_removed += (
         PlacedWire(path=path, wire=wire) for wire in sorted(wires_before - wires_after)
+    )
+    lines_before, lines_after = {line.renamed(names) for line in before.frame_lines}, set(after.frame_lines)
+    findings.lines_added += (PlacedLine(path=path, line=line) for line in sorted(lines_after - lines_before))
+    findings.lines_removed += (
+        PlacedLine(path=path, line=line) for line in sorted(lines_before - lines_after)
     )
     old_comments = {names.get(name, name): comment for name, comment in before.commented.items()}
     for name in {**old_comments, **after.commented}:
@@ -304,6 +322,10 @@ def _ends_of(diagram: Diagram, names: Mapping[str, object]) -> dict[str, _Ends]:
             ends[wire.source.block].append((wire.source.port, "out", wire.target))
         if wire.target.block in ends:
             ends[wire.target.block].append((wire.target.port, "in", wire.source))
+    for line in diagram.frame_lines:
+        for own, other in (line.ends, line.ends[::-1]):
+            if own.block in ends:
+                ends[own.block].append((own.port, "line", other))
     return ends
 
 
@@ -357,7 +379,7 @@ def _value_content(block: Block, rule: Parameter) -> object:
     comments = tuple(inside.commented.items())
     signals = tuple(inside.signal_names.items())
     whole = (inside.settings, inside.description, inside.mask, inside.link, inside.logged, comments, signals)
-    return (blocks, inside.connections, *whole)
+    return (blocks, inside.connections, inside.frame_lines, *whole)
 
 
 def _renamed(port: PortRef, names: Mapping[str, str]) -> PortRef:

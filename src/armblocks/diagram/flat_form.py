@@ -82,6 +82,7 @@ def _as_diagram(net: Netlist) -> Diagram:
         commented={},
         signal_names={},
         shares=net.shares,
+        frame_lines=(),
     )
 
 

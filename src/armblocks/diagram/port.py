@@ -17,6 +17,8 @@ class Port(metaclass=ArgumentErrors):
     ``""`` if the port has no unit or the unit of its signal. ``names`` are the names of the entries of a
     vector, such as joints, if the block has names for them. ``before_events``: an output with the value
     before the events of its block at the same instant, such as the state of an integrator before a reset.
+    ``internal``: a port between blocks of a flat diagram that a pass has added; a run does not record its
+    signal.
     """
 
     name: str
@@ -25,6 +27,7 @@ class Port(metaclass=ArgumentErrors):
     shape: Shape | None = None
     names: tuple[str, ...] = ()
     before_events: bool = False
+    internal: bool = False
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,9 @@ from casadi import SX
 from numpy.typing import ArrayLike
 
 from armblocks.diagram.block import Block, Shapes, Signals
+from armblocks.diagram.connection_port import ConnectionPort
 from armblocks.diagram.diagram import Connection, Diagram
+from armblocks.diagram.frames import FramePort
 from armblocks.diagram.parameter import Parameter, ParameterKind, Value, parameter
 from armblocks.diagram.port import Port, PortRef
 from armblocks.diagram.signs import Outline
@@ -209,6 +211,9 @@ class DiagramBlock(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return inner_outputs(self.diagram)
 
+    def frame_ports(self) -> tuple[FramePort, ...]:
+        return inner_frames(self.diagram)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Subsystem(DiagramBlock):
@@ -280,5 +285,17 @@ def inner_outputs(diagram: Diagram) -> tuple[Port, ...]:
         lambda: tuple(
             Port(name, f"Out block '{name}'", block.unit, declared_shape(block))
             for name, block in port_blocks(diagram, Outport)
+        ),
+    )
+
+
+def inner_frames(diagram: Diagram) -> tuple[FramePort, ...]:
+    """The frame ports of a subsystem, from its Connection Port blocks."""
+    return diagram.cached(
+        "inner frames",
+        lambda: tuple(
+            FramePort(name, f"Connection Port block '{name}'", "left" if block.side == "left" else "right")
+            for name, block in diagram.blocks.items()
+            if isinstance(block, ConnectionPort)
         ),
     )

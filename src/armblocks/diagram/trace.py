@@ -357,6 +357,7 @@ def _signal_values(
 ) -> list[tuple[str, tuple[int, ...], Value]]:
     """Path, shape and location of every recorded signal, in evaluation order."""
     derived: dict[Node, list[PortRef]] = {}
+    internal = _internal_outputs(network.diagram)
     for name, block in network.diagram.blocks.items():
         for port in block.time_derivatives:
             ref = PortRef(name, port)
@@ -365,6 +366,8 @@ def _signal_values(
     def recorded(node: Node, slot: BlockSlot) -> bool:
         # For a sampled block the held outputs are recorded.
         computed = slot.kind is SlotKind.OUTPUT and not network.diagram.clocked(node.block)
+        if slot.kind is SlotKind.OUTPUT and slot.name in internal.get(node.block, ()):
+            return False
         return node.order == 0 and (computed or slot.kind is SlotKind.RECORD)
 
     signals: list[tuple[str, tuple[int, ...], Value]] = []
@@ -426,6 +429,7 @@ def _aliases(form: FlatForm, layout: Signature) -> dict[str, str]:
     """Other names of signals: the user's names, names of blocks with one output, input and virtual ports."""
     aliases: dict[str, str] = {}
     used_names = set(layout.names)
+    internal = {f"{name}/{port}" for name, ports in _internal_outputs(form.diagram).items() for port in ports}
     for name, block in form.diagram.blocks.items():
         outputs = block.output_ports()
         if len(outputs) == 1:
@@ -437,4 +441,15 @@ def _aliases(form: FlatForm, layout: Signature) -> dict[str, str]:
             aliases[wire.target.block] = str(wire.source)
     aliases.update({name: str(ref) for name, ref in form.aliases.items() if name not in used_names})
     aliases.update({name: str(ref) for name, ref in named_signals(form)})
+    if internal:
+        aliases = {name: path for name, path in aliases.items() if path not in internal}
     return aliases
+
+
+def _internal_outputs(diagram: Diagram) -> dict[str, frozenset[str]]:
+    """The output ports by block that are not recorded; blocks without such ports are absent."""
+    ports = {
+        name: frozenset(port.name for port in block.output_ports() if port.internal)
+        for name, block in diagram.blocks.items()
+    }
+    return {name: names for name, names in ports.items() if names}

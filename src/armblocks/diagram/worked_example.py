@@ -56,7 +56,8 @@ class WorkedExample:
     ``shows``: a caption of one or two sentences. ``parameters`` of the block (robots by name). ``inputs`` by
     port; an omitted port gets a suitable signal. ``shown``: the signals of the scope; by default the inputs
     and outputs of the block. ``x_axis`` and ``y_axis``: the signals of an x-y plot instead. ``extra_blocks``:
-    additional, unconnected blocks. ``stop_time`` (s) of the run and ``sample_time`` (s) of the record.
+    additional, unconnected blocks. ``lines``: frame lines, pairs of frame ports ``"block/port"``, or
+    ``"port"`` of the example's block. ``stop_time`` (s) of the run and ``sample_time`` (s) of the record.
     """
 
     shows: str = ""
@@ -66,5 +67,6 @@ class WorkedExample:
     x_axis: Driver | None = None
     y_axis: Driver | None = None
     extra_blocks: tuple[ExampleBlock, ...] = ()
+    lines: tuple[tuple[str, str], ...] = ()
     stop_time: float = 10.0
     sample_time: float | None = None

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 from armblocks.diagram import Block, Placement
 from armblocks.diagram.signs import Outline
-from armblocks.drawing.block_faces import bus_width, face_size, face_width, port_labels
+from armblocks.drawing.block_faces import bus_width, face_size, face_width, frame_labels, port_labels
 from armblocks.drawing.structure_faces import CONTROL_HEIGHT, control_ports
 from armblocks.pictures.text_width import text_width
 
@@ -19,6 +19,11 @@ NAME_HEIGHT = 20.0
 PORT_TEXT = 9.0
 PORT_TEXT_HEIGHT = 13.0
 """Height of the port names at the upper or lower edge, px."""
+
+
+SIDES = ("left", "right")
+_FRAME = "\0"
+"""Precedes the name of a frame port among the ports of one side; names of ports are printable."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +57,8 @@ class Box:
     colour: str = "none"
     inputs: tuple[BoxPort, ...] = ()
     outputs: tuple[BoxPort, ...] = ()
+    frames: tuple[BoxPort, ...] = ()
+    """The frame ports; the direction of each leads away from the block."""
 
     @property
     def upright(self) -> bool:
@@ -72,6 +79,7 @@ class Box:
             y=y,
             inputs=tuple(replace(p, x=p.x + dx, y=p.y + dy) for p in self.inputs),
             outputs=tuple(replace(p, x=p.x + dx, y=p.y + dy) for p in self.outputs),
+            frames=tuple(replace(p, x=p.x + dx, y=p.y + dy) for p in self.frames),
         )
 
 
@@ -106,9 +114,10 @@ def _rotated_size(box: Box) -> tuple[float, float]:
         return box.width, box.height + 10
     if shape not in (Outline.CARD, Outline.BUS):
         return box.height, box.width
-    labels = port_labels(box.block)
+    labels = _side_labels(box.block)
     pitches = [max((text_width(text, PORT_TEXT) + 6 for text in side), default=0.0) for side in labels]
-    ports = (len(box.block.input_ports()), len(box.block.output_ports()))
+    frames = [sum(port.side == side for port in box.block.frame_ports()) for side in SIDES]
+    ports = (len(box.block.input_ports()) + frames[0], len(box.block.output_ports()) + frames[1])
     wide = max(count * max(20.0, pitch) + 8 for count, pitch in zip(ports, pitches))
     if shape is Outline.BUS:
         return float(round(max(box.height, wide))), 30.0
@@ -121,9 +130,11 @@ def _rotated_size(box: Box) -> tuple[float, float]:
 def box_at_origin(name: str, block: Block) -> Box:
     """A box at the origin with the size of the block's face and with its ports along the edges."""
     shape, width, height = face_size(block)
-    inputs, outputs = len(block.input_ports()) - len(control_ports(block)), len(block.output_ports())
+    left_frames = sum(port.side == "left" for port in block.frame_ports())
+    inputs = len(block.input_ports()) - len(control_ports(block)) + left_frames
+    outputs = len(block.output_ports()) + len(block.frame_ports()) - left_frames
     if shape is Outline.CARD:
-        labels = port_labels(block)
+        labels = _side_labels(block)
         if any(label for side in labels for label in side):
             widest = [max((text_width(t, PORT_TEXT) + 5 for t in side if t), default=0.0) for side in labels]
             width = max(width, face_width(block) + sum(widest) + 4)
@@ -133,6 +144,16 @@ def box_at_origin(name: str, block: Block) -> Box:
     elif shape is Outline.BUS:
         width, height = bus_width(block, PORT_TEXT), max(height, 20.0 * max(inputs, outputs) + 4)
     return _with_ports(Box(name=name, block=block, x=0.0, y=0.0, width=float(round(width)), height=height))
+
+
+def _side_labels(block: Block) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The texts beside the ports of the left and of the right side, with those of frame ports."""
+    into, out = port_labels(block)
+    named = list(zip(block.frame_ports(), frame_labels(block)))
+    left, right = (
+        tuple(label for port, label in named if label and port.side == side) for side in ("left", "right")
+    )
+    return (*left, *into), (*right, *out)
 
 
 def flipped_box(box: Box) -> Box:
@@ -151,7 +172,7 @@ def with_inputs(box: Box, inputs: Sequence[BoxPort]) -> Box:
 
 
 def _free_name_side(box: Box) -> str:
-    ports = (*box.inputs, *box.outputs)
+    ports = (*box.inputs, *box.outputs, *box.frames)
     has_ports = {
         "left": any(port.x <= box.x for port in ports),
         "right": any(port.x >= box.x + box.width for port in ports),
@@ -170,12 +191,13 @@ def _with_ports(box: Box) -> Box:
     """The box with its ports, which are rotated with the block."""
     width, height = (box.width, box.height) if box.upright else (box.height, box.width)
     upright = _with_upright_ports(replace(box, x=0.0, y=0.0, width=width, height=height))
-    inputs, outputs = upright.inputs, upright.outputs
+    inputs, outputs, frames = upright.inputs, upright.outputs, upright.frames
     for _ in range(box.rotation // 90):
         inputs = tuple(_rotated_by_90(port, height) for port in inputs)
         outputs = tuple(_rotated_by_90(port, height) for port in outputs)
+        frames = tuple(_rotated_by_90(port, height) for port in frames)
         width, height = height, width
-    return with_inputs(replace(box, x=0.0, y=0.0, outputs=outputs), inputs).at(box.x, box.y)
+    return with_inputs(replace(box, x=0.0, y=0.0, outputs=outputs, frames=frames), inputs).at(box.x, box.y)
 
 
 def _rotated_by_90(port: BoxPort, height: float) -> BoxPort:
@@ -202,15 +224,39 @@ def _with_upright_ports(box: Box) -> Box:
     above = control_ports(box.block)
     side = [name for name in into if name not in above]
     top = CONTROL_HEIGHT if above else 0.0
+    of_side = {s: [port.name for port in box.block.frame_ports() if port.side == s] for s in SIDES}
+    entering = _evenly_spaced_ports(
+        [*(f"{_FRAME}{name}" for name in of_side["left"]), *side],
+        entry,
+        box.y + top,
+        box.height - top,
+        forwards,
+    )
     ports = {
-        **_evenly_spaced_ports(side, entry, box.y + top, box.height - top, forwards),
+        **entering,
         **{
             name: BoxPort(name, box.x + box.width * (k + 1) / (len(above) + 1), box.y, 0, 1)
             for k, name in enumerate(above)
         },
     }
-    leaving = _evenly_spaced_ports(out, leave, box.y + top, box.height - top, forwards)
-    return replace(box, inputs=tuple(ports[name] for name in into), outputs=tuple(leaving.values()))
+    leaving = _evenly_spaced_ports(
+        [*(f"{_FRAME}{name}" for name in of_side["right"]), *out],
+        leave,
+        box.y + top,
+        box.height - top,
+        forwards,
+    )
+    frames = {
+        name: replace(placed[f"{_FRAME}{name}"], name=name, dx=outwards)
+        for s, placed, outwards in (("left", entering, -forwards), ("right", leaving, forwards))
+        for name in of_side[s]
+    }
+    return replace(
+        box,
+        inputs=tuple(ports[name] for name in into),
+        outputs=tuple(leaving[name] for name in out),
+        frames=tuple(frames[port.name] for port in box.block.frame_ports()),
+    )
 
 
 def _evenly_spaced_ports(

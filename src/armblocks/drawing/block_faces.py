@@ -185,8 +185,17 @@ def port_labels(block: Block) -> tuple[tuple[str, ...], tuple[str, ...]]:
         case _ if is_subsystem(block):
             above = control_ports(block)
             return tuple("" if name in above else name for name in into), out
+        case _ if block.frame_ports():
+            return into, out
         case _:
             return into if len(into) > 1 else (), out if len(out) > 1 else ()
+
+
+def frame_labels(block: Block) -> tuple[str, ...]:
+    """The texts beside the frame ports: their names, unless the block has a single port."""
+    frames = block.frame_ports()
+    single = len(frames) == 1 and not block.input_ports() and not block.output_ports()
+    return tuple("" if single else port.name for port in frames)
 
 
 def bus_width(block: Block, size: float) -> float:

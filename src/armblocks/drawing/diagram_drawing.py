@@ -16,6 +16,7 @@ from armblocks.diagram import (
     ViewKind,
     diagram_views,
     flatten_hierarchy,
+    frames_of,
     infer_shapes,
     levels_of,
 )
@@ -38,12 +39,30 @@ from armblocks.drawing.face_marks import FaceArea
 from armblocks.drawing.rates import Rates
 from armblocks.drawing.sink_faces import Trend
 from armblocks.drawing.structure_faces import control_ports
-from armblocks.drawing.wire_marks import WireKind, arrow_head, label_marks, rounded_path, wire_marks
+from armblocks.drawing.wire_marks import (
+    FRAME_TONE,
+    WireKind,
+    arrow_head,
+    frame_line_marks,
+    label_marks,
+    rounded_path,
+    wire_marks,
+)
 from armblocks.drawing.wire_names import name_marks
 from armblocks.drawing.wire_routing import route
 from armblocks.drawing.wires import Net, Obstacle, RoutedNet, WireEnd
 from armblocks.errors import DiagramError, UnknownNameError, counted
-from armblocks.pictures.picture import Curve, Group, Mark, Picture, Polyline, Text, moved, rotated_clockwise
+from armblocks.pictures.picture import (
+    Curve,
+    Group,
+    Mark,
+    Picture,
+    Polyline,
+    Rectangle,
+    Text,
+    moved,
+    rotated_clockwise,
+)
 from armblocks.pictures.style import Theme, Tone
 from armblocks.pictures.svg import svg_file
 from armblocks.pictures.text_width import shorten, text_width
@@ -79,8 +98,12 @@ def diagram_picture(
     placed_boxes = boxes(level)
     nets, wires = wire_nets(level.connections, drawn_bends(level), placed_boxes)
     obstacles = [obstacle(box) for box in placed_boxes.values()]
-    routed = route(obstacles, nets)
+    lines = frame_nets(level, placed_boxes)
+    every = route(obstacles, [*nets, *(net for _, net in lines)])
+    routed, routed_lines = every[: len(nets)], every[len(nets) :]
     marks: list[Mark] = []
+    for (ends, net), line in zip(lines, routed_lines):
+        marks += frame_line_marks(net, line, " and ".join(map(str, ends)), str(ends[0]))
     for (source, _), net in zip(wires.items(), routed):
         kind = contents.kind(PortRef(path + source.block, source.port))
         _, tone = clocks.mark(path + source.block) or ("", Tone.WIRE)
@@ -100,7 +123,7 @@ def diagram_picture(
     if comment:
         marks = [grey_mark(mark) for mark in marks]
     marks += _notes(level)
-    left, top, right, bottom = _extent(placed_boxes, routed, level)
+    left, top, right, bottom = _extent(placed_boxes, every, level)
     picture = Picture(
         width=right - left + 2 * _MARGIN,
         height=bottom - top + 2 * _MARGIN,
@@ -151,6 +174,9 @@ def block_picture(block: Block) -> Picture:
         marks.append(Curve(rounded_path(path), stroke=Tone.WIRE, width=1.2))
         if enters:
             marks.append(arrow_head(path))
+    for port in box.frames:
+        end = (port.x + _STUB_LENGTH * port.dx, port.y + _STUB_LENGTH * port.dy)
+        marks.append(Curve(rounded_path(((port.x, port.y), end)), stroke=FRAME_TONE, width=1.8))
     marks += [mark for mark in _block(box, None) if not isinstance(mark, Text) or mark.text]
     above, below = (any(port.dy == direction for port in box.inputs) for direction in (1, -1))
     picture = Picture(
@@ -186,6 +212,32 @@ def wire_nets(
         for source, targets in wires.items()
     ]
     return nets, wires
+
+
+def frame_nets(diagram: Diagram, placed_boxes: Mapping[str, Box]) -> list[tuple[tuple[PortRef, ...], Net]]:
+    """The nets of the frames of a sheet: the ports of each, and the net from the first port to the others.
+
+    The first port is the rightmost one that leads to the right, as if the line were a signal.
+    """
+    nets: list[tuple[tuple[PortRef, ...], Net]] = []
+    for members in frames_of(diagram.frame_lines):
+        ports = {ref: port for ref in members if (port := _frame_port(placed_boxes, ref)) is not None}
+        if len(ports) < 2:
+            continue
+        first, *others = sorted(ports, key=lambda ref: (-ports[ref].dx, ports[ref].x, ref))
+        source = ports[first]
+        ends = tuple(
+            WireEnd(port.x, port.y, -port.dx, -port.dy) for port in (ports[other] for other in others)
+        )
+        net = Net(WireEnd(source.x, source.y, source.dx, source.dy), ends, ((),) * len(ends))
+        nets.append(((first, *others), net))
+    return nets
+
+
+def _frame_port(placed_boxes: Mapping[str, Box], ref: PortRef) -> BoxPort | None:
+    """A frame port; ``None`` if it does not exist in an incomplete diagram."""
+    box = placed_boxes.get(ref.block)
+    return None if box is None else next((port for port in box.frames if port.name == ref.port), None)
 
 
 def _end(ports: tuple[BoxPort, ...], name: str) -> WireEnd:
@@ -258,7 +310,7 @@ def block_marks(box: Box, trend: Trend | None = None, comment: str = "") -> list
 
 def _plain_marks(box: Box, trend: Trend | None) -> list[Mark]:
     shape, block = _shape(box), box.block
-    marks: list[Mark] = [_outline(box)]
+    marks: list[Mark] = [_outline(box), *frame_port_marks(box)]
     area = FaceArea(box.x, box.y, box.width, box.height)
     if shape in (Outline.CARD, Outline.BUS):
         names, area = _port_names(box)
@@ -287,6 +339,15 @@ def _plain_marks(box: Box, trend: Trend | None) -> list[Mark]:
     return marks + (
         port_marks if port_marks is not None else block_faces.face(block, area, trend, flipped=flipped)
     )
+
+
+def frame_port_marks(box: Box) -> list[Mark]:
+    """Small squares at the frame ports."""
+    half = 3.0
+    return [
+        Rectangle(port.x - half, port.y - half, 2 * half, 2 * half, 1.0, Tone.SURFACE, FRAME_TONE, 1.2)
+        for port in box.frames
+    ]
 
 
 def _outline(box: Box) -> Mark:
@@ -320,15 +381,18 @@ def _port_names(box: Box) -> tuple[list[Mark], FaceArea]:
     marks: list[Mark] = []
     label_width = {"left": 0.0, "right": 0.0}
     into, out = block_faces.port_labels(box.block)
+    frames = list(zip(box.frames, block_faces.frame_labels(box.block)))
     flipped = box.flipped != (box.rotation == 180)
     for ports, labels, side in (
         (box.inputs, into, "right" if flipped else "left"),
         (box.outputs, out, "left" if flipped else "right"),
     ):
-        if not any(labels):
+        edge = box.x if side == "left" else box.x + box.width
+        shown = [*zip(ports, labels), *((port, label) for port, label in frames if port.x == edge)]
+        if not any(label for _, label in shown):
             continue
-        label_width[side] = max(text_width(label, PORT_TEXT) for label in labels) + 5
-        for port, label in zip(ports, labels):
+        label_width[side] = max(text_width(label, PORT_TEXT) for _, label in shown) + 5
+        for port, label in shown:
             if not label:
                 continue
             x = box.x + 5 if side == "left" else box.x + box.width - 5
@@ -341,8 +405,12 @@ def _port_names(box: Box) -> tuple[list[Mark], FaceArea]:
 def _port_names_above_and_below(box: Box) -> tuple[list[Mark], FaceArea]:
     marks: list[Mark] = []
     top, bottom = box.y, box.y + box.height
+    frames = [(port, label) for port, label in zip(box.frames, block_faces.frame_labels(box.block)) if label]
     for ports, labels in zip((box.inputs, box.outputs), block_faces.port_labels(box.block)):
         labelled_ports = [(port, label) for port, label in zip(ports, labels) if label]
+        edge = next((port.y for port in ports), None)
+        labelled_ports += [(port, label) for port, label in frames if edge in (None, port.y)]
+        frames = [entry for entry in frames if entry not in labelled_ports]
         above = any(port.y == box.y for port, _ in labelled_ports)
         for port, label in labelled_ports:
             y = box.y + PORT_TEXT + 3 if above else box.y + box.height - 5
@@ -437,7 +505,8 @@ def _text_alternative(diagram: Diagram) -> str:
     def connection_text(wire: Connection) -> str:
         return f"{wire.source} to {wire.target}"
 
-    connection_list = "; ".join(connection_text(wire) for wire in diagram.connections)
+    lines = [f"{line.first} and {line.second} are one frame" for line in diagram.frame_lines]
+    connection_list = "; ".join([*(connection_text(wire) for wire in diagram.connections), *lines])
     return (
         f"{counted(len(diagram.blocks), 'block')}. Wires: {connection_list}."
         if connection_list

@@ -102,10 +102,16 @@ class _ExampleBuilder:
             self._builder.connect(source, PortRef(self._name, port))
         for signal in self._example.extra_blocks:
             self._block_of(signal)
+        for ends in self._example.lines:
+            self._builder.draw_line(*(self._frame(end) for end in ends))
         self._show()
         for signal, target in self._wires:
             self._builder.connect(self._source(signal), target)
         return self._builder.build()
+
+    def _frame(self, end: str) -> PortRef:
+        block, _, port = end.rpartition("/")
+        return PortRef(block or self._name, port)
 
     def _show(self) -> None:
         """The sink: a scope of the shown signals, unless the block is a sink itself."""

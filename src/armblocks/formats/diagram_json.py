@@ -16,6 +16,8 @@ with ``/``, which block names cannot::
       "settings": {"stop_time": 10, …}
     }
 
+``frame_lines`` has the lines between frame ports, sorted texts without direction: ``"hinge/F -- rod/R"``.
+
 A diagram may declare parameters, its ``mask``; a block's ``formulas`` of them are beside its parameters, and
 their values are not written. The values of mask parameters are among the parameters of the subsystem block,
 for the outermost diagram under ``parameters`` of the document.

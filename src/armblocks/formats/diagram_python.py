@@ -87,6 +87,7 @@ class _ProgramWriter:
         used = {wire.source.block for wire in diagram.connections} | {
             wire.target.block for wire in backward_connections
         }
+        used |= {end.block for line in diagram.frame_lines for end in line.ends}
         used |= {ref.block for ref in (*diagram.logged, *diagram.signal_names)} | set(diagram.commented)
         before: list[str] = []
         for name in order:
@@ -99,6 +100,10 @@ class _ProgramWriter:
         for wire in backward_connections:
             source = _output_expression(diagram, wire.source, names)
             written.append(f'{builder}.connect({source}, {names[wire.target.block]}["{wire.target.port}"])')
+        written += [
+            f"{builder}.draw_line({', '.join(_frame_expression(diagram, end, names) for end in line.ends)})"
+            for line in diagram.frame_lines
+        ]
         written += [f"{builder}.log({_output_expression(diagram, ref, names)})" for ref in diagram.logged]
         written += [
             f"{builder}.name_signal({_output_expression(diagram, ref, names)}, {_text(name)})"
@@ -240,6 +245,11 @@ def _sources(diagram: Diagram, name: str, added: set[str], names: Mapping[str, s
 def _output_expression(diagram: Diagram, source: PortRef, names: Mapping[str, str]) -> str:
     outputs: tuple[Port, ...] = diagram.blocks[source.block].output_ports()
     return names[source.block] if len(outputs) == 1 else f'{names[source.block]}["{source.port}"]'
+
+
+def _frame_expression(diagram: Diagram, end: PortRef, names: Mapping[str, str]) -> str:
+    frames = diagram.blocks[end.block].frame_ports()
+    return names[end.block] if len(frames) == 1 else f'{names[end.block]}["{end.port}"]'
 
 
 def _robots(diagrams: Iterable[Diagram]) -> dict[Robot, tuple[str, str]]:

@@ -25,6 +25,7 @@ from armblocks.formats.layout_json import (
     Layout,
     bookmark_from_json,
     connection_from_json,
+    line_from_json,
     scope_trigger_from_json,
 )
 from armblocks.formats.located_errors import located
@@ -40,6 +41,7 @@ INNER_KEYS = (
     "mask",
     "blocks",
     "connections",
+    "frame_lines",
     "logged",
     "signal_names",
     "parameter_sets",
@@ -92,6 +94,10 @@ class DiagramReader:
             source, target = connection_from_json(entry)
             with located(entry):
                 builder.connect(source, target)
+        for entry in members["frame_lines"].elements() if "frame_lines" in members else []:
+            first, second = line_from_json(entry)
+            with located(entry):
+                builder.draw_line(first, second)
         for entry in members["logged"].elements() if "logged" in members else []:
             with located(entry):
                 builder.log(_port(entry, entry.text()))

@@ -49,6 +49,7 @@ class DiagramWriter:
                 for key, block in diagram.blocks.items()
             },
             "connections": [str(wire) for wire in diagram.connections],
+            **({"frame_lines": [str(line) for line in diagram.frame_lines]} if diagram.frame_lines else {}),
             **({"logged": [str(ref) for ref in diagram.logged]} if diagram.logged else {}),
             **(
                 {"signal_names": {str(ref): name for ref, name in diagram.signal_names.items()}}

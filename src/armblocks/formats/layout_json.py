@@ -29,6 +29,7 @@ from armblocks.formats.unknown_members import Extras, members_of, split_extras
 _BOOKMARK = tuple(field.name for field in dataclasses.fields(Bookmark))
 _TRIGGER = {field.name: field.default for field in dataclasses.fields(ScopeTrigger)}
 _PLACEMENT = {field.name: field.default for field in dataclasses.fields(Placement)}
+_LINE = re.compile(r"([^/]+)/([^/]+?) -- ([^/]+)/([^/]+)")
 _CONNECTION = re.compile(r"([^/]+)/([^/]+?) -> ([^/]+)/([^/]+)")
 
 
@@ -37,6 +38,14 @@ def connection_from_json(node: Node) -> tuple[PortRef, PortRef]:
     match = _CONNECTION.fullmatch(node.text())
     if match is None:
         raise node.error(f"'{node.text()[:80]}' is not a connection", allowed='"block/output -> block/input"')
+    return PortRef(match[1], match[2]), PortRef(match[3], match[4])
+
+
+def line_from_json(node: Node) -> tuple[PortRef, PortRef]:
+    """The two ends of a frame line from its text."""
+    match = _LINE.fullmatch(node.text())
+    if match is None:
+        raise node.error(f"'{node.text()[:80]}' is not a frame line", allowed='"block/port -- block/port"')
     return PortRef(match[1], match[2]), PortRef(match[3], match[4])
 
 

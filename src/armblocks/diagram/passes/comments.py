@@ -41,6 +41,9 @@ def resolve_comments(net: Netlist) -> Netlist:
         levels={path: level for path, level in net.levels.items() if not is_inside(path, net.commented)},
         blocks=blocks,
         drivers={ref: source for ref, source in net.drivers.items() if _is_port(ref, blocks)},
+        frame_lines=tuple(
+            line for line in net.frame_lines if all(_is_frame(end, blocks) for end in line.ends)
+        ),
         replaced={**net.replaced, **comments.replaced},
         origins={**net.origins, **comments.origins},
         commented={},
@@ -53,6 +56,11 @@ def _is_port(ref: PortRef, blocks: dict[str, Block]) -> bool:
     if not isinstance(block, Bypass | Grounded):
         return block is not None
     return any(port.name == ref.port for port in block.input_ports())
+
+
+def _is_frame(ref: PortRef, blocks: dict[str, Block]) -> bool:
+    block = blocks.get(ref.block)
+    return block is not None and any(port.name == ref.port for port in block.frame_ports())
 
 
 class _Comments:

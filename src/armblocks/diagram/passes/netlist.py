@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from armblocks.diagram.block import Block
 from armblocks.diagram.bus import PortContent
 from armblocks.diagram.diagram import Diagram, Gate
+from armblocks.diagram.frames import FrameLine
 from armblocks.diagram.levels import joined
 from armblocks.diagram.port import PortRef, View
 from armblocks.equations import Shape
@@ -72,6 +73,8 @@ class Netlist:
     """Every block by path, level by level, and then the blocks that passes have added."""
     drivers: Mapping[PortRef, PortRef]
     """The output port that is connected to each input port."""
+    frame_lines: tuple[FrameLine, ...] = ()
+    """The lines between frame ports, of all levels; empty after the pass ``physical_networks``."""
     commented: Mapping[str, str] = field(default_factory=dict[str, str])
     """The outermost commented blocks by path, see :mod:`armblocks.diagram.comments`; empty after their
     pass."""
@@ -144,17 +147,22 @@ def netlist(
     """The netlist of a hierarchy before all passes; the first of ``levels`` is the top."""
     blocks: dict[str, Block] = {}
     drivers: dict[PortRef, PortRef] = {}
+    lines: list[FrameLine] = []
     for level, diagram in levels.items():
         for name, block in diagram.blocks.items():
             blocks[joined(level, name)] = block
         for wire in diagram.connections:
             source = PortRef(joined(level, wire.source.block), wire.source.port)
             drivers[PortRef(joined(level, wire.target.block), wire.target.port)] = source
+        for line in diagram.frame_lines:
+            first, second = (PortRef(joined(level, end.block), end.port) for end in line.ends)
+            lines.append(FrameLine(first, second))
     return Netlist(
         top=levels[""],
         levels=levels,
         blocks=blocks,
         drivers=drivers,
+        frame_lines=tuple(lines),
         commented=commented or {},
         without_comments=without_comments or KnownSignals(),
     )

@@ -18,6 +18,7 @@ from armblocks.diagram.passes.displays import resolve_displays
 from armblocks.diagram.passes.merges import resolve_merges
 from armblocks.diagram.passes.names import resolve_names
 from armblocks.diagram.passes.netlist import Netlist
+from armblocks.diagram.passes.physical_networks import resolve_physical_networks
 from armblocks.diagram.passes.signals import resolve_signals
 from armblocks.diagram.passes.subsystems import resolve_subsystems
 from armblocks.diagram.passes.tags import resolve_tags
@@ -27,6 +28,7 @@ PASSES: tuple[Callable[[Netlist], Netlist], ...] = (
     resolve_comments,
     resolve_conditional_subsystems,
     resolve_subsystems,
+    resolve_physical_networks,
     resolve_tags,
     resolve_buses,
     copy_for_buses,

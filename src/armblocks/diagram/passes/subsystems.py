@@ -8,6 +8,7 @@ subsystem has the contents of its Out block's input, or of the held output.
 
 from __future__ import annotations
 
+from armblocks.diagram.connection_port import ConnectionPort
 from armblocks.diagram.levels import joined, level_of, name_of
 from armblocks.diagram.passes.netlist import Netlist, Replacement, Replacements
 from armblocks.diagram.port import PortRef
@@ -23,7 +24,7 @@ def resolve_subsystems(net: Netlist) -> Netlist:
             replaced[path] = {port.name: _output(net, path, port.name) for port in block.output_ports()}
         elif level and isinstance(block, Inport):
             replaced[path] = {"y": Replacement((net.drivers[PortRef(level, name_of(path))],))}
-        elif level and isinstance(block, Outport):
+        elif isinstance(block, ConnectionPort) or (level and isinstance(block, Outport)):
             replaced[path] = {}
     return net.with_replaced(replaced)
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from armblocks.diagram import Diagram
 from armblocks.drawing.arrangement.columns import Columns, assign_columns
 from armblocks.drawing.arrangement.feedback import Flow, signal_flow
-from armblocks.drawing.arrangement.links import Network
+from armblocks.drawing.arrangement.links import Network, with_frames, without_frames
 from armblocks.drawing.arrangement.order import node_order
 from armblocks.drawing.arrangement.rows import heights
 from armblocks.drawing.block_boxes import NAME_HEIGHT, Box, flipped_box
@@ -43,13 +43,15 @@ def arranged_boxes(diagram: Diagram, unplaced: Mapping[str, Box]) -> dict[str, B
             x, y, row_height = 0.0, y + row_height, 0.0
         placed_boxes[box.name] = box.at(round(x + (width - box.width) / 2), y)
         x, row_height = x + width + _GAP, max(row_height, box.height + NAME_HEIGHT + _GAP / 2)
-    return {name: placed_boxes[name] for name in diagram.blocks}
+    return {name: without_frames(placed_boxes[name]) for name in diagram.blocks}
 
 
 def _arranged_part(network: Network) -> list[Box]:
     """The boxes of a connected part, whose upper left corner is (0, 0)."""
     flow = signal_flow(network)
-    boxes = [flipped_box(box) if k in flow.mirrored else box for k, box in enumerate(network.boxes)]
+    boxes = [
+        with_frames(flipped_box(box)) if k in flow.mirrored else box for k, box in enumerate(network.boxes)
+    ]
     network = Network(network.names, tuple(boxes), network.links)
     columns, order = _best_order(network, flow)
     tops = heights(columns, order, [box.height for box in boxes], NAME_HEIGHT)

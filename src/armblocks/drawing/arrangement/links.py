@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armblocks import blocks as kinds
-from armblocks.diagram import Block, Diagram, DiagramBlock, Inport
+from armblocks.diagram import Block, Diagram, DiagramBlock, Inport, frames_of
 from armblocks.diagram.signs import Outline
-from armblocks.drawing.block_boxes import Box
+from armblocks.drawing.block_boxes import SIDES, Box, BoxPort
 
 _MEMORY_WEIGHT = 30.0
 """Weight of a cut before an integrator, a filter or a plant."""
 _FUNCTION_WEIGHT = 5.0
+_FRAME_WEIGHT = 5.0
+"""Weights of a cut before a block without memory, and of a cut of a frame line."""
 _FURTHER_PORT_WEIGHT = 2.0
 _SUM_WEIGHT = 3.0
 _PLUS_TERM_WEIGHT = 1.5
@@ -70,7 +72,8 @@ class Network:
                     weight,
                 )
             )
-        return cls(names, tuple(unplaced[name] for name in names), tuple(links))
+        links += _frame_links(diagram, unplaced, number)
+        return cls(names, tuple(with_frames(unplaced[name]) for name in names), tuple(links))
 
     def subnetwork(self, members: Sequence[int]) -> Network:
         """Some of the blocks, and the links between them."""
@@ -132,6 +135,62 @@ class Network:
     def memory(self) -> list[bool]:
         """For each block, whether it has states or delays."""
         return [has_memory(box.block) for box in self.boxes]
+
+
+def with_frames(box: Box) -> Box:
+    """The box with its left frame ports after its inputs, and the right ones after its outputs."""
+    if not box.frames:
+        return box
+    left, right = _sides(box)
+    return replace(
+        box,
+        inputs=(*box.inputs, *(replace(port, dx=-port.dx) for port in left)),
+        outputs=(*box.outputs, *right),
+    )
+
+
+def without_frames(box: Box) -> Box:
+    """The box with its own inputs and outputs, the inverse of :func:`with_frames`."""
+    if not box.frames:
+        return box
+    left, right = _sides(box)
+    return replace(
+        box,
+        inputs=box.inputs[: len(box.inputs) - len(left)],
+        outputs=box.outputs[: len(box.outputs) - len(right)],
+    )
+
+
+def _sides(box: Box) -> tuple[list[BoxPort], list[BoxPort]]:
+    """The frame ports of the left and of the right side of the block before it is flipped."""
+    sides = {port.name: port.side for port in box.block.frame_ports()}
+    left, right = ([port for port in box.frames if sides[port.name] == side] for side in SIDES)
+    return left, right
+
+
+def _frame_links(diagram: Diagram, unplaced: Mapping[str, Box], number: Mapping[str, int]) -> list[Link]:
+    """The links of frames: from one port that leads to the right to all ports that lead to the left.
+
+    Blocks are thus arranged from the base to the follower, as signals are from outputs to inputs.
+    """
+    links: list[Link] = []
+    for members in frames_of(diagram.frame_lines):
+        outputs: list[tuple[int, int]] = []
+        inputs: list[tuple[int, int]] = []
+        for ref in members:
+            if ref.block not in unplaced:
+                continue
+            box = unplaced[ref.block]
+            left, right = _sides(box)
+            inputs += [
+                (number[ref.block], len(box.inputs) + k) for k, p in enumerate(left) if p.name == ref.port
+            ]
+            outputs += [
+                (number[ref.block], len(box.outputs) + k) for k, p in enumerate(right) if p.name == ref.port
+            ]
+        for source, output in outputs[:1]:
+            links += [Link(source, output, block, port, _FRAME_WEIGHT) for block, port in inputs]
+    return links
 
 
 def is_circle(box: Box) -> bool:

@@ -1,0 +1,1 @@
+"""Bodies and joints as blocks: frames, solids, joints, forces, sensors of mechanisms."""

@@ -1,0 +1,32 @@
+"""The bearing joint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from armblocks.blocks.mechanics.examples import joint_example
+from armblocks.blocks.mechanics.joint_block import JointBlock
+from armblocks.diagram import WorkedExample
+from armblocks.diagram.signs import FaceSign, Words
+from armblocks.robot.joints import AxisMotion, Motion
+
+
+@dataclass(frozen=True, kw_only=True)
+class BearingJoint(JointBlock):
+    """F translates along the z axis of B, then rotates about its x, then y, then z axis."""
+
+    title: ClassVar[str] = "Bearing Joint"
+    sign: ClassVar[FaceSign] = Words("Bearing")
+    motions: ClassVar[tuple[Motion, ...]] = (
+        AxisMotion(axis=(0.0, 0.0, 1.0), linear=1.0, name="pz"),
+        AxisMotion(axis=(1.0, 0.0, 0.0), angular=1.0, name="rx"),
+        AxisMotion(axis=(0.0, 1.0, 0.0), angular=1.0, name="ry"),
+        AxisMotion(axis=(0.0, 0.0, 1.0), angular=1.0, name="rz"),
+    )
+    example: ClassVar[WorkedExample] = joint_example(
+        "A rotor in an elastic bearing that lets it tilt.",
+        spring_stiffness=(500.0, 5.0, 5.0, 0.0),
+        position_target=(0.0, 0.1, 0.0, 0.0),
+        velocity_target=(0.0, 0.0, 0.0, 5.0),
+    )

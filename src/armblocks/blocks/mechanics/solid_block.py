@@ -1,0 +1,67 @@
+"""The base class of solids: mass from density or given, inertia of the shape."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from armblocks.diagram import Block, FramePort, parameter
+from armblocks.multibody.gathering import gather_mechanisms
+from armblocks.multibody.parts import REFERENCE, BodyPart
+from armblocks.robot.shapes import Material, Shape
+from armblocks.spatial import Vector3
+
+COLOURS = {
+    "paint": Material.PAINT,
+    "graphite": Material.JOINT,
+    "steel": Material.FLANGE,
+    "base": Material.BASE,
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolidBlock(Block):
+    """Base class of solids with the frame R at their centre, in the axes of the shape.
+
+    The mass is given, or the volume times the density. A subclass gives the volume, the principal moments of
+    inertia for unit mass, and the shape for drawings.
+    """
+
+    virtual: ClassVar[bool] = True
+    gathers: ClassVar[Callable[[Any], Any] | None] = gather_mechanisms
+    card_size: ClassVar[tuple[float, float]] = (84.0, 50.0)
+
+    mass_from: str = parameter(
+        "density", choices=("density", "mass"), doc="whether density or mass determines the inertia"
+    )
+    density: float = parameter(1000.0, above=0.0, tunable=False, doc="density", unit="kg/m3")
+    mass: float = parameter(1.0, above=0.0, tunable=False, doc="mass", unit="kg")
+    appearance: str = parameter("paint", choices=tuple(COLOURS), doc="surface in drawings")
+
+    def frame_ports(self) -> tuple[FramePort, ...]:
+        return (FramePort(REFERENCE, "frame of the solid, at its centre"),)
+
+    @property
+    def material(self) -> Material:
+        """The surface of the shape in drawings."""
+        return COLOURS[self.appearance]
+
+    @abstractmethod
+    def volume(self) -> float:
+        """The volume, m3."""
+
+    @abstractmethod
+    def unit_inertia(self) -> Vector3:
+        """The principal moments of inertia about the centre for a mass of 1 kg, m2."""
+
+    @abstractmethod
+    def shape(self) -> Shape:
+        """The shape for drawings, in frame R."""
+
+    def part(self) -> BodyPart:
+        mass = self.density * self.volume() if self.mass_from == "density" else self.mass
+        xx, yy, zz = (mass * moment for moment in self.unit_inertia())
+        inertia = ((xx, 0.0, 0.0), (0.0, yy, 0.0), (0.0, 0.0, zz))
+        return BodyPart(mass=mass, inertia=inertia, shapes=(self.shape(),))

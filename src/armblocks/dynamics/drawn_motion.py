@@ -1,0 +1,101 @@
+"""The motion of a mechanism under joint torques and loads at frames: the equations of drawn mechanisms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from casadi import SX, Function, vertcat
+
+from armblocks.dynamics.base_parameters import base_parameter_tree
+from armblocks.dynamics.constrained import (
+    ConstrainedEquations,
+    ConstrainedMotion,
+    independent_relations,
+    projected,
+    restoring_rates,
+)
+from armblocks.dynamics.forward import forward_dynamics
+from armblocks.dynamics.frame_motions import FramesOfTree
+from armblocks.dynamics.joint_motion import entries
+from armblocks.dynamics.mechanism import Array
+from armblocks.dynamics.rnea import Wrench
+from armblocks.robot.constraints import Attachment
+from armblocks.robot.robot import Robot
+from armblocks.spatial.vectors import Vector
+
+
+class Load(NamedTuple):
+    """A force (N) and a moment (N m) on a frame of a robot, at its origin, in base axes."""
+
+    at: Attachment
+    force: Vector
+    moment: Vector
+
+
+class Accelerations(NamedTuple):
+    """Accelerations (n, 1), and the rates of the states of an integration, of q (nq, 1) and qd (n, 1)."""
+
+    qdd: SX
+    q_rates: SX
+    qd_rates: SX
+
+
+class DrawnMotion:
+    """The equations of a robot with loads at frames.
+
+    ``state`` gives the consistent state, ``accelerations`` the motion. ``near`` (nq,): an assembled
+    configuration, see :func:`armblocks.dynamics.constrained.independent_relations`.
+    """
+
+    def __init__(self, robot: Robot, near: Array) -> None:
+        self.robot = robot
+        self.tree = base_parameter_tree(robot)
+        self._relations = independent_relations(robot, near)
+
+    def state(self, q: SX, qd: SX) -> tuple[SX, SX]:
+        """The state that satisfies the closures, nearest to ``q`` (nq, 1) and ``qd`` (n, 1)."""
+        if not self._relations:
+            return q, qd
+        at, speeds = SX.sym("q", self.robot.nq), SX.sym("qd", self.robot.nv)
+        equations = ConstrainedEquations(self.robot, self.tree, at, self._relations)
+        consistent = Function("speeds", [at, speeds], [equations.consistent_speeds(speeds)])
+        q = projected(self.robot, self.tree, q, self._relations)
+        (qd,) = consistent.call([q, qd], True, False)
+        return q, qd
+
+    def frames(self, q: SX, qd: SX, qdd: SX | None = None) -> FramesOfTree:
+        """The motions of frames at a state."""
+        return FramesOfTree(self.tree, q, entries(qd), None if qdd is None else entries(qdd))
+
+    def accelerations(self, q: SX, qd: SX, tau: SX, loads: Sequence[Load]) -> SX:
+        """The accelerations (n, 1) at a consistent state under the joint torques ``tau`` (n, 1)."""
+        frames = self.frames(q, qd)
+        placed = [(self.tree.attached(load.at.link, load.at.pose), load.force, load.moment) for load in loads]
+        wrenches = frames.on_bodies(placed)
+        if not self._relations:
+            return SX(vertcat(*forward_dynamics(self.tree, q, entries(qd), entries(tau), wrenches)))
+        # The bias of the relations is a derivative with respect to q at constant speeds and wrenches.
+        at, speeds, given = (
+            SX.sym("q", self.robot.nq),
+            SX.sym("qd", self.robot.nv),
+            SX.sym("tau", self.robot.nv),
+        )
+        equations = ConstrainedEquations(self.robot, self.tree, at, self._relations)
+        symbols = {body: SX.sym(f"wrench{body}", 6) for body in wrenches}
+        acting = {body: _wrench(column) for body, column in symbols.items()}
+        qdd, _ = equations.motion(speeds, given, acting)
+        motion = Function("motion", [at, speeds, given, *symbols.values()], [qdd])
+        columns = [SX(vertcat(*wrench.force, *wrench.moment)) for wrench in wrenches.values()]
+        (result,) = motion.call([q, qd, tau, *columns], True, False)
+        return result
+
+    def rates(self, q: SX, qd: SX, consistent: tuple[SX, SX], qdd: SX) -> Accelerations:
+        """The rates of the states ``q``, ``qd``, whose consistent state is ``consistent``."""
+        motion = ConstrainedMotion(*consistent, qdd, SX(0, 1))
+        return Accelerations(qdd, *restoring_rates(self.robot, q, qd, motion))
+
+
+def _wrench(column: SX) -> Wrench:
+    fx, fy, fz, nx, ny, nz = entries(column)
+    return Wrench((fx, fy, fz), (nx, ny, nz))

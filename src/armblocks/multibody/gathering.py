@@ -1,0 +1,144 @@
+"""Pass: bodies, joints and force elements are replaced by mechanisms.
+
+Input: the blocks of the family ``mechanics``, and the frame lines between them, of all levels.
+
+Result: for each network of connected frames, a block with its equations of motion in the place of its World
+Frame; each joint and each force element is a block with states or loads under its own path. Signals, states
+and parameters thus have the paths of the drawn blocks.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+from typing import cast
+
+from armblocks.diagram import Block, PortRef
+from armblocks.diagram.passes.netlist import Netlist, Replacements
+from armblocks.dynamics.base_parameters import regrouped
+from armblocks.dynamics.forward import check_accelerations_exist
+from armblocks.errors import DiagramError, RobotError
+from armblocks.multibody.assembly import DrawnMechanism, drawn_mechanism, world_block
+from armblocks.multibody.element_states import ElementLoads
+from armblocks.multibody.frames import frames_of_parts, networks
+from armblocks.multibody.joint_states import JointStates
+from armblocks.multibody.mechanism import Mechanism, port_of
+from armblocks.multibody.parts import Part
+from armblocks.multibody.start import Start, drawn_start, start_of
+from armblocks.robot.tree import KinematicTree
+
+
+def gather_mechanisms(net: Netlist) -> Netlist:
+    """The netlist with mechanisms in place of bodies, joints and force elements. Raises ``DiagramError``."""
+    parts = {
+        path: cast("Part", block.part())
+        for path, block in net.blocks.items()
+        if type(block).gathers is gather_mechanisms
+    }
+    for path in parts:
+        _check_always_active(net, path)
+    frames = frames_of_parts(net, parts)
+    gathered = _Gathered(net)
+    for network in networks(net, parts, frames):
+        mechanism = drawn_mechanism(net, parts, frames, network)
+        if mechanism is not None:
+            gathered.add(world_block(parts, network), mechanism)
+        gathered.remove(path for path in network if path not in gathered.blocks)
+    return dataclasses.replace(
+        net,
+        blocks={**net.blocks, **gathered.blocks},
+        drivers={**net.drivers, **gathered.drivers},
+        replaced={**net.replaced, **gathered.replaced},
+    )
+
+
+class _Gathered:
+    """The blocks and connections in place of the drawn ones."""
+
+    def __init__(self, net: Netlist) -> None:
+        self.net = net
+        self.blocks: dict[str, Block] = {}
+        self.drivers: dict[PortRef, PortRef] = {}
+        self.replaced: dict[str, Replacements] = {}
+
+    def add(self, world: str, drawn: DrawnMechanism) -> None:
+        """Add the blocks of a mechanism. Raises ``DiagramError``."""
+        self._check_inertia(drawn)
+        start = start_of(self.net, drawn)
+        plant = Mechanism(mechanism=drawn, near=tuple(start.q.tolist()))
+        self.blocks[world] = plant
+        for joint in drawn.joints:
+            self._add_joint(world, drawn, joint.path, start)
+        for element in drawn.elements:
+            path = element.path
+            self.blocks[path] = ElementLoads(element=self.net.blocks[path], place=element.part)
+            self._connect(world, path, "frame motion", "motion")
+            if element.part.accelerations:
+                self._connect(world, path, "frame acceleration", "acceleration")
+            if element.part.exerts:
+                self._drive(world, path, "loads", "loads")
+
+    def _add_joint(self, world: str, drawn: DrawnMechanism, path: str, start: Start) -> None:
+        joint = next(joint for joint in drawn.joints if joint.path == path)
+        closed = bool(drawn.robot.closures)
+        q, qd = drawn_start(joint, start)
+        states = JointStates(
+            joint=self.net.blocks[path],
+            place=joint.part,
+            closed=closed,
+            start_q=q if closed else (),
+            start_qd=qd if closed else (),
+        )
+        self.blocks[path] = states
+        inputs = {port.name for port in states.input_ports()}
+        for port, quantity in (
+            ("mechanism qdd", "qdd"),
+            ("mechanism q", "q"),
+            ("mechanism qd", "qd"),
+            ("q rates", "q rates"),
+            ("qd rates", "qd rates"),
+        ):
+            if port in inputs:
+                self._connect(world, path, port, quantity)
+        for port, quantity in (
+            ("state q", "state q"),
+            ("state qd", "state qd"),
+            ("generalised force", "force"),
+        ):
+            self._drive(world, path, port, quantity)
+
+    def remove(self, paths: Iterable[str]) -> None:
+        """Remove blocks that have no equations of their own."""
+        for path in paths:
+            self.replaced[path] = {}
+
+    def _connect(self, world: str, path: str, port: str, quantity: str) -> None:
+        """Connect an output of the mechanism to an input of a joint or element."""
+        self.drivers[PortRef(path, port)] = PortRef(world, port_of(path, quantity))
+
+    def _drive(self, world: str, path: str, port: str, quantity: str) -> None:
+        """Connect an output of a joint or element to an input of the mechanism."""
+        self.drivers[PortRef(world, port_of(path, quantity))] = PortRef(path, port)
+
+    def _check_inertia(self, drawn: DrawnMechanism) -> None:
+        """Raise ``DiagramError`` for a joint beyond which no mass moves."""
+        try:
+            check_accelerations_exist(regrouped(KinematicTree.of(drawn.robot)))
+        except RobotError as error:
+            path = error.where.rpartition("link ")[2].strip("'")
+            raise DiagramError(
+                "no body with mass moves with the joint, so that its acceleration is undefined",
+                where=self.net.label(path) if path in self.net.blocks else error.where,
+                allowed="mass, and for a rotation inertia, beyond every joint",
+                fix="add a solid to a frame beyond the joint, or replace the joint by a Weld Joint",
+            ) from error
+
+
+def _check_always_active(net: Netlist, path: str) -> None:
+    if net.gates.get(path):
+        raise DiagramError(
+            "the block is in a conditional subsystem, but the motion of bodies cannot be switched off",
+            where=net.label(path),
+            allowed="bodies, joints and force elements outside of conditional subsystems",
+            fix="move the mechanism out of the conditional subsystem",
+        )

@@ -1,0 +1,280 @@
+"""The equations of motion of a drawn mechanism in a flat diagram.
+
+The joints have the states; the mechanism computes their accelerations from the states and the generalised
+forces of all joints and from the loads of the force elements. All ports are internal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import ClassVar
+
+import numpy as np
+from casadi import SX, mtimes, vertcat
+
+from armblocks.diagram import Block, ParameterKind, Port, Signals, View, ViewKind, parameter
+from armblocks.dynamics.ball_joints import normalised, position_rates, rotation_of
+from armblocks.dynamics.drawn_motion import DrawnMotion, Load
+from armblocks.dynamics.frame_motions import FramesOfTree
+from armblocks.dynamics.joint_motion import entries
+from armblocks.multibody.assembly import DrawnMechanism, PlacedElement, PlacedJoint
+from armblocks.multibody.parts import JointPart
+from armblocks.robot import Robot
+from armblocks.robot.joints import AxisMotion, Motion
+from armblocks.robot.tree import BASE, Frame
+from armblocks.spatial import Transform
+
+KINEMATICS_SIZE = 18
+"""Numbers that describe the motion of a frame: rotation 9, position, velocity, angular velocity."""
+ACCELERATION_SIZE = 6
+"""Acceleration and angular acceleration of a frame."""
+
+
+def port_of(path: str, quantity: str) -> str:
+    """The name of the port for a quantity of a block; paths of ports have no slashes after the block."""
+    return f"{quantity} of {path.replace('/', '.')}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mechanism(Block):
+    """The equations of motion of the bodies, joints and force elements of one network."""
+
+    title: ClassVar[str] = "Mechanism"
+
+    mechanism: DrawnMechanism = parameter(
+        kind=ParameterKind.DIAGRAM, of_type=DrawnMechanism, doc="the robot, its joints and force elements"
+    )
+    near: tuple[float, ...] = parameter((), kind=ParameterKind.DIAGRAM, doc="assembled coordinates (nq,)")
+
+    @property
+    def robot(self) -> Robot:
+        """The robot of the mechanism."""
+        return self.mechanism.robot
+
+    # -- ports
+
+    def input_ports(self) -> tuple[Port, ...]:
+        ports = [
+            _port(joint.path, quantity, shape)
+            for joint in self.mechanism.joints
+            for quantity, shape in (
+                ("state q", joint.part.nq),
+                ("state qd", joint.part.nv),
+                ("force", joint.part.nv),
+            )
+        ]
+        loads = [element for element in self.mechanism.elements if element.part.exerts]
+        return (*ports, *(_port(element.path, "loads", 6 * len(element.frames)) for element in loads))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        ports: list[Port] = []
+        for joint in self.mechanism.joints:
+            ports.append(_port(joint.path, "qdd", joint.part.nv))
+            if self._has_coordinates(joint):
+                ports.append(_port(joint.path, "q", joint.part.nq))
+                ports.append(_port(joint.path, "q rates", joint.part.nq))
+            if self.robot.closures:
+                ports.append(_port(joint.path, "qd", joint.part.nv))
+                ports.append(_port(joint.path, "qd rates", joint.part.nv))
+        for element in self.mechanism.elements:
+            count = len(element.frames)
+            ports.append(_port(element.path, "motion", KINEMATICS_SIZE * count))
+            if element.part.accelerations:
+                ports.append(_port(element.path, "acceleration", ACCELERATION_SIZE * count))
+        return tuple(ports)
+
+    def _has_coordinates(self, joint: PlacedJoint) -> bool:
+        return bool(self.robot.closures) or joint.part.nq != joint.part.nv
+
+    def record_ports(self) -> tuple[Port, ...]:
+        if not self.mechanism.animated:
+            return ()
+        doc = "world poses of the base, every body in order, and the tool"
+        return (Port("poses", doc, shape=(len(self.robot.links) + 2, 4, 4)),)
+
+    def views(self) -> tuple[View, ...]:
+        if not self.mechanism.animated:
+            return ()
+        return (View(kind=ViewKind.ROBOT, signals=("poses",), title=self.robot.name, subject=self.robot),)
+
+    # -- equations
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        equations, robot = drawn_motion(self.robot, self.near), self.robot
+        q, qd = self._state(u)
+        consistent_q, consistent_qd = self._consistent(q, qd)
+        frames = equations.frames(consistent_q, consistent_qd)
+        tau = SX.zeros(robot.nv)
+        for joint in self.mechanism.joints:
+            tau[_speeds(joint)] = _tree_forces(joint, q, u[port_of(joint.path, "force")])
+        qdd = equations.accelerations(consistent_q, consistent_qd, tau, list(self._loads(u)))
+        if robot.closures:
+            _, q_rates, qd_rates = equations.rates(q, qd, (consistent_q, consistent_qd), qdd)
+        else:
+            q_rates, qd_rates = SX(vertcat(*position_rates(robot, entries(q), entries(qd)))), qdd
+        values: dict[str, SX] = {}
+        for joint in self.mechanism.joints:
+            positions, speeds = _positions(joint), _speeds(joint)
+            of_joint = {
+                "qdd": _drawn_speeds(joint, consistent_q, qdd[speeds]),
+                "q": _drawn_coordinates(joint, consistent_q[positions]),
+                "q rates": _drawn_coordinates(joint, q_rates[positions]),
+                "qd": _drawn_speeds(joint, consistent_q, consistent_qd[speeds]),
+                "qd rates": _drawn_speeds(joint, q, qd_rates[speeds]),
+            }
+            values |= {port_of(joint.path, name): value for name, value in of_joint.items()}
+        moving: FramesOfTree | None = None
+        for element in self.mechanism.elements:
+            values[port_of(element.path, "motion")] = self._kinematics(frames, element)
+            if element.part.accelerations:
+                moving = moving or equations.frames(consistent_q, consistent_qd, qdd)
+                values[port_of(element.path, "acceleration")] = self._frame_accelerations(moving, element)
+        return {port.name: values[port.name] for port in self.output_ports()}
+
+    def records(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        if not self.mechanism.animated:
+            return {}
+        equations = drawn_motion(self.robot, self.near)
+        frames = equations.frames(*self._consistent(*self._state(u)))
+        places = [Frame(body=BASE, pose=Transform()), *equations.tree.links, equations.tree.tool]
+        return {"poses": SX(vertcat(*(frames.pose(place).matrix() for place in places)))}
+
+    def _state(self, u: Signals) -> tuple[SX, SX]:
+        """The coordinates and speeds of the robot, from those of the drawn joints."""
+        q, qd = SX.zeros(self.robot.nq), SX.zeros(self.robot.nv)
+        for joint in self.mechanism.joints:
+            coordinates = u[port_of(joint.path, "state q")]
+            q[_positions(joint)] = _tree_coordinates(joint, coordinates)
+            qd[_speeds(joint)] = _tree_speeds(joint, coordinates, u[port_of(joint.path, "state qd")])
+        return q, qd
+
+    def _consistent(self, q: SX, qd: SX) -> tuple[SX, SX]:
+        if self.robot.closures:
+            return drawn_motion(self.robot, self.near).state(q, qd)
+        is_unit = self.robot.nq == self.robot.nv
+        return (q if is_unit else SX(vertcat(*normalised(self.robot, entries(q))))), qd
+
+    def _loads(self, u: Signals) -> Iterator[Load]:
+        for element in self.mechanism.elements:
+            if not element.part.exerts:
+                continue
+            column = u[port_of(element.path, "loads")]
+            for k, (_, at) in enumerate(element.frames):
+                fx, fy, fz, nx, ny, nz = (column[6 * k + i] for i in range(6))
+                yield Load(at, (fx, fy, fz), (nx, ny, nz))
+
+    def _kinematics(self, frames: FramesOfTree, element: PlacedElement) -> SX:
+        tree, parts = drawn_motion(self.robot, self.near).tree, list[SX]()
+        for _, at in element.frames:
+            frame = tree.attached(at.link, at.pose)
+            pose = frames.pose(frame)
+            linear, angular = frames.velocity(frame)
+            parts.append(SX(vertcat(*pose.x, *pose.y, *pose.z, *pose.p, *linear, *angular)))
+        return SX(vertcat(*parts))
+
+    def _frame_accelerations(self, frames: FramesOfTree, element: PlacedElement) -> SX:
+        tree = drawn_motion(self.robot, self.near).tree
+        places = [tree.attached(at.link, at.pose) for _, at in element.frames]
+        return SX(vertcat(*(vertcat(*part) for frame in places for part in frames.acceleration(frame))))
+
+
+@lru_cache(maxsize=32)
+def drawn_motion(robot: Robot, near: tuple[float, ...]) -> DrawnMotion:
+    """The equations of a robot; those of the last 32 robots are cached."""
+    return DrawnMotion(robot, np.array(near))
+
+
+def _port(path: str, quantity: str, size: int) -> Port:
+    return Port(port_of(path, quantity), quantity, shape=() if size == 1 else (size,), internal=True)
+
+
+# -- coordinates of drawn joints and of the tree: they differ for joints whose link carries the base
+
+
+def _positions(joint: PlacedJoint) -> list[int]:
+    return list(range(joint.position, joint.position + joint.part.nq))
+
+
+def _speeds(joint: PlacedJoint) -> list[int]:
+    return list(range(joint.speed, joint.speed + joint.part.nv))
+
+
+def _slices(motions: Sequence[Motion], *, speeds: bool) -> list[slice]:
+    slices: list[slice] = []
+    first = 0
+    for motion in motions:
+        count = len(motion.speeds if speeds else motion.positions)
+        slices.append(slice(first, first + count))
+        first += count
+    return slices
+
+
+def _tree_coordinates(joint: PlacedJoint, q: SX) -> SX:
+    """The coordinates of the tree: for a reversed joint in reversed order, quaternions conjugate."""
+    if not joint.reversed:
+        return q
+    parts = [
+        q[part] if isinstance(motion, AxisMotion) else SX(vertcat(q[part][0], -q[part][1:]))
+        for motion, part in zip(joint.part.motions, _slices(joint.part.motions, speeds=False))
+    ]
+    return SX(vertcat(*reversed(parts)))
+
+
+def _drawn_coordinates(joint: PlacedJoint, q: SX) -> SX:
+    """The coordinates of the drawn joint from those of the tree; rates are converted likewise."""
+    if not joint.reversed:
+        return q
+    backwards = list(reversed(joint.part.motions))
+    parts = [
+        q[part] if isinstance(motion, AxisMotion) else SX(vertcat(q[part][0], -q[part][1:]))
+        for motion, part in zip(backwards, _slices(backwards, speeds=False))
+    ]
+    return SX(vertcat(*reversed(parts)))
+
+
+def _tree_speeds(joint: PlacedJoint, drawn_q: SX, qd: SX) -> SX:
+    """The speeds of the tree from those of the drawn joint.
+
+    A ball joint with the rotation R of the follower in the base has the angular velocity w in follower axes;
+    that of the base relative to the follower, in base axes, is ``-R w``.
+    """
+    if not joint.reversed:
+        return qd
+    return SX(vertcat(*reversed(_turned(joint.part, drawn_q, qd, back=False))))
+
+
+def _tree_forces(joint: PlacedJoint, tree_q: SX, force: SX) -> SX:
+    """The generalised forces of the tree, with the power of those of the drawn joint."""
+    if not joint.reversed:
+        return force
+    drawn_q = _drawn_coordinates(joint, tree_q[_positions(joint)])
+    return SX(vertcat(*reversed(_turned(joint.part, drawn_q, force, back=False))))
+
+
+def _drawn_speeds(joint: PlacedJoint, tree_q: SX, qd: SX) -> SX:
+    """The speeds of the drawn joint from those of the tree; accelerations are converted likewise.
+
+    ``w = -R' w_tree`` has the derivative ``-R' dw_tree/dt``, because ``[w]x R' w_tree`` is zero.
+    """
+    if not joint.reversed:
+        return qd
+    drawn_q = _drawn_coordinates(joint, tree_q[_positions(joint)])
+    backwards = list(reversed(joint.part.motions))
+    parts = [qd[part] for part in _slices(backwards, speeds=True)]
+    return SX(vertcat(*_turned(joint.part, drawn_q, SX(vertcat(*reversed(parts))), back=True)))
+
+
+def _turned(part: JointPart, drawn_q: SX, values: SX, *, back: bool) -> list[SX]:
+    """The values of each motion, those of balls multiplied by ``-R``, or by ``-R'`` (``back``)."""
+    parts: list[SX] = []
+    speeds, positions = _slices(part.motions, speeds=True), _slices(part.motions, speeds=False)
+    for motion, at, where in zip(part.motions, speeds, positions):
+        value = values[at]
+        if not isinstance(motion, AxisMotion):
+            w, x, y, z = (drawn_q[where][k] for k in range(4))
+            R = SX(vertcat(*(vertcat(*row).T for row in rotation_of((w, x, y, z)))))
+            value = -mtimes(R.T if back else R, value)
+        parts.append(value)
+    return parts

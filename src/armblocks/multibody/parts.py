@@ -1,0 +1,159 @@
+"""What blocks of mechanics contribute to a mechanism: the data that the pass ``gathering`` reads.
+
+A block of the family ``mechanics`` returns one of these parts. Frame ports are named here once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from casadi import SX
+
+from armblocks.diagram import Port, Signals
+from armblocks.robot import Closure
+from armblocks.robot.joints import Motion
+from armblocks.robot.shapes import Shape
+from armblocks.spatial import Matrix3, Transform, Vector3
+from armblocks.spatial.vectors import Vector
+
+BASE, FOLLOWER = "B", "F"
+"""The frame ports of joints, transforms, forces between two frames and sensors."""
+REFERENCE = "R"
+"""The frame port of bodies, and of reference frames."""
+WORLD = "W"
+SETTINGS = "C"
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorldPart:
+    """The inertial frame, at the frame port ``W``."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SettingsPart:
+    """The settings of the mechanism whose frames are connected with the frame port ``C``.
+
+    ``gravity``: m/s2, in the World Frame. ``animated``: whether a run records the poses of all bodies.
+    """
+
+    gravity: Vector3
+    animated: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class NodePart:
+    """A frame without any property, at the frame port ``R``."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigidPart:
+    """A rigid connection: the constant ``pose`` of frame ``F`` in frame ``B``."""
+
+    pose: Transform
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodyPart:
+    """A rigid body at the frame port ``R``, in its axes.
+
+    ``mass`` kg, ``centre`` of mass m, ``inertia`` about the centre of mass kg m2, ``shapes`` for drawings.
+    """
+
+    mass: float
+    centre: Vector3 = (0.0, 0.0, 0.0)
+    inertia: Matrix3 = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    shapes: tuple[Shape, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Targets:
+    """The wished start of a joint: coordinates ``q`` (nq,) and speeds ``qd`` (nv,) with their priorities.
+
+    ``high``: satisfied exactly, or an error. ``low``: the start is searched near the target. ``none``: the
+    target is ignored.
+    """
+
+    q: tuple[float, ...]
+    qd: tuple[float, ...]
+    position_priority: str = "low"
+    velocity_priority: str = "low"
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointPart:
+    """A joint from frame ``B`` to frame ``F``: a sequence of elementary motions.
+
+    ``closure``: the type of constraint that the joint is where it closes a loop, with the pose of the frames
+    of this constraint in ``B`` and in ``F``; ``None``: there is no such type. ``needs_coordinate``: whether
+    the joint must have coordinates, because something acts on them or reads them. ``actuation``: ``none``,
+    ``torque`` or ``motion`` for each speed.
+    """
+
+    motions: tuple[Motion, ...]
+    targets: Targets
+    closure: type[Closure] | None = None
+    closure_frames: tuple[Transform, Transform] = field(default_factory=lambda: (Transform(), Transform()))
+    needs_coordinate: bool = False
+    actuation: tuple[str, ...] = ()
+
+    @property
+    def nq(self) -> int:
+        """Number of coordinates."""
+        return sum(len(motion.positions) for motion in self.motions)
+
+    @property
+    def nv(self) -> int:
+        """Number of speeds."""
+        return sum(len(motion.speeds) for motion in self.motions)
+
+
+@dataclass(frozen=True)
+class FrameMotion:
+    """The motion of a frame in the World Frame: all vectors have world axes.
+
+    ``rotation``: the columns are the axes of the frame. ``position`` m, ``velocity`` m/s and ``acceleration``
+    m/s2 of its origin; ``angular_velocity`` rad/s, ``angular_acceleration`` rad/s2.
+    """
+
+    rotation: tuple[Vector, Vector, Vector]
+    position: Vector
+    velocity: Vector
+    angular_velocity: Vector
+    acceleration: Vector
+    angular_acceleration: Vector
+
+
+class ForceLaw(Protocol):
+    """A block that exerts a force, and possibly a moment, as a function of the motion of its frames."""
+
+    def loads(
+        self, frames: Mapping[str, FrameMotion], u: Signals, p: Signals
+    ) -> Mapping[str, tuple[Vector, Vector]]:
+        """Force (N) and moment (N m) on the body at each frame port, at its origin, in world axes."""
+        ...
+
+    def measured(self, frames: Mapping[str, FrameMotion], u: Signals, p: Signals) -> Mapping[str, SX]:
+        """The values of the output ports of the block."""
+        ...
+
+    def input_ports(self) -> tuple[Port, ...]: ...
+
+    def output_ports(self) -> tuple[Port, ...]: ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForcePart:
+    """A force element at the frame ports ``frames``, or a sensor, which exerts no force.
+
+    ``accelerations``: whether it reads accelerations; a force element must not, because it would depend on
+    itself.
+    """
+
+    frames: tuple[str, ...]
+    exerts: bool = True
+    accelerations: bool = False
+
+
+Part = WorldPart | SettingsPart | NodePart | RigidPart | BodyPart | JointPart | ForcePart
