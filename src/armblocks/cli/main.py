@@ -1,8 +1,9 @@
 """The entry point of the command line: commands, and handling of errors, warnings and Ctrl-C.
 
 Exit codes: 0 done, 1 a defect of armblocks (with a traceback), 2 invalid input (a message, no traceback), 130
-interrupted with Ctrl-C. ``diff`` also exits with 1 if its diagrams differ, ``lint`` if it has findings, and
-``size`` if a joint has no candidate drive within all limits.
+interrupted with Ctrl-C. ``diff`` also exits with 1 if its diagrams differ, ``lint`` if it has findings,
+``size`` if a joint has no candidate drive within all limits, and ``identify`` and ``fit`` if the data do not
+determine some parameters.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ from armblocks.cli import (
     diagram,
     diff,
     docs,
+    fit,
+    identify,
     linearize,
     lint,
     listing,
@@ -80,6 +83,8 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "show": show.show,
     "lint": lint.lint,
     "size": size.size,
+    "identify": identify.identify,
+    "fit": fit.fit,
     "workspace": workspace.workspace,
     "list": listing.list_names,
     "blocks": blocks.describe_blocks,

@@ -85,6 +85,21 @@ class SweepProgress(RunProgress):
         self._show(f"run {done:,.0f} of {runs:,.0f}, {factor_text(rate)} runs/s", done / runs)
 
 
+class FitProgress(RunProgress):
+    """Displays the progress of a fit: called with the number of evaluations and the sum of squares.
+
+    ``most``: the maximum number of evaluations.
+    """
+
+    def __init__(self, name: str, console: Console, most: int) -> None:
+        super().__init__(name, console)
+        self._most = most
+
+    def __call__(self, evaluations: float, squares: float, _: float = 0.0) -> None:
+        where = f"evaluation {evaluations:.0f} of at most {self._most}, sum of squares {squares:.6g}"
+        self._show(where, min(evaluations / max(self._most, 1), 1.0))
+
+
 def _duration(seconds: float) -> str:
     """A rounded duration: ``40 s``, ``3 min``, ``1.5 h``."""
     if seconds < 100.0:

@@ -141,6 +141,11 @@ class FitResult(metaclass=ArgumentErrors):
         ]
 
     @property
+    def summary(self) -> str:
+        """The condition number and the degrees of freedom, as a sentence."""
+        return summary_line(self.condition, self.degrees_of_freedom)
+
+    @property
     def findings(self) -> tuple[str, ...]:
         """Sentences on parameters without information, bounds, correlations, differences, the end."""
         found: list[str] = []
@@ -222,7 +227,7 @@ class FitResult(metaclass=ArgumentErrors):
             for signal in self.signals
         ]
         lines += text_table(["signal", "noise", "unit", "explained"], signal_rows)
-        lines += ["", summary_line(self.condition, self.degrees_of_freedom)]
+        lines += ["", self.summary]
         return "\n".join([*lines, *self.findings])
 
     @property

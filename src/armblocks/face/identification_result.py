@@ -225,9 +225,14 @@ class IdentificationResult(metaclass=ArgumentErrors):
             for j, joint in enumerate(self.joints)
         ]
         lines += text_table(["joint", "noise", "unit", "of torque"], joint_rows)
-        lines += ["", summary_line(self.condition, self.degrees_of_freedom)]
+        lines += ["", self.summary]
         lines += self.findings
         return "\n".join(lines)
+
+    @property
+    def summary(self) -> str:
+        """The condition number and the degrees of freedom, as a sentence."""
+        return summary_line(self.condition, self.degrees_of_freedom)
 
     @property
     def findings(self) -> tuple[str, ...]:
