@@ -161,7 +161,7 @@ def _check_actuation(
             allowed="as many motors as degrees of freedom, so that the torques exist and are unique",
             fix="give a motor (Motor() without inertia is enough) to the actuated joints only",
         )
-    J = functions.jacobian(assembled_coordinates(robot, near))[list(relations)] @ free_directions
+    J = functions.balanced(assembled_coordinates(robot, near))[list(relations)] @ free_directions
     s = np.linalg.svd(J, compute_uv=False)
     if len(s) and s.min() <= RANK_TOLERANCE * s.max():
         raise RobotError(

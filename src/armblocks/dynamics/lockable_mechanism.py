@@ -191,7 +191,7 @@ def check_lockable(robot: Robot, lockable: Sequence[int], near: Array | None, wh
     if not robot.closures or not lockable:
         return
     relations = list(independent_relations(robot, near))
-    J = mechanism(robot).jacobian(assembled_coordinates(robot, near))[relations]
+    J = mechanism(robot).balanced(assembled_coordinates(robot, near))[relations]
     others = [k for k in range(robot.nv) if k not in lockable]
     s = np.linalg.svd(J[:, others], compute_uv=False) if others else np.zeros(0)
     if int(np.sum(s > RANK_TOLERANCE * s.max(initial=0.0))) == len(relations):

@@ -29,12 +29,15 @@ from armblocks.spatial import Transform
 Array = NDArray[np.float64]
 
 RESIDUAL_TOLERANCE = 1e-12
-"""Largest residual of an assembled configuration: m, or cosine of an angle."""
+"""Largest residual of an assembled configuration: cosine of an angle, or displacement in the unit of
+:func:`characteristic_length`, which is 1 m for most robots."""
 RANK_TOLERANCE = 1e-5
 """Singular values below this fraction of the largest one count as zero.
 
 Near a singular configuration a smaller tolerance would count a direction in which the mechanism can almost
 move as locked. With 1e-9 Bricard's mechanism has no degree of freedom at inaccurate coordinates."""
+SIZES = 0.01, 100.0
+"""Sizes of robots whose Jacobian is used in metres, m."""
 MAX_STEPS = 200
 """Maximum number of steps from one start."""
 RESTARTS = 12
@@ -102,6 +105,10 @@ class Mechanism:
             for end in (closure.first, closure.second)
         ]
         self._poses = Function("poses", [q], poses)
+        self._length = characteristic_length(robot)
+        relations = [relation for closure in self._closures for relation in closure.relations]
+        self._rows = np.array([1.0 if isinstance(r, Perpendicular) else self._length for r in relations])
+        self._columns = np.array([1.0 if entry.unit == "rad" else self._length for entry in robot.speeds])
 
     def residuals(self, q: Array) -> Array:
         """The residuals (m,) at ``q`` (nq,)."""
@@ -115,6 +122,13 @@ class Mechanism:
     def jacobian(self, q: Array) -> Array:
         """J (m, n) at ``q`` (nq,)."""
         return np.asarray(self._evaluate(q)[1].full())
+
+    def balanced(self, q: Array) -> Array:
+        """J (m, n) at ``q`` for ranks: lengths of very small and very large robots in their own unit.
+
+        The unit is :func:`characteristic_length`.
+        """
+        return self._balanced(self.jacobian(q))
 
     def moved(self, q: Array, step: Array) -> Array:
         """The coordinates after a motion with the speeds ``step`` (n,) for unit time."""
@@ -139,7 +153,7 @@ class Mechanism:
             start = guess
             if attempt:
                 step = np.zeros(self.robot.nv)
-                step[free] = random.normal(scale=0.1 * attempt, size=len(free))
+                step[free] = random.normal(scale=0.1 * attempt, size=len(free)) * self._columns[free]
                 start = self.moved(guess, step)
             q = self._descend(start, free)
             size = self.distance(q)
@@ -162,7 +176,8 @@ class Mechanism:
             random, free = np.random.default_rng(2), list(range(self.robot.nv))
             ranges: Array = np.array(
                 [
-                    limits.position or ((-math.pi, math.pi) if entry.unit == "rad" else (-1.0, 1.0))
+                    limits.position
+                    or ((-math.pi, math.pi) if entry.unit == "rad" else (-self._length, self._length))
                     for limits, entry in zip(self.robot.limits, self.robot.speeds)
                 ]
             )
@@ -182,13 +197,14 @@ class Mechanism:
         J = self.jacobian(q)
         change = np.zeros(self.robot.nv)
         rates = J @ qd
-        change[free] = -_least_squares(J[:, free], rates)
-        remaining = np.abs(J @ (qd + change))
-        if len(remaining) and remaining.max() > 1e-9 * max(1.0, float(np.abs(rates).max())):
-            worst = self.names[int(np.argmax(remaining))]
+        change[free] = -self._least_squares(J, rates, free)
+        remaining = np.abs(J @ (qd + change)) / self._rows
+        if len(remaining) and remaining.max() > 1e-9 * max(1.0, float(np.abs(rates / self._rows).max())):
+            row = int(np.argmax(remaining))
+            worst, violation = self.names[row], float(remaining[row] * self._rows[row])
             raise RobotError(
                 f"the speeds of the locked joints violate constraint '{worst}' "
-                f"by {remaining.max():.3g} per second",
+                f"by {violation:.3g} per second",
                 where=f"robot '{self.robot.name}'",
                 allowed="speeds of locked joints that the constraints permit",
                 fix="lock fewer joints, at most as many as the mechanism has degrees of freedom",
@@ -197,7 +213,7 @@ class Mechanism:
 
     def mobility(self, q: Array) -> Mobility:
         """The degrees of freedom at and near an assembled configuration ``q``."""
-        jacobians = [self.jacobian(q), *(self.jacobian(other) for other in self._neighbours(q))]
+        jacobians = [self.balanced(q), *(self.balanced(other) for other in self._neighbours(q))]
         ranks = [_rank(J) for J in jacobians]
         rank = max(ranks)
         independent = _independent_rows([J for J, r in zip(jacobians, ranks) if r == rank], rank)
@@ -212,7 +228,7 @@ class Mechanism:
     def free_joints(self, q: Array) -> tuple[str, ...]:
         """The joints that the first derivatives of the constraints permit to move at ``q``."""
         J = self.jacobian(q)
-        motion = np.eye(self.robot.nv) - np.column_stack([_least_squares(J, column) for column in J.T])
+        motion = np.eye(self.robot.nv) - np.column_stack([self._least_squares(J, column) for column in J.T])
         owners = [link.name for link in self.robot.moving_links for _ in link.joint.speeds]
         return tuple(dict.fromkeys(name for name, row in zip(owners, motion) if np.abs(row).max() > 1e-6))
 
@@ -226,19 +242,22 @@ class Mechanism:
         found: list[Array] = []
         for _ in range(BRANCH_STARTS):
             step = random.normal(size=self.robot.nv)
-            step -= _least_squares(J, J @ step)
-            length = float(np.linalg.norm(step))
+            step = self._permitted(J, step)
+            length = float(np.linalg.norm(step / self._columns))
             if length < 1e-9:
                 return []
             other = self._descend(self.moved(q, BRANCH_STEP / length * step), [*range(self.robot.nv)])
-            chord = np.asarray(self._difference(q, other).full())[:, 0]
+            chord = np.asarray(self._difference(q, other).full())[:, 0] / self._columns
             size = float(np.linalg.norm(chord))
-            is_assembled = np.abs(self.residuals(other)).max(initial=0.0) <= RESIDUAL_TOLERANCE
+            is_assembled = self._largest_residual(other) <= RESIDUAL_TOLERANCE
             if is_assembled and size > 0.2 * BRANCH_STEP:
                 direction = chord / size
                 if all(abs(float(direction @ known)) < SAME_BRANCH for known in found):
                     found.append(direction)
-        return found
+        if self._length == 1.0:
+            return found
+        in_metres = [direction * self._columns for direction in found]
+        return [direction / np.linalg.norm(direction) for direction in in_metres]
 
     def gaps(self, q: Array) -> dict[str, str]:
         """The violation of each closure at ``q`` as text, in mm and degrees."""
@@ -268,10 +287,13 @@ class Mechanism:
         return math.hypot(*position), max(map(abs, angle))
 
     def distance(self, q: Array) -> float:
-        """The largest residual; infinite if a closure is assembled with a reversed axis."""
+        """The largest residual, in balanced units; infinite if a closure has a reversed axis."""
         if any(self._reversed_axes(closure, q) for closure in self._closures):
             return math.inf
-        return float(np.abs(self.residuals(q)).max(initial=0.0))
+        return self._largest_residual(q)
+
+    def _largest_residual(self, q: Array) -> float:
+        return float(np.abs(self.residuals(q) / self._rows).max(initial=0.0))
 
     def _reversed_axes(self, closure: Closure, q: Array) -> bool:
         """Whether an axis of the second frame is opposite to the same axis of the first frame."""
@@ -294,9 +316,10 @@ class Mechanism:
         residuals = self.residuals(q)
         size, damping = float(residuals @ residuals), 1e-3
         for _ in range(MAX_STEPS):
-            if np.abs(residuals).max(initial=0.0) <= 0.01 * RESIDUAL_TOLERANCE or damping > 1e12:
+            largest_residual = np.abs(residuals / self._rows).max(initial=0.0)
+            if largest_residual <= 0.01 * RESIDUAL_TOLERANCE or damping > 1e12:
                 break
-            U, s, Vt = np.linalg.svd(self.jacobian(q)[:, free], full_matrices=False)
+            U, s, Vt = np.linalg.svd(self.balanced(q)[:, free], full_matrices=False)
             largest = float(s.max(initial=0.0))
             if largest == 0.0:
                 break
@@ -306,7 +329,8 @@ class Mechanism:
                 s > 1e-11 * largest, s / (s * s + damping * largest * largest * min(1.0, size)), 0.0
             )
             step = np.zeros(self.robot.nv)
-            step[free] = -Vt.T @ (gains * (U.T @ residuals))
+            step[free] = -Vt.T @ (gains * (U.T @ (residuals / self._rows)))
+            step *= self._columns
             candidate = self.moved(q, step)
             new = self.residuals(candidate)
             new_size = float(new @ new)
@@ -316,6 +340,19 @@ class Mechanism:
                 damping *= 8.0
         return q
 
+    def _balanced(self, J: Array) -> Array:
+        return J * self._columns / self._rows[:, None]
+
+    def _least_squares(self, J: Array, b: Array, free: Sequence[int] | None = None) -> Array:
+        """The shortest speeds of the ``free`` joints that minimise |J x - b|, in balanced units."""
+        chosen = [*range(self.robot.nv)] if free is None else free
+        return _least_squares(self._balanced(J)[:, chosen], b / self._rows) * self._columns[chosen]
+
+    def _permitted(self, J: Array, step: Array) -> Array:
+        """The part of a step, given in balanced units, that J permits."""
+        step = step * self._columns
+        return step - self._least_squares(J, J @ step)
+
     def _neighbours(self, q: Array) -> list[Array]:
         """Assembled configurations near ``q``, by random motions in the directions that J permits."""
         random = np.random.default_rng(1)
@@ -324,12 +361,12 @@ class Mechanism:
         for k in range(MOTIONS):
             J = self.jacobian(q)
             step = random.normal(size=self.robot.nv)
-            step -= _least_squares(J, J @ step)
-            length = float(np.linalg.norm(step))
+            step = self._permitted(J, step)
+            length = float(np.linalg.norm(step / self._columns))
             if length < 1e-9:
                 break
             other = self._descend(self.moved(q, (0.03 + 0.04 * k) / length * step), free)
-            if np.abs(self.residuals(other)).max(initial=0.0) <= RESIDUAL_TOLERANCE:
+            if self._largest_residual(other) <= RESIDUAL_TOLERANCE:
                 found.append(other)
         return found
 
@@ -347,6 +384,18 @@ class Mechanism:
             q=q.tolist(),
             gaps=gaps,
         )
+
+
+def characteristic_length(robot: Robot) -> float:
+    """The unit of length, m, in which rows and columns of the Jacobian are compared: 1 m for most robots.
+
+    Robots below 0.01 m or above 100 m have the sum of the distances of their frames. In metres, the
+    singular values of their displacements would be negligible beside those of angles, or the reverse.
+    """
+    poses = [pose for link in robot.links for pose in (link.before, link.after)]
+    poses += [end.pose for closure in robot.closures for end in (closure.first, closure.second)]
+    size = sum(math.hypot(*pose.translation) for pose in poses)
+    return 1.0 if size == 0.0 or SIZES[0] <= size <= SIZES[1] else size
 
 
 @lru_cache(maxsize=32)

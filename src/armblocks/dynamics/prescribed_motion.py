@@ -147,7 +147,7 @@ def _check_independent(robot: Robot, free: Sequence[int], near: Array | None) ->
             allowed="at most as many as the mechanism has; the constraints determine all others",
             fix="prescribe fewer joints",
         )
-    J = mechanism(robot).jacobian(assembled_coordinates(robot, near))[relations]
+    J = mechanism(robot).balanced(assembled_coordinates(robot, near))[relations]
     s = np.linalg.svd(J[:, free], compute_uv=False)
     if int(np.sum(s > RANK_TOLERANCE * s.max(initial=0.0))) < len(relations):
         raise RobotError(
