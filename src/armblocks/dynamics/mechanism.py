@@ -203,8 +203,7 @@ class Mechanism:
             row = int(np.argmax(remaining))
             worst, violation = self.names[row], float(remaining[row] * self._rows[row])
             raise RobotError(
-                f"the speeds of the locked joints violate constraint '{worst}' "
-                f"by {violation:.3g} per second",
+                f"the speeds of the locked joints violate constraint '{worst}' by {violation:.3g} per second",
                 where=f"robot '{self.robot.name}'",
                 allowed="speeds of locked joints that the constraints permit",
                 fix="lock fewer joints, at most as many as the mechanism has degrees of freedom",
