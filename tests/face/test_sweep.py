@@ -37,6 +37,27 @@ def decay() -> ab.Diagram:
     return builder.build()
 
 
+def test_numbers_of_runs_and_values_are_integers() -> None:
+    result = ab.sweep(decay(), {"rate": [1.0, 2.0, 3.0]}, measures={"end": "final(state/y)"}, **SHORT)
+    assert result.largest("end", 2).tolist() == [0, 1] and result.smallest("end", np.int64(1)).tolist() == [2]
+    for count in (-1, 1.5, True):
+        with pytest.raises(InputError, match="an integer number of runs, 0 or more"):
+            result.largest("end", count)  # pyright: ignore[reportArgumentType]
+    for run in (0.5, 3, -1, True):
+        with pytest.raises(InputError, match=f"run {run!r} does not exist. Allowed: 0 to 2"):
+            result.run(run)  # pyright: ignore[reportArgumentType]
+    for count in (-1, 0, 2.5, True):
+        for spaced in (ab.linspace, ab.geomspace):
+            with pytest.raises(InputError, match=f"the number of values is {count}. Allowed: an integer, 1"):
+                spaced(1, 2, count)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(InputError, match="'a' is not a finite number"):
+        ab.linspace("a", 1, 3)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(InputError, match="nan is not a finite number"):
+        ab.geomspace(1, np.nan, 3)
+    with pytest.raises(InputError, match="two numbers of the same sign, other than 0"):
+        ab.geomspace(-1, 1, 3)
+
+
 def assert_same_table(first: ab.SweepResult, second: ab.SweepResult) -> None:
     assert first.names == second.names
     for name in (*first.names, *first.kept):
@@ -141,7 +162,7 @@ def test_masks_entries_and_constants_of_the_equations_vary() -> None:
     assert whole.kept == ("source/y[0]", "source/y[1]")
     assert whole["source.value[1]"].tolist() == whole["source/y[1]"][:, 0].tolist() == [2.0, 6.0]
     periods = ab.sweep(decay(), {"noise.sample_time": [0.5, 0.25]}, measures={"end": "rms(noise/y)"}, **SHORT)
-    assert "1 models compiled" in periods.remark or "2 models compiled" in periods.remark
+    assert "1 model compiled" in periods.remark or "2 models compiled" in periods.remark
     for run in (0, 1):
         assert periods.run(run).run.ticks == (5, 9)[run]
 
@@ -165,7 +186,7 @@ def test_every_column_has_a_name_of_its_own() -> None:
 def test_equal_texts_are_compiled_once() -> None:
     texts = np.array(["<", ">"] * 3)
     result = ab.sweep(decay(), {"below.relation": texts}, design="paired", **SHORT)
-    assert "2 models" in result.remark or "1 models" in result.remark
+    assert "2 models" in result.remark or "1 model " in result.remark
 
 
 def test_python_functions_measure_results() -> None:

@@ -88,3 +88,21 @@ def test_figures_are_written_as_svg_and_png(tmp_path: Path) -> None:
 def test_a_trajectory_of_another_robot_is_refused() -> None:
     with pytest.raises(InputError, match=r"the trajectory has 2 joints.*1, as the robot 'slider'"):
         ab.trajectory_report(slider(), ab.jtraj([0, 0], [1, 1], 5))
+
+
+def test_a_report_names_the_first_contact() -> None:
+    arm = ab.load_robot("twolink")
+    motion = ab.jtraj([0.0, 0.0], [1.0, 0.0], np.linspace(0.0, 2.0, 30))
+    wall = ab.Box(size=(0.1, 2.0, 0.1), pose=ab.Transform(translation=(1.5, 0.0, 1.2)), name="lamp")
+    report = ab.trajectory_report(arm, motion, obstacles=[wall])
+    assert report.collisions is not None and report.collisions.first_contact is not None
+    contact = report.collisions.first_contact
+    assert (contact.first, contact.second) == ("link2", "lamp")
+    assert f"collisions: first contact of link2 and lamp at {contact.contact:.4f}"[:45] in str(report)
+    free = ab.trajectory_report(arm, motion, obstacles=[ab.Plane(point=(0, 0, -1))])
+    assert "collisions: no contact, least distance" in str(free)
+    alone = ab.trajectory_report(arm, motion, obstacles=())
+    assert "collisions: no contact, least distance 0.7095 m" in str(alone)  # of base and link2
+    nothing = ab.collisions(arm, [0.0, 0.0], ignore=[("base", "link2")])
+    assert nothing.summary == "no pair of bodies is compared" and not nothing.collides
+    assert ab.trajectory_report(arm, motion).collisions is None

@@ -22,7 +22,8 @@ from armblocks.face.estimates import (
     value_of,
 )
 from armblocks.face.joint_log import LogSource, prepared, read_logs
-from armblocks.face.trajectory_report import save_picture, text_table
+from armblocks.face.text_table import text_table
+from armblocks.face.trajectory_report import save_picture
 from armblocks.pictures.numbers import table_number
 from armblocks.pictures.picture import Picture
 from armblocks.pictures.style import FIGURE_WIDTH

@@ -16,8 +16,9 @@ from armblocks.errors import InputError, RobotError, UnknownNameError, counted
 from armblocks.face.arm import Arm
 from armblocks.face.payload import Payload
 from armblocks.face.pick_and_place import PickAndPlaceCycle
+from armblocks.face.text_table import text_table
 from armblocks.face.trajectory import JointTrajectory
-from armblocks.face.trajectory_report import motion_with_torques, save_picture, text_table
+from armblocks.face.trajectory_report import motion_with_torques, save_picture
 from armblocks.files import write_atomically
 from armblocks.pictures.numbers import table_number
 from armblocks.pictures.picture import Picture

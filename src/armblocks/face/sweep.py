@@ -17,7 +17,7 @@ from armblocks import interrupts
 from armblocks.diagram import Diagram, content_key, with_parameters
 from armblocks.diagram.function_content import UnknownContentError, function_parts
 from armblocks.equations import SimulationOptions
-from armblocks.errors import InputError
+from armblocks.errors import InputError, counted
 from armblocks.face.model import CompiledDiagram, compile_diagram
 from armblocks.face.python_calls import called_functions
 from armblocks.face.settings import RunSettings, check_settings, takes_settings, with_settings
@@ -398,5 +398,6 @@ def _remark(
     if general and not reason:
         parts.append(f"{general} runs one after the other, because they failed, were stiff or too long")
     if parameters.recompiled:
-        parts.append(f"{parameters.recompiled} models compiled, because constants of the equations vary")
+        models = counted(parameters.recompiled, "model")
+        parts.append(f"{models} compiled, because constants of the equations vary")
     return "; ".join(parts)

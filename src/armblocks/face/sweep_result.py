@@ -101,9 +101,9 @@ class SweepResult(metaclass=ArgumentErrors):
         return self.source.model.simulate(self.source.options, parameters=self.parameters(run))
 
     def _check_run(self, run: int) -> None:
-        if not 0 <= run < self.planned:
+        if not _is_integer(run) or not 0 <= run < self.planned:
             raise InputError(
-                f"run {run} does not exist",
+                f"run {run!r} does not exist",
                 where=self.name,
                 allowed=f"0 to {self.planned - 1}",
                 fix="choose a number of the column 'run'",
@@ -118,6 +118,13 @@ class SweepResult(metaclass=ArgumentErrors):
         return self._extreme(name, count, 1.0)
 
     def _extreme(self, name: str, count: int, sign: float) -> NDArray[np.int64]:
+        if not _is_integer(count) or count < 0:
+            raise InputError(
+                f"count = {count!r}",
+                where=self.name,
+                allowed="an integer number of runs, 0 or more",
+                fix="give the number of runs that the result lists",
+            )
         values = self._numbers(name)
         order = np.argsort(sign * values, kind="stable")
         order = order[~np.isnan(values[order])]
@@ -204,3 +211,7 @@ class SweepResult(metaclass=ArgumentErrors):
                 text = f"{finite.min():.6g} to {finite.max():.6g}, median {np.median(finite):.6g}"
             lines.append(f"  {name:<{width}}  {text}")
         return "\n".join(lines)
+
+
+def _is_integer(value: object) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)

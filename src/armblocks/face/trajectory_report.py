@@ -12,9 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from armblocks.argument_errors import ArgumentErrors
 from armblocks.errors import InputError, counted
 from armblocks.face.arm import Arm
+from armblocks.face.collisions.check import collisions
+from armblocks.face.collisions.obstacles import Obstacle
+from armblocks.face.collisions.report import CollisionReport
 from armblocks.face.least_time import MotionLimits, check_joint_space, motion_limits
 from armblocks.face.payload import Payload, payload_numbers
 from armblocks.face.pick_and_place import PickAndPlaceCycle
+from armblocks.face.text_table import text_table
 from armblocks.face.trajectory import JointTrajectory
 from armblocks.files import write_atomically
 from armblocks.pictures.numbers import table_number
@@ -59,7 +63,7 @@ class TrajectoryReport(metaclass=ArgumentErrors):
 
     ``joints``: the names of the n joints, ``units`` rad or m. ``time`` (N,) s; ``q``, ``qd``, ``qdd``,
     ``tau`` (N, n) at these times. ``speed_limits``, ``acceleration_limits``, ``torque_limits`` (n,), infinite
-    without a limit; ``position_limits`` (n, 2).
+    without a limit; ``position_limits`` (n, 2). ``collisions``: the check for collisions, if it was made.
     """
 
     name: str
@@ -74,6 +78,7 @@ class TrajectoryReport(metaclass=ArgumentErrors):
     speed_limits: Array
     acceleration_limits: Array
     torque_limits: Array
+    collisions: CollisionReport | None = None
 
     @property
     def cycle_time(self) -> float:
@@ -206,6 +211,8 @@ class TrajectoryReport(metaclass=ArgumentErrors):
         heads = ["joint", "lowest", "highest", "margin", "speed", "%", "accel.", "%", "torque", "%"]
         lines = [f"{self.name}: cycle time {table_number(self.cycle_time)} s", *text_table(heads, rows)]
         lines += [f"exceeded: {sentence}" for sentence in self.exceeded]
+        if self.collisions is not None:
+            lines.append(f"collisions: {self.collisions.summary}")
         intervals = self.binding
         for part in intervals[:_MAX_TEXT_INTERVALS]:
             lines.append(f"{part.start:8.3f} to {part.end:.3f} s: {part.quantity} of {part.joint}")
@@ -222,16 +229,22 @@ def trajectory_report(
     acceleration: ArrayLike | None = None,
     torque: ArrayLike | None = None,
     payload: Payload | float | None = None,
+    obstacles: Sequence[Obstacle] | None = None,
+    margin: float = 0.0,
 ) -> TrajectoryReport:
     """The report of a trajectory of ``arm``: cycle time, peaks and limits, the binding limit at each time.
 
     The limits are defined as for :func:`~armblocks.least_time`; torques are computed by ``arm.rne`` with the
     ``payload``. In a cycle of :func:`~armblocks.pick_and_place` the payload is at the tool only in the loaded
-    phases. Raises InputError for a trajectory with another number of joints.
+    phases. ``obstacles``, also none, ``()``: the report names the first contact of the links with each other
+    and with these bodies, as :func:`~armblocks.collisions` with this ``margin`` (m); ``collisions`` has all
+    distances. The body in the gripper is not included. Raises InputError for a trajectory with another number
+    of joints.
     """
     where = "trajectory_report"
     limits = motion_limits(arm, where, speed, acceleration, torque)
     time, q, qd, qdd, tau, _ = motion_with_torques(arm, trajectory, payload, where)
+    path = trajectory.trajectory if isinstance(trajectory, PickAndPlaceCycle) else trajectory
     return TrajectoryReport(
         name=arm.name,
         joints=tuple(entry.name for entry in arm.robot.speeds),
@@ -242,6 +255,7 @@ def trajectory_report(
         qdd=qdd,
         tau=tau,
         position_limits=arm.robot.qlim,
+        collisions=None if obstacles is None else collisions(arm, path, obstacles, margin=margin),
         **_named(limits),
     )
 
@@ -307,18 +321,6 @@ def save_picture(picture: Picture, path: str | PathLike[str], where: str) -> Non
             fix="change the suffix",
         )
     write_atomically(name, svg_file(picture).encode() if kind == "svg" else picture_png(picture))
-
-
-def text_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Lines with aligned columns; the first one is aligned to the left."""
-    widths = [max(len(row[k]) for row in [heads, *rows]) for k in range(len(heads))]
-    return [
-        "  ".join(
-            cell.ljust(width) if k == 0 else cell.rjust(width)
-            for k, (cell, width) in enumerate(zip(row, widths))
-        ).rstrip()
-        for row in [heads, *rows]
-    ]
 
 
 def _number(value: float | str) -> str:

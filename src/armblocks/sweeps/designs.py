@@ -112,13 +112,48 @@ def seeds(first: int = 1) -> Distribution:
 @with_argument_errors
 def linspace(first: float, last: float, count: int) -> Array:
     """``count`` values at equal distances, for :func:`armblocks.sweep`: NumPy's ``linspace``."""
-    return np.linspace(first, last, count)
+    start, stop, number = _ends(first, last, count, "linspace")
+    return np.linspace(start, stop, number)
 
 
 @with_argument_errors
 def geomspace(first: float, last: float, count: int) -> Array:
     """``count`` values with equal ratios, for :func:`armblocks.sweep`: NumPy's ``geomspace``."""
-    return np.geomspace(first, last, count)
+    start, stop, number = _ends(first, last, count, "geomspace")
+    if not (start * stop > 0.0).all():
+        raise InputError(
+            f"the values are from {first} to {last}",
+            where="geomspace",
+            allowed="two numbers of the same sign, other than 0",
+            fix="use linspace",
+        )
+    return np.geomspace(start, stop, number)
+
+
+def _ends(first: ArrayLike, last: ArrayLike, count: object, where: str) -> tuple[Array, Array, int]:
+    """Two finite values, numbers or arrays, and a number of values. Raises ``InputError``."""
+    ends: list[Array] = []
+    for value in (first, last):
+        try:
+            end = np.asarray(value, dtype=np.float64)
+        except (TypeError, ValueError):
+            end = np.array(np.nan)
+        if not np.isfinite(end).all():
+            raise InputError(
+                f"{value!r} is not a finite number",
+                where=where,
+                allowed="the first and the last value",
+                fix="give two numbers and the number of values",
+            )
+        ends.append(end)
+    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
+        raise InputError(
+            f"the number of values is {count!r}",
+            where=where,
+            allowed="an integer, 1 or more",
+            fix=f"write for example {where}(1, 10, 20)",
+        )
+    return ends[0], ends[1], int(cast("int", count))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from armblocks.argument_errors import ArgumentErrors
 from armblocks.errors import counted
-from armblocks.face.trajectory_report import text_table
+from armblocks.face.text_table import text_table
 from armblocks.pictures.numbers import table_number
 
 MAX_ROWS = 12
@@ -57,14 +57,20 @@ class CollisionReport(metaclass=ArgumentErrors):
         """The least distance of all pairs, m; infinite without pairs."""
         return min((pair.distance for pair in self.pairs), default=float("inf"))
 
-    def __str__(self) -> str:
+    @property
+    def summary(self) -> str:
+        """The bodies and the time of the first contact, or the least distance, as a sentence."""
         first = self.first_contact
-        if first is None or first.contact is None:
-            head = f"no contact, least distance {table_number(self.clearance)} m"
-        else:
+        if first is not None and first.contact is not None:
             when = table_number(first.contact)
             at = f"at {when} s" if self.unit else f"in configuration {when}"
-            head = f"first contact of {first.first} and {first.second} {at}"
+            return f"first contact of {first.first} and {first.second} {at}"
+        if not self.pairs:
+            return "no pair of bodies is compared"
+        nearest = min(self.pairs, key=lambda pair: pair.distance)
+        return f"no contact, least distance {table_number(nearest.distance)} m"
+
+    def __str__(self) -> str:
         rows = [
             [
                 f"{pair.first}, {pair.second}",
@@ -74,7 +80,7 @@ class CollisionReport(metaclass=ArgumentErrors):
             ]
             for pair in self.pairs[:MAX_ROWS]
         ]
-        lines = [f"{self.name}: {head}", *text_table(["bodies", "distance", "at", "contact"], rows)]
+        lines = [f"{self.name}: {self.summary}", *text_table(["bodies", "distance", "at", "contact"], rows)]
         if len(self.pairs) > MAX_ROWS:
             lines.append(f"and {counted(len(self.pairs) - MAX_ROWS, 'more pair')}")
         lines += [f"not compared: {text}" for text in self.excluded]

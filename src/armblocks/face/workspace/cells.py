@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from armblocks.argument_errors import ArgumentErrors
 from armblocks.errors import InputError, UnknownNameError, counted
+from armblocks.face.text_table import text_table
 from armblocks.face.trajectory_arguments import as_array
-from armblocks.face.trajectory_report import text_table
 from armblocks.pictures.numbers import table_number
 
 Array = NDArray[np.float64]
