@@ -107,7 +107,7 @@ def test_python_code_is_refused(text: str) -> None:
         ("[" * 80 + "]" * 80, "brackets are nested too deeply"),
         ("[1 2; 3]", "the rows of an array have 2, 1 numbers"),
         ("[A 1]", "a matrix is inside brackets"),
-        ("A*v", "a matrix of 2 x 2 is multiplied by one of 3 x 1.*as many columns"),
+        ("A*v", "a matrix of 2 x 2 is multiplied by a matrix of 3 x 1.*as many columns"),
         ("A + v", "arrays of 2 x 2 and 3 x 1 numbers are combined"),
         ("v/A", r"the divisor is a matrix.*inv\(A\)"),
         ("A[5]", r"the index 5 is not possible here, in column 2: A»\[5\].*Allowed: A\(1\) to A\(4\)"),

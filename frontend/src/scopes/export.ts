@@ -29,8 +29,8 @@ export async function savePng(figure: Figure): Promise<void> {
 const quoted = (text: string) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text)
 
 /**
- * The recorded samples of the traces, in SI units, all of them or in a range of times; traces of
- * another run have a separate time column.
+ * The recorded samples of the traces in a range of times, in SI units. Traces of another run have a separate
+ * time column.
  */
 export function csvOf(traces: Trace[], range: [number, number] = [-Infinity, Infinity]): string {
   const columns: { name: string; values: Float64Array }[] = []

@@ -1,4 +1,4 @@
-"""CasADi functions as sums of products, within a budget."""
+"""CasADi functions as sums of products, with a limit on their size."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from armblocks.algebra.graph import evaluate
 from armblocks.algebra.sums import Sum, call, cosine, sine
 
 MAX_PRODUCTS = 200_000
-"""Largest number of products of terms in the expansion of a function: some seconds."""
+"""Largest number of products of terms in the expansion of a function, which takes some seconds."""
 MAX_CONTRACTED = 300
-"""Largest number of terms of intermediate sums that are contracted."""
+"""Only intermediate sums of at most this many terms are contracted."""
 
 
 class _TooManyTermsError(Exception):
-    """The expansion exceeds the budget."""
+    """The expansion has more than ``MAX_PRODUCTS`` products."""
 
 
 class _Sums:
@@ -31,16 +31,16 @@ class _Sums:
 
     def add(self, a: Sum, b: Sum) -> Sum:
         """The sum."""
-        self._spend(len(a) + len(b))
+        self._count(len(a) + len(b))
         return _small_contracted(a.plus(b))
 
     def multiply(self, a: Sum, b: Sum) -> Sum:
         """The product, expanded."""
-        self._spend(len(a) * len(b))
+        self._count(len(a) * len(b))
         return _small_contracted(a.times(b))
 
     def divide(self, a: Sum, b: Sum) -> Sum:
-        """The quotient; of a sum with several terms the reciprocal remains a call."""
+        """The quotient. A divisor with several terms becomes the call ``reciprocal``."""
         if len(b) != 1:
             return self.multiply(a, call("reciprocal", b))
         ((monomial, (value, _)),) = b.terms.items()
@@ -56,10 +56,10 @@ class _Sums:
         return sine(a)
 
     def call(self, name: str, *arguments: Sum) -> Sum:
-        """A function of other arguments."""
+        """A function without a rule in this class, as a call."""
         return call(name, *arguments)
 
-    def _spend(self, products: int) -> None:
+    def _count(self, products: int) -> None:
         self._products += products
         if self._products > MAX_PRODUCTS:
             raise _TooManyTermsError

@@ -36,9 +36,9 @@ class RootLocus:
 def root_locus(system: LinearSystem, gains: Array | None = None) -> RootLocus:
     """The branches of a loop with negative feedback; by default the gains are chosen automatically.
 
-    They then range from 0 to a gain at which the roots are near their limits, and are denser where the roots
-    move fast, so that branches can be distinguished where they meet. Raises ``InputError`` for more than one
-    input or output, and for a system without states.
+    Automatic gains range from 0 to a gain at which the roots are near their limits. They are denser where the
+    roots move fast, so that branches can be distinguished where they meet. Raises ``InputError`` for more
+    than one input or output, and for a system without states.
     """
     if not system.is_siso or not system.order:
         raise InputError(

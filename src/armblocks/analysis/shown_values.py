@@ -9,8 +9,8 @@ An eigenvalue computed in floating point is an exact eigenvalue of a matrix ``A 
 7.5.6). The set of all such eigenvalues is the pseudospectrum of A: the numbers ``mu`` with ``sigma_min(A - mu
 I) <= eta`` (Trefethen and Embree, Spectra and Pseudospectra, 2005, ch. 2). A root is displayed as 0, as real
 or as imaginary if the straight line from it to 0, to the real or to the imaginary axis is inside the
-pseudospectrum, because rounding alone can then move the root there. This is also valid for multiple roots,
-whose rounding errors are as large as a root of ``eta``.
+pseudospectrum: rounding alone can then cause the difference. This is also valid for multiple roots, whose
+rounding errors are as large as a root of ``eta``.
 """
 
 from __future__ import annotations

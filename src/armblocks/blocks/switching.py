@@ -19,7 +19,7 @@ from armblocks.diagram import (
 from armblocks.errors import InputError
 
 THRESHOLD_OFFSET = 1e-300
-"""An offset below the resolution of any signal, which assigns the threshold itself to one side."""
+"""An offset below the resolution of any signal: a guard with this offset is positive at its threshold."""
 
 
 SMALLEST_JUMP = 1e-9
@@ -83,7 +83,7 @@ def beyond(guards: Signals, up: str = "up", down: str = "down") -> SX:
 
 
 def cell_of(target: SX, before: SX, guards: Signals, up: str = "up", down: str = "down") -> SX:
-    """The consistent cell: ``before`` while the guards at its ends allow it, else ``target``.
+    """The consistent cell: ``before`` while no guard at its ends has crossed 0, else ``target``.
 
     ``target`` is computed from the present values. If it equals ``before`` because of rounding, the result is
     the next cell.

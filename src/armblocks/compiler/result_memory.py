@@ -49,8 +49,8 @@ def result_memory() -> ResultMemory:
 class ResultMemory:
     """A pool of memory for large results.
 
-    At most ``limit`` bytes that no array refers to are kept. Calls from several threads are safe: deques
-    append and pop in one step each.
+    At most ``limit`` bytes that no array refers to are kept. Calls from several threads are safe, because
+    ``append`` and ``pop`` of a deque are atomic.
     """
 
     def __init__(self, limit: int) -> None:
@@ -87,7 +87,7 @@ class ResultMemory:
                 break
             if count <= memory.size <= 2 * count:
                 return memory
-            self._idle.appendleft(memory)  # of another size: it becomes the next block to be freed
+            self._idle.appendleft(memory)  # the size is unsuitable: this block will be freed first
         return np.empty(count + count // 8)  # larger, so that a slightly larger result can reuse the block
 
 

@@ -26,8 +26,8 @@ def solve_affine(w: SX, residual: SX) -> tuple[SX, list[int], list[tuple[list[in
     solution, remaining = SX(w), list[int]()
     loops: list[tuple[list[int], SX]] = []
     derivatives = jacobian(residual, w)
-    needs = _dependencies(residual, w)
-    for loop in strongly_connected(needs):
+    dependencies = _dependencies(residual, w)
+    for loop in strongly_connected(dependencies):
         unknowns, derivative = w[loop], derivatives[loop, loop]
         if depends_on(derivative, unknowns) or has_discontinuity(residual[loop], unknowns):
             remaining.extend(loop)
@@ -36,7 +36,7 @@ def solve_affine(w: SX, residual: SX) -> tuple[SX, list[int], list[tuple[list[in
         constant = substitute(residual[loop], unknowns, SX.zeros(len(loop)))
         solved = -_linear_solve(densify(constant), derivative)
         # Earlier solutions are substituted last, into a small expression, so that the work grows linearly.
-        before = sorted({index for row in loop for index in needs[row]} - set(loop))
+        before = sorted({index for row in loop for index in dependencies[row]} - set(loop))
         solution[loop] = substituted(solved, w[before], solution[before]) if before else solved
     return solution, sorted(remaining), loops
 
@@ -93,10 +93,10 @@ def _function_of(expression: SX, unknowns: SX) -> Function:
 def _dependencies(residual: SX, w: SX) -> list[list[int]]:
     """The indices of the unknowns in each residual, including unknowns in comparisons only."""
     sparsity = _function_of(residual, w).jac_sparsity(0, 0)
-    needs: list[list[int]] = [[] for _ in range(residual.shape[0])]
+    dependencies: list[list[int]] = [[] for _ in range(residual.shape[0])]
     for row, column in zip(sparsity.row(), sparsity.get_col()):
-        needs[row].append(column)
-    return needs
+        dependencies[row].append(column)
+    return dependencies
 
 
 def check_solvable(
@@ -105,7 +105,7 @@ def check_solvable(
     """Raise ``AlgebraicLoopError`` for equations that are singular for the present parameter values.
 
     ``loops[i]``: the signals around the loop of unknown ``i``. Only equations that depend on parameters alone
-    are checked here; those that depend on states or time are checked during the run.
+    are checked here; other equations are checked during the run.
     """
     derivatives = jacobian(residual, w)
     parameters = _symbols_in(p)

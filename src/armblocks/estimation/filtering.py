@@ -48,10 +48,10 @@ def central_derivative(values: Array, step: float) -> Array:
 def advised_cutoff(values: Array, step: float) -> float:
     """A cut-off frequency (Hz) for positions (N, n): five times the highest frequency of the motion.
 
-    The highest frequency is the one above which less than 1e-4 of the energy of the speed of each joint
-    remains once the white noise, measured in the upper half of the spectrum, is subtracted. The result is at
-    most a fifth of the sample rate. Source of the factor: Gautier, *Dynamic identification of robots with
-    power model*, ICRA 1997.
+    Above the highest frequency, less than 1e-4 of the energy of the speed of each joint remains. White noise,
+    estimated from the upper half of the spectrum, is first subtracted. The result is at most a fifth of the
+    sample rate. Source of the factor: Gautier, *Dynamic identification of robots with power model*, ICRA
+    1997.
     """
     count = len(values)
     window = np.hanning(count).reshape(-1, 1)

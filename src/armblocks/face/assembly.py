@@ -58,8 +58,7 @@ class Assembly(metaclass=ArgumentErrors):
             if self.bifurcation:
                 lines.append(f"bifurcation: {len(self.branches)} branches of the motion cross here")
         for name, count in self.redundant.items():
-            equations = counted(count, "equation follows", "equations follow")
-            lines.append(f"constraint '{name}': {equations} from the others")
+            lines.append(f"constraint '{name}': {counted(count, 'redundant equation')}")
         return "\n".join(lines)
 
 

@@ -68,7 +68,7 @@ class FileContext:
 
 
 def warn_of_findings(findings: Sequence[FileFinding]) -> None:
-    """Issue one ArmblocksWarning for each code: its first finding, and the number of others."""
+    """Issue one ArmblocksWarning for each code: its first finding, and the number of further findings."""
     by_code: dict[str, list[FileFinding]] = {}
     for finding in findings:
         by_code.setdefault(finding.rule.code, []).append(finding)

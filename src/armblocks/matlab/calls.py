@@ -33,7 +33,7 @@ def call_function(
     """The value of a function of the table, with the given arithmetic.
 
     ``constant`` returns the numbers of an argument, or ``None`` where it depends on symbols. Raises an error
-    at ``location`` for arguments that do not fit.
+    at ``location`` for a wrong number of arguments or wrong sizes.
     """
     _check_count(location, name, function, len(arguments))
     try:

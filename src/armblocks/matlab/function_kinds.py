@@ -55,11 +55,11 @@ class Arithmetic(Protocol):
         ...
 
     def minimum(self, left: Any, right: Any) -> Any:
-        """The smaller value; if one is NaN, the other one."""
+        """The smaller value; NaN only if both are NaN."""
         ...
 
     def maximum(self, left: Any, right: Any) -> Any:
-        """The larger value; if one is NaN, the other one."""
+        """The larger value; NaN only if both are NaN."""
         ...
 
     def quotient(self, left: Any, right: Any) -> Any:

@@ -67,11 +67,11 @@ class NumberArithmetic:
         return np.abs(value)
 
     def minimum(self, left: Array, right: Array) -> Array:
-        """The smaller value; if one is NaN, the other one."""
+        """The smaller value; NaN only if both are NaN."""
         return np.fmin(left, right)
 
     def maximum(self, left: Array, right: Array) -> Array:
-        """The larger value; if one is NaN, the other one."""
+        """The larger value; NaN only if both are NaN."""
         return np.fmax(left, right)
 
     def quotient(self, left: Array, right: Array) -> Array:

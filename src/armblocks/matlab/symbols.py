@@ -104,11 +104,11 @@ class SymbolArithmetic:
         return casadi.fabs(value)
 
     def minimum(self, left: SX, right: SX) -> SX:
-        """The smaller value; if one is NaN, the other one."""
+        """The smaller value; NaN only if both are NaN."""
         return casadi.fmin(left, right)
 
     def maximum(self, left: SX, right: SX) -> SX:
-        """The larger value; if one is NaN, the other one."""
+        """The larger value; NaN only if both are NaN."""
         return casadi.fmax(left, right)
 
     def quotient(self, left: SX, right: SX) -> SX:
@@ -248,7 +248,8 @@ class Symbols:
             columns = [entry for entry in row if isinstance(entry, OrientedVector) and entry.kind == "column"]
             if columns and (len(rows) > 1 or len(row) > 1):
                 raise location.error(
-                    "a column of a matrix, or a matrix times a vector, is combined with others in brackets",
+                    "a column of a matrix, or a matrix times a vector, is combined with other entries "
+                    "in brackets",
                     allowed="numbers, vectors, and rows of matrices inside brackets",
                     fix="write A(:, [2 1]) for columns of one matrix",
                 )
@@ -289,7 +290,7 @@ class Symbols:
         return OrientedVector(array, {"row": "column", "column": "row"}.get(kind, "transposed"))
 
     def index(self, location: Location, value: Symbol, expression: Expression) -> Symbol:
-        """The value of an index. Raises an error for a logical one."""
+        """The value of an index. Raises an error for a logical index."""
         if is_logical(expression):
             raise location.error(
                 "an index is a comparison or a logical value", allowed="positions counted from 1"
@@ -402,7 +403,8 @@ def _orientation_error(location: Location) -> ArmblocksError:
 def _single_index(
     location: Location, count: int, index_arrays: Sequence[NDArray[np.float64] | None]
 ) -> list[NDArray[np.float64] | None]:
-    """The indices (k, 1) of ``v(k, 1)`` or ``v(1, k)``. Raises an error for others, unless v is a number."""
+    """The indices (k, 1) of ``v(k, 1)`` or ``v(1, k)``. Raises an error for other indices, unless v is a
+    number."""
     numbers = [float(index[0, 0]) for index in index_arrays if index is not None and index.size == 1]
     if count == 1:
         return list(index_arrays)
@@ -461,7 +463,7 @@ def _product(location: Location, left: SX, right: SX) -> Symbol:
         left = left.T
     if left.shape[1] != right.shape[0]:
         raise location.error(
-            f"a matrix of {_size(left)} is multiplied by one of {_size(right)}",
+            f"a matrix of {_size(left)} is multiplied by a matrix of {_size(right)}",
             allowed="as many columns on the left as rows on the right; .* multiplies elementwise",
         )
     return _oriented_part(mtimes(left, right))

@@ -116,7 +116,7 @@ class SignalGenerator(Block):
 class RepeatingSequence(Block):
     """A periodic piecewise linear signal: y = values at times, linear in between, period times[-1].
 
-    If the last value differs from the first one, the signal jumps at the end of each period.
+    If the last value differs from the first value, the signal jumps at the end of each period.
     """
 
     following_modes: ClassVar[bool] = True
@@ -183,7 +183,7 @@ class RepeatingSequence(Block):
 class RepeatingSequenceInterpolated(Block):
     """A periodic sampled signal: y(k) = values at times, interpolated at kT modulo times[-1].
 
-    ``linear`` interpolates linearly, ``nearest`` takes the nearest value, ``flat`` the previous one.
+    ``linear`` interpolates linearly, ``nearest`` takes the nearest value, ``flat`` the previous value.
     """
 
     title: ClassVar[str] = "Repeating Sequence Interpolated"

@@ -87,7 +87,7 @@ class _Rows:
             self._unite(left.node, right.node, left.port - right.port, self._strength(segment))
 
     def _unite(self, left: int, right: int, shift: float, strength: float) -> None:
-        """Make the right node, and its row, ``shift`` lower than the left one."""
+        """Make the right node, and its row, ``shift`` lower than the left node."""
         a, b = self._leader[left], self._leader[right]
         move = self._offset[left] + shift - self._offset[right]
         for node in self._members[b]:

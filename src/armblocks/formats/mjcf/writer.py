@@ -4,7 +4,7 @@ A body has the frame of the link at the coordinate 0: its pose in the parent is 
 after``, and its joint is at the pose ``after`` inverse in the body. A link without mass, inertia and shapes
 that only carries the joint of the next link becomes an additional joint of that link's body, because MuJoCo
 does not accept moving bodies without mass. The pose of the base is included in the poses of the first bodies.
-The pose of the tool becomes a last body, so that ``fkine`` stays the same.
+The tool becomes the last body, so that ``fkine`` does not change.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ _MOST_JOINTS = 6
 class _Body:
     """A body of the file: the link, the series of joints that move it, and its pose in the parent body.
 
-    ``joints``: the links whose joints these are, each with the pose of the body in the frame of the joint.
+    ``joints``: for each joint its link, and the pose of the body in the frame of the joint.
     """
 
     link: Link
@@ -133,7 +133,7 @@ def _warn_of_losses(robot: Robot) -> None:
 
 
 def _check_quaternions(robot: Robot, link: Link) -> None:
-    """Check that a link with a quaternion has the same coordinates in the file: its frame is in its joint."""
+    """Check that a ball or free joint has the same coordinates in the file, and warn otherwise."""
     where = f"robot '{robot.name}', link '{link.name}'"
     if isinstance(link.joint, Free) and link.parent is not None:
         raise FormatError(
@@ -179,7 +179,7 @@ def _bodies(robot: Robot) -> tuple[dict[str, _Body], list[str]]:
         else:
             at_base = robot.base if link.parent is None else Transform()
             body, parent = _Body(link=link, pose=at_base), link.parent
-        # The joints so far are followed by this link.
+        # The frame of the body moves to this link.
         step = pose @ link.after
         body.joints = [(carried, after @ step) for carried, after in body.joints]
         body.pose, body.link = body.pose @ step, link

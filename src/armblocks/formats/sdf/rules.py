@@ -27,12 +27,12 @@ SPRING = Rule(
 COUPLING = Rule(
     code="sdf-coupling",
     allowed="<mimic> of a joint with one axis, and gearboxes between revolute joints of one body",
-    remedy="correct the names of joints and bodies, or compute the coupled coordinates from the others",
+    remedy="correct the names of joints and bodies, or compute the coupled coordinates separately",
 )
 CLOSURE = Rule(
     code="sdf-closure",
     allowed="joints that close a loop without limits, friction and springs",
-    remedy="close the loop at another joint: move this one up in the file",
+    remedy="close the loop at another joint: move this joint up in the file",
 )
 NO_INERTIA = Rule(
     code="sdf-inertia-default",

@@ -7,7 +7,7 @@ from armblocks.formats.file_findings import Rule
 MIMIC = Rule(
     code="urdf-mimic",
     allowed="<mimic> of another revolute, continuous or prismatic joint, with a multiplier other than 0",
-    remedy="name the joint that is followed, or remove <mimic>",
+    remedy="correct the name of the other joint, or remove <mimic>",
 )
 NO_LIMIT = Rule(
     code="urdf-limit-missing",

@@ -11,7 +11,7 @@ from armblocks.robot.constraints.relations import NoDisplacement, Relation
 
 @dataclass(frozen=True, kw_only=True)
 class PointOnPlane(Closure):
-    """A point that stays in a plane. The origin of the second frame is in the xy plane of the first one."""
+    """A point that stays in a plane. The origin of the second frame is in the xy plane of the first frame."""
 
     title: ClassVar[str] = "point on plane"
 
