@@ -97,8 +97,13 @@ class Equations:
     def row(self, relation: Relation, a: Frame, b: Frame) -> tuple[Array, float]:
         """The coefficients of the accelerations (a, alpha of each link), and the rest."""
         rest = self._second_derivative(relation, a, b, np.zeros(self.size))
-        units = np.eye(self.size)
-        return np.array([self._second_derivative(relation, a, b, e) - rest for e in units]), rest
+        coefficients = np.zeros(self.size)
+        for link in {a.link, b.link} - {None}:
+            first = 6 * self.names.index(link)
+            for k in range(first, first + 6):
+                unit = np.eye(self.size)[k]
+                coefficients[k] = self._second_derivative(relation, a, b, unit) - rest
+        return coefficients, rest
 
     def _second_derivative(self, relation: Relation, a: Frame, b: Frame, accelerations: Array) -> float:
         (pa, ea), (pb, eb) = (self._motion(frame, accelerations) for frame in (a, b))
