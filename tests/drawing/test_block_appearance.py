@@ -6,9 +6,9 @@ import itertools
 
 import pytest
 
-from armblocks.blocks import BLOCKS, EnabledSubsystem, Gain, Scope, SineWave, Sum
+from armblocks.blocks import BLOCKS, EnabledSubsystem, Gain, Mux, Scope, SineWave, Sum
 from armblocks.diagram import BLOCK_COLOURS, NAME_SIDES, Block, Diagram, DiagramBuilder, Placement
-from armblocks.drawing.block_boxes import box_at_placement
+from armblocks.drawing.block_boxes import MIN_PORT_DISTANCE, box_at_placement
 from armblocks.drawing.diagram_drawing import diagram_svg, obstacle
 from armblocks.drawing.diagram_layout import arranged_layout
 from armblocks.errors import ArmblocksError, DiagramError
@@ -117,3 +117,16 @@ def test_an_edit_changes_the_stated_property_of_the_blocks() -> None:
     place = document.diagram.layout["k 0"]
     document.edit(MoveBlocks(places={"k 0": Place(x=1.0, y=2.0, name_side="hidden", colour="green")}))
     assert document.diagram.layout["k 0"] == type(place)(x=1.0, y=2.0, name_side="hidden", colour="green")
+
+
+def test_a_block_is_never_so_small_that_the_wires_at_its_ports_would_touch() -> None:
+    mux = Mux(inputs=24)
+    for rotation in (0, 90, 180, 270):
+        for flipped in (False, True):
+            place = Placement(x=10, y=20, width=12, height=16, rotation=rotation, flipped=flipped)
+            box = box_at_placement("mux", mux, place)
+            assert (box.x, box.y) == (10, 20)
+            spots = sorted((port.x, port.y) for port in box.inputs)
+            distances = [abs(b[0] - a[0]) + abs(b[1] - a[1]) for a, b in itertools.pairwise(spots)]
+            assert min(distances) >= MIN_PORT_DISTANCE - 1e-9
+    assert box_at_placement("mux", Mux(inputs=2), Placement(x=0, y=0, width=12, height=16)).height == 16

@@ -107,7 +107,7 @@ def check_connections(model: SheetModel, routed: Mapping[str, RoutedNet]) -> Non
 
 def random_model(draw: random.Random) -> SheetModel:
     """A random sheet: dense, rotated or overlapping blocks, fan-out, user-drawn routes."""
-    kind = draw.choice(["grid", "dense", "anywhere", "fan", "facing"])
+    kind = draw.choice(["grid", "dense", "anywhere", "fan", "facing", "mirrored"])
     blocks: dict[str, Placed] = {}
     for k in range(draw.randint(2, 14)):
         width, height = draw.choice([30, 45, 60, 90]), draw.choice([30, 40, 60, 84])
@@ -122,6 +122,8 @@ def random_model(draw: random.Random) -> SheetModel:
             x, y = draw.randint(0, 450), draw.randint(0, 300)
         if kind == "facing":
             width, x = 90 + draw.randint(0, 9), (k % 4) * pitch
+        if kind == "mirrored":
+            (x, y), height, sides = ((k % 4) * pitch, (k // 4) * row), 40, ("right", "left")
         blocks[f"b{k}"] = Placed(x, y, width, height, draw.randint(0, 3), draw.randint(0, 2), *sides)
     if kind == "fan":
         count, height = 20, draw.choice([60, 130, 400])
@@ -159,6 +161,37 @@ def test_the_connections_are_inferred_from_the_lines(seed: int) -> None:
         model = replace(model, blocks=moved)
     nets, _ = model.nets()
     assert routing.update(model.obstacles(), nets) == Routing().update(model.obstacles(), nets)
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_a_line_in_any_direction_does_not_run_under_a_block_on_its_straight_way(side: str) -> None:
+    dx, dy = SIDES[side]
+    source, target = WireEnd(0, 0, dx, dy), WireEnd(300 * dx, 300 * dy, dx, dy)
+    between = Obstacle(150 * dx - 20, 150 * dy - 20, 40, 40, (150 * dx - 20, 150 * dy + 22, 40, 16))
+    (alone,) = route([], [Net(source, (target,))])
+    assert alone.paths == (((0, 0), (target.x, target.y)),)
+    (around,) = route([between], [Net(source, (target,))])
+    sheet_drawing = Drawing(
+        {"between": Block(between.x, between.y, 40, 40)},
+        {"a/y": Port("a", 0, 0, (dx, dy), True), "b/u": Port("b", target.x, target.y, (-dx, -dy), False)},
+        around.paths,
+        around.dots,
+        {},
+    )
+    assert read(sheet_drawing) == {"b/u": "a/y"}
+
+
+def test_the_branches_of_a_net_do_not_meet_its_other_lines_without_a_dot() -> None:
+    """The straight way to the nearer port is the beginning of the line to the farther one, 6.5 px lower."""
+    places = {"s1": (432, 34), "s2": (546, 68), "s3": (504, 102), "s4": (524, 136), "s5": (475, 170)}
+    blocks = {name: Placed(x, y, 40, 22, 0, 1, "left", "right") for name, (x, y) in places.items()}
+    blocks["s15"] = Placed(388, 510, 40, 22, 0, 1, "left", "right")
+    blocks["b1"] = Placed(185, 6, 45, 84, 1, 2, "left", "right")
+    blocks["fan"] = Placed(700, 40, 60, 130, 20, 1, "left", "right")
+    sources = {4: ("s15", 0), 7: ("s4", 0), 8: ("s4", 0), 9: ("b1", 1), 16: ("s1", 0), 19: ("s2", 0)}
+    drivers = {("fan", k): source for k, source in sources.items()}
+    model = SheetModel(blocks, drivers, {("fan", 9): (305.0, 6.0, -3.0, -3.0)})
+    check_connections(model, Routing().update(model.obstacles(), model.nets()[0]))
 
 
 # -- user-drawn routes ----------------------------------------------------------------------------

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 
 from armblocks.diagram import Block, Placement
 from armblocks.diagram.signs import Outline
@@ -19,6 +21,8 @@ NAME_HEIGHT = 20.0
 PORT_TEXT = 9.0
 PORT_TEXT_HEIGHT = 13.0
 """Height of the port names at the upper or lower edge, px."""
+MIN_PORT_DISTANCE = 5.0
+"""Minimum distance of ports on one side, px, with which the wires at them can be distinguished."""
 
 
 SIDES = ("left", "right")
@@ -94,17 +98,29 @@ def _placed_at_origin(block: Block, place: Placement) -> Box:
     width, height = natural.width, natural.height
     if place.rotation % 180:
         width, height = _rotated_size(natural)
-    return _with_ports(
-        replace(
-            natural,
-            width=place.width or width,
-            height=place.height or height,
-            flipped=place.flipped,
-            rotation=place.rotation,
-            name_side=place.name_side,
-            colour=place.colour,
-        )
+    box = replace(
+        natural,
+        width=place.width or width,
+        height=place.height or height,
+        flipped=place.flipped,
+        rotation=place.rotation,
+        name_side=place.name_side,
+        colour=place.colour,
     )
+    return _with_separate_ports(_with_ports(box))
+
+
+def _with_separate_ports(box: Box) -> Box:
+    """The box, enlarged if its size is so small that wires to neighbouring ports would touch."""
+    sizes = [box.width, box.height]
+    for ports in (box.inputs, box.outputs):
+        for axis, positions in ((0, [p.x for p in ports if p.dy]), (1, [p.y for p in ports if p.dx])):
+            distances = [b - a for a, b in pairwise(sorted(positions)) if b > a]
+            if distances and min(distances) < MIN_PORT_DISTANCE:
+                sizes[axis] *= MIN_PORT_DISTANCE / min(distances)
+    if sizes == [box.width, box.height]:
+        return box
+    return _with_ports(replace(box, width=math.ceil(sizes[0]), height=math.ceil(sizes[1])))
 
 
 def _rotated_size(box: Box) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from armblocks.drawing.free_space import LEVELS, Extent, FreeSpace, Level, sorted_ends
+from armblocks.drawing.free_space import LEVELS, Extent, FreeSpace, Level, Surroundings, sorted_ends
 from armblocks.drawing.wire_search import Floats, Point
 from armblocks.drawing.wires import Net, RoutedNet, WireEnd, corners, drawn_path
 
@@ -67,7 +67,7 @@ class NetRouter:
         source, end = self._net.source, (target.x, target.y)
         if not self._tree and _is_straight(source, target):
             line = (source.x, source.y, target.x, target.y)
-            extent = _enlarged(line, _EXAMINED_DISTANCE + level.clearance)
+            extent = _enlarged(_bounds([line[:2], line[2:]]), _EXAMINED_DISTANCE + level.clearance)
             self._examine(extent)
             ports = [((source.x, source.y), (source.dx, source.dy)), (end, (-target.dx, -target.dy))]
             if self._space.around(extent, self._number).is_free(line, level, ports):
@@ -95,7 +95,27 @@ class NetRouter:
             route = surroundings.path(source, start, goal, target, level)
             if route:
                 route.insert(0, port)
-        return corners([*route, end]) if route else ()
+        return self._without_loops(corners([*route, end]), surroundings, level) if route else ()
+
+    def _without_loops(
+        self, path: tuple[Point, ...], surroundings: Surroundings, level: Level
+    ) -> tuple[Point, ...]:
+        """A path that meets neither itself nor the tree after its start; empty if this is not legal."""
+        direct = _cut_loops(path)
+        if self._tree:
+            direct = self._after_tree(direct)
+        if direct == path:
+            return path
+        new_corners = [point for point in direct[:-1] if point not in path]
+        if self._tree and direct[0] not in new_corners:
+            new_corners.append(direct[0])
+        is_legal = all(
+            surroundings.may_bend(point, level)
+            and point not in self._dots
+            and all(_distance(point, port) >= level.stub for port in self._ports())
+            for point in new_corners
+        )
+        return direct if is_legal else ()
 
     def _ports(self) -> list[Point]:
         return [(end.x, end.y) for end in (self._net.source, *self._net.targets)]
@@ -162,6 +182,16 @@ def _is_along(a: Point, b: Point, end: WireEnd) -> bool:
 def _touches_itself(path: Sequence[Point]) -> bool:
     segments = list(pairwise(path))
     return any(_contacts(segments[i], segments[j]) for j in range(len(segments)) for i in range(j - 1))
+
+
+def _cut_loops(path: tuple[Point, ...]) -> tuple[Point, ...]:
+    """The path without the loops between two of its points at the same place."""
+    for i in range(len(path) - 1):
+        for j in range(len(path) - 2, i + 1, -1):
+            touched = _contacts((path[i], path[i + 1]), (path[j], path[j + 1]))
+            if touched:
+                return _cut_loops(corners([*path[: i + 1], touched[0], *path[j + 1 :]]))
+    return path
 
 
 def _contacts(one: tuple[Point, Point], other: tuple[Point, Point]) -> list[Point]:
