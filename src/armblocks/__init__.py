@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from armblocks.face.sizing import SizingReport, size_drives
     from armblocks.face.sweep import sweep
     from armblocks.face.sweep_result import SweepResult
+    from armblocks.face.sweep_sensitivity import MorrisEffects, SobolIndices
     from armblocks.face.symbolic_arm import SymbolicArm, symbolic_dh
     from armblocks.face.symbolic_expression import SymbolicExpression
     from armblocks.face.toolbox_trajectories import ctraj, jtraj, lspb, mstraj, mtraj, tpoly
@@ -160,6 +161,7 @@ else:
             "Link": "armblocks.robot",
             "Measure": "armblocks.sweeps.measures",
             "MeasureMap": "armblocks.face.workspace.cells",
+            "MorrisEffects": "armblocks.face.sweep_sensitivity",
             "Motor": "armblocks.robot",
             "NamedFrame": "armblocks.robot",
             "OperatingPoint": "armblocks.analysis.operating_point",
@@ -183,6 +185,7 @@ else:
             "SimulationOptions": "armblocks.equations",
             "SimulationResult": "armblocks.simulation",
             "SizingReport": "armblocks.face.sizing",
+            "SobolIndices": "armblocks.face.sweep_sensitivity",
             "Sphere": "armblocks.face.collisions.obstacles",
             "Spherical": "armblocks.robot",
             "SphericalClosure": "armblocks.robot",
@@ -303,6 +306,7 @@ __all__ = [
     "Link",
     "Measure",
     "MeasureMap",
+    "MorrisEffects",
     "Motor",
     "NamedFrame",
     "OperatingPoint",
@@ -326,6 +330,7 @@ __all__ = [
     "SimulationOptions",
     "SimulationResult",
     "SizingReport",
+    "SobolIndices",
     "Sphere",
     "Spherical",
     "SphericalClosure",

@@ -11,7 +11,6 @@ from time import perf_counter
 from typing import Any, Unpack, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armblocks import interrupts
 from armblocks.diagram import Diagram, content_key, with_parameters
@@ -19,17 +18,16 @@ from armblocks.diagram.function_content import UnknownContentError, function_par
 from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError, counted
 from armblocks.face.model import CompiledDiagram, compile_diagram
-from armblocks.face.python_calls import called_functions
 from armblocks.face.settings import RunSettings, check_settings, takes_settings, with_settings
-from armblocks.face.sweep_parameters import RunParameters, Variant
+from armblocks.face.sweep_parameters import RunParameters
+from armblocks.face.sweep_programs import ProgramRecipe, Programs
 from armblocks.face.sweep_result import SweepResult, SweepSource
 from armblocks.simulation import SimulationResult
-from armblocks.sweeps.batch import RunProgram, RunRows
+from armblocks.sweeps.batch import RunRows
 from armblocks.sweeps.designs import make_design
 from armblocks.sweeps.files import SweepFile
-from armblocks.sweeps.lanes import lanes_of_host
-from armblocks.sweeps.measures import Measure, observe, signal_entries
-from armblocks.sweeps.scheduling import GroupsOf, RunGroup, Scheduler, default_threads
+from armblocks.sweeps.measures import Measure
+from armblocks.sweeps.scheduling import Scheduler, default_threads
 from armblocks.sweeps.tables import Layout, concatenated
 
 SweepProgress = Callable[[int, int, float, float], None]
@@ -100,9 +98,15 @@ def sweep(
     functions, named = _split(measures or {})
     all_parameters = RunParameters(model, make_design(vary, runs, design, seed))
     models = len({id(variant.model) for variant in all_parameters.variants})
-    many = all_parameters.design.count >= LANE_RUNS * models if lanes is None else lanes
-    width = lanes_of_host() if many else 1
-    programs = _Programs(options, list(named.values()), list(functions.values()), keep, max_steps, width)
+    recipe = ProgramRecipe(
+        options=options,
+        measures=tuple(named.values()),
+        functions=tuple(functions.values()),
+        keep=(keep,) if isinstance(keep, str) else tuple(keep),
+        max_steps=max_steps,
+        lanes=all_parameters.design.count >= LANE_RUNS * models if lanes is None else lanes,
+    )
+    programs = Programs(recipe)
     layout, time = programs.layout(all_parameters, (*named, *functions), text_file=_is_csv(out))
     file = None
     if out is not None:
@@ -127,104 +131,6 @@ def sweep(
         file=file,
         source=SweepSource(model=model, options=options, design=layout.design),
     )
-
-
-class _Programs:
-    """The program of each model of a sweep."""
-
-    def __init__(
-        self,
-        options: SimulationOptions,
-        measures: Sequence[Measure],
-        functions: Sequence[Callable[[SimulationResult], float]],
-        keep: Sequence[str],
-        max_steps: int | None,
-        lanes: int,
-    ) -> None:
-        self._options = options
-        self._lanes = lanes
-        self._measures = measures
-        self._functions = functions
-        self._keep = (keep,) if isinstance(keep, str) else tuple(keep)
-        self._max_steps = max_steps
-        self._known: dict[int, tuple[CompiledDiagram, RunProgram]] = {}
-
-    def layout(
-        self, parameters: RunParameters, names: tuple[str, ...], *, text_file: bool
-    ) -> tuple[Layout, NDArray[np.float64]]:
-        """The layout of the table, and the sample times ``(N,)``, s."""
-        first = parameters.variants[0]
-        kept = self.kept(first)
-        for variant in {id(variant.model): variant for variant in parameters.variants}.values():
-            different = set(self.kept(variant)).symmetric_difference(kept)
-            if different:
-                raise InputError(
-                    f"the kept signal '{min(different)}' does not exist in all runs",
-                    allowed="signals with equal shapes in all runs",
-                    where="sweep",
-                    fix="keep single entries",
-                )
-        times = self.of(first).plan.sample_times
-        layout = Layout(
-            design=parameters.design,
-            measures=names,
-            kept=kept,
-            samples=times.count,
-            text_file=text_file,
-        )
-        return layout, times.part(0, times.count)
-
-    def groups_of(self, parameters: RunParameters) -> GroupsOf:
-        """The function that returns the groups of a range of runs."""
-
-        def groups(begin: int, end: int) -> list[RunGroup]:
-            return [
-                RunGroup(program=self.of(variant), places=places, parameters=p)
-                for variant, places, p in parameters.groups(begin, end)
-            ]
-
-        return groups
-
-    def kept(self, variant: Variant) -> tuple[str, ...]:
-        """The names of all kept scalars."""
-        model = variant.model
-        layout, aliases = model.signals_layout, model.compiled.aliases
-        return tuple(entry for name in self._keep for entry in signal_entries(name, layout, aliases))
-
-    def of(self, variant: Variant) -> RunProgram:
-        """The program of a variant's model."""
-        model = variant.model
-        entry = self._known.get(id(model))
-        if entry is None:
-            compiled, layout = model.compiled, model.signals_layout
-            observation = observe(self._measures, self.kept(variant), layout, compiled.aliases)
-            calls = called_functions(model.diagram, compiled)
-            program = RunProgram(
-                compiled,
-                self._options,
-                observation,
-                self._functions,
-                calls=calls,
-                max_steps=self._max_steps,
-                layout=layout,
-                lanes=self._lanes,
-            )
-            # The reference keeps the model alive, so that its id stays unique.
-            entry = self._known[id(model)] = (model, program)
-        return entry[1]
-
-    @property
-    def general_reason(self) -> str:
-        """The reason for not using the native loop over runs; empty if it is used."""
-        programs = [program for _, program in self._known.values()]
-        if any(program.calls for program in programs):
-            return "the model calls Python functions"
-        return "" if all(program.native for program in programs) else "the runs have no duration"
-
-    @property
-    def against_lanes(self) -> str:
-        """The reason why runs of a model are not computed in lanes; empty if there is none."""
-        return next((p.against_lanes for _, p in self._known.values() if p.against_lanes), "")
 
 
 class _Collected:
@@ -382,7 +288,7 @@ def _digest(*values: object) -> str:
 
 
 def _remark(
-    programs: _Programs,
+    programs: Programs,
     parameters: RunParameters,
     general: int,
     functions: Mapping[str, object],

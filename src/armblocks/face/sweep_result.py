@@ -16,10 +16,15 @@ from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError, UnknownNameError, counted
 from armblocks.face.model import CompiledDiagram
 from armblocks.face.sweep_parameters import values_of_run
+from armblocks.face.sweep_pictures import sweep_picture
+from armblocks.face.sweep_sensitivity import MorrisEffects, SobolIndices, morris_effects, sobol_indices
+from armblocks.face.trajectory_report import save_picture
+from armblocks.pictures.picture import Picture
 from armblocks.simulation import SimulationResult
 from armblocks.sweeps.batch import COMPLETED, STATUSES
 from armblocks.sweeps.designs import Design
 from armblocks.sweeps.files import SweepFile, to_dataframe, write_table
+from armblocks.sweeps.sensitivity_designs import MORRIS, SALTELLI
 from armblocks.sweeps.statistics import rank_correlation, wilson_interval
 from armblocks.sweeps.tables import STATUS
 
@@ -165,6 +170,55 @@ class SweepResult(metaclass=ArgumentErrors):
             if entries.dtype != object
         }
         return dict(sorted(known.items(), key=lambda item: -abs(np.nan_to_num(item[1]))))
+
+    def sobol(self, name: str) -> SobolIndices:
+        """Sobol indices of a column: the shares of its variance that come from each parameter.
+
+        For a sweep with ``design="saltelli"`` and ``runs`` a multiple of d + 2 for d parameters. Groups with
+        a failed run are omitted. Raises ``InputError`` for other designs and incomplete sweeps.
+        """
+        values = self._of_design(name, SALTELLI)
+        return sobol_indices(name, tuple(self.source.design.columns), values)
+
+    def morris(self, name: str) -> MorrisEffects:
+        """Elementary effects of Morris on a column, for the choice of the parameters that matter.
+
+        For a sweep with ``design="morris"`` and ``runs`` a multiple of d + 1 for d parameters. Paths with a
+        failed run are omitted. Raises ``InputError`` for other designs and incomplete sweeps.
+        """
+        values, design = self._of_design(name, MORRIS), self.source.design
+        assert design.points is not None
+        return morris_effects(name, tuple(design.columns), values, design.points)
+
+    def _of_design(self, name: str, kind: str) -> NDArray[np.float64]:
+        """A column of a complete sweep with this design, in the order of the runs."""
+        values, given = self._numbers(name), self.source.design.kind
+        if given != kind or len(values) != self.planned:
+            found = f"the design is '{given}'" if given != kind else f"{len(values)} of {self.planned} runs"
+            raise InputError(
+                f"{found}, and these indices need all runs of the design '{kind}'",
+                where=self.name,
+                allowed=f"a complete sweep with design='{kind}'",
+                fix=f"call ab.sweep(…, design='{kind}', runs=…)",
+            )
+        return values
+
+    def plot(
+        self, kind: str = "response", name: str | None = None, *, save: str | PathLike[str] | None = None
+    ) -> Picture:
+        """A picture of the table. ``name``: a column, by default the first measure.
+
+        ``kind``: ``response`` (the column over each parameter, with median and bands of the percentiles 25 to
+        75 and 5 to 95), ``tornado`` (medians in the runs with the lowest and the highest tenth of each
+        parameter), ``scatter`` (matrix of the parameters and the column), ``parallel`` (parallel
+        coordinates; the tenth of the runs with the highest values in colour), or ``bands`` (the same
+        percentiles of a kept signal over time; ``name`` is by default the first one). ``save``: the ``.svg``
+        or ``.png`` file to write. Raises ``UnknownNameError`` and ``InputError``.
+        """
+        picture = sweep_picture(self, kind, name)
+        if save is not None:
+            save_picture(picture, save, "SweepResult.plot")
+        return picture
 
     def _numbers(self, name: str) -> NDArray[np.float64]:
         values = self[name]

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from armblocks.analysis.designs import DESIGNS, RANDOM, normal_quantile, unit_points
 from armblocks.argument_errors import ArgumentErrors, with_argument_errors
 from armblocks.errors import InputError, UnknownNameError
+from armblocks.sweeps.sensitivity_designs import SENSITIVITY_DESIGNS, sensitivity_points
 
 Array = NDArray[np.float64]
 Column = NDArray[Any]
@@ -162,6 +163,9 @@ class Design:
 
     columns: Mapping[str, Column]
     count: int
+    kind: str = PAIRED
+    points: Array | None = None
+    """The probabilities of the parameters ``(count, d)``, of a design for sensitivity indices."""
 
     @cached_property
     def digest(self) -> str:
@@ -183,8 +187,9 @@ def make_design(vary: object, runs: int | None, kind: str | None, seed: int) -> 
 
     Raises ``InputError`` and ``UnknownNameError``.
     """
-    if kind is not None and kind not in (GRID, PAIRED, *DESIGNS):
-        raise UnknownNameError("design", kind, (GRID, PAIRED, *DESIGNS), where="sweep")
+    known = (GRID, PAIRED, *DESIGNS, *SENSITIVITY_DESIGNS)
+    if kind is not None and kind not in known:
+        raise UnknownNameError("design", kind, known, where="sweep")
     for name, number in (("runs", runs), ("seed", seed)):
         whole = isinstance(number, int | np.integer) and not isinstance(number, bool) and number >= 0
         if number is not None and not whole:
@@ -206,6 +211,8 @@ def make_design(vary: object, runs: int | None, kind: str | None, seed: int) -> 
             where="sweep",
             fix="give a list of values, or another design: random, sobol, halton or latin",
         )
+    if kind in SENSITIVITY_DESIGNS:
+        return _for_sensitivity(kind, levels, random, runs, seed)
     points = math.prod(len(values) for values in levels.values())
     count = _count(points, runs, bool(random))
     columns: dict[str, Column] = {}
@@ -217,7 +224,24 @@ def make_design(vary: object, runs: int | None, kind: str | None, seed: int) -> 
         repeat //= len(values)
         numbers = np.arange(count) // repeat % len(values)
         columns[name] = values[numbers]
-    return Design(columns={name: columns[name] for name in given}, count=count)
+    return Design(columns={name: columns[name] for name in given}, count=count, kind=kind or RANDOM)
+
+
+def _for_sensitivity(
+    kind: str, levels: Mapping[str, Column], random: Mapping[str, Distribution], runs: int | None, seed: int
+) -> Design:
+    """A design for sensitivity indices."""
+    unsuitable = [*levels, *(name for name, value in random.items() if value.kind == "seeds")]
+    if unsuitable:
+        raise InputError(
+            f"'{unsuitable[0]}' has no distribution with quantiles, and the design is '{kind}'",
+            allowed="ab.uniform, ab.loguniform and ab.normal",
+            where="sweep",
+            fix="give the parameter a distribution, or set it with parameters={…}",
+        )
+    points = sensitivity_points(kind, runs, len(random), seed)
+    columns = {name: value.values(points[:, k]) for k, (name, value) in enumerate(random.items())}
+    return Design(columns=columns, count=len(points), kind=kind, points=points)
 
 
 def _count(points: int, runs: int | None, random: bool) -> int:
