@@ -13,6 +13,7 @@ from armblocks.errors import MissingLibraryError
 
 LIBRARIES = {
     "analysis": ("scipy",),
+    "cluster": ("distributed",),
     "data": ("pandas", "pyarrow", "scipy"),
     "figures": ("matplotlib",),
     "film": ("PIL", "imageio_ffmpeg"),

@@ -79,6 +79,7 @@ def examples() -> Mapping[str, Any]:
         ab.Plane(point=(0, 0, -9)),
     )
     contacts = ab.collisions(arm, [0.0, 0.0], obstacles)
+    indices: dict[str, Any] = {"runs": 6, "measures": {"p": "peak(integrator)"}, "stop_time": 1.0}
     values = [
         *(contacts, contacts.pairs[0], *obstacles),
         *(region, region.maps["manipulability"], region.slice("y")),
@@ -115,6 +116,8 @@ def examples() -> Mapping[str, Any]:
             ab.Measure("peak", "integrator"),
             ab.uniform(0, 1),
             ab.sweep(compiled, {"k": [1.0]}, stop_time=1.0),
+            ab.sweep(compiled, {"k": ab.uniform(0, 1)}, design="saltelli", **indices).sobol("p"),
+            ab.sweep(compiled, {"k": ab.uniform(0, 1)}, design="morris", **indices).morris("p"),
         ),
         *(diagram, small_builder(), compiled, ab.SimulationOptions(step=0.1), ab.formula("2*k")),
         *(result, result.final_state, system, system.point, system.margins(), system.transfer_function()),

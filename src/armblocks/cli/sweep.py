@@ -61,6 +61,9 @@ def sweep(
     atol: Annotated[float | None, typer.Option(help="Absolute tolerance of an adaptive solver.")] = None,
     max_steps: Annotated[int | None, typer.Option(help="Maximum number of steps of a run.")] = None,
     threads: Annotated[int | None, typer.Option(help="Number of threads.", show_default="all cores")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Compute on the cluster of this Dask scheduler.")
+    ] = None,
     assignments: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="BLOCK.PARAMETER=VALUE", help="Change a parameter of all runs."),
@@ -93,6 +96,7 @@ def sweep(
             parameters=chosen_parameters(diagram, parameter_set, assignments) or None,
             max_steps=max_steps,
             threads=threads,
+            scheduler=scheduler,
             out=out,
             progress=progress,
             **given,

@@ -24,6 +24,7 @@ from armblocks.face.sweep_programs import ProgramRecipe, Programs
 from armblocks.face.sweep_result import SweepResult, SweepSource
 from armblocks.simulation import SimulationResult
 from armblocks.sweeps.batch import RunRows
+from armblocks.sweeps.cluster import ClusterScheduler, connected
 from armblocks.sweeps.designs import make_design
 from armblocks.sweeps.files import SweepFile
 from armblocks.sweeps.measures import Measure
@@ -58,6 +59,7 @@ def sweep(
     max_steps: int | None = None,
     threads: int | None = None,
     lanes: bool | None = None,
+    scheduler: object = None,
     out: str | PathLike[str] | None = None,
     progress: SweepProgress | None = None,
     **settings: Unpack[RunSettings],
@@ -77,8 +79,9 @@ def sweep(
     kept in memory or in the file. ``parameters``: parameter values for all runs. ``max_steps``: the maximum
     number of steps of a run. ``threads``: by default the number of cores. ``lanes``: whether each thread
     computes several runs at a time in the lanes of vector registers, if the model and the solver allow it
-    (otherwise ``remark`` has the reason); by default for 500 runs or more. ``settings``: as for
-    :func:`simulate`.
+    (otherwise ``remark`` has the reason); by default for 500 runs or more. ``scheduler``: the address of a
+    Dask scheduler, or a client of ``dask.distributed``, whose workers compute the runs. ``settings``: as
+    for :func:`simulate`.
 
     ``out``: a ``.parquet`` or ``.csv`` file. The results are written during the sweep, so that the memory
     does not grow with the number of runs. If the sweep is interrupted, another call with the same arguments
@@ -97,26 +100,18 @@ def sweep(
     options = with_settings(model.diagram.settings, settings)
     functions, named = _split(measures or {})
     all_parameters = RunParameters(model, make_design(vary, runs, design, seed))
-    models = len({id(variant.model) for variant in all_parameters.variants})
-    recipe = ProgramRecipe(
-        options=options,
-        measures=tuple(named.values()),
-        functions=tuple(functions.values()),
-        keep=(keep,) if isinstance(keep, str) else tuple(keep),
-        max_steps=max_steps,
-        lanes=all_parameters.design.count >= LANE_RUNS * models if lanes is None else lanes,
-    )
-    programs = Programs(recipe)
+    kept = (keep,) if isinstance(keep, str) else tuple(keep)
+    wide = _wants_lanes(all_parameters) if lanes is None else lanes
+    measured = tuple(named.values()), tuple(functions.values())
+    programs = Programs(ProgramRecipe(options, *measured, kept, max_steps, wide))
     layout, time = programs.layout(all_parameters, (*named, *functions), text_file=_is_csv(out))
     file = None
     if out is not None:
         content = all_parameters.digest
         identity = _identity(model.diagram, options, content, named, functions, layout.kept, max_steps)
         file = SweepFile(Path(out), identity, layout.texts)
-    called = functions or any(variant.model.compiled.called for variant in all_parameters.variants)
-    groups = programs.groups_of(all_parameters)
     collected = _Collected(layout, file, progress)
-    complete = collected.collect(Scheduler(groups, 1 if called else threads or default_threads()))
+    complete = _compute(collected, programs, all_parameters, scheduler, 1 if functions else threads)
     return SweepResult(
         name=model.diagram.name,
         names=layout.names,
@@ -131,6 +126,29 @@ def sweep(
         file=file,
         source=SweepSource(model=model, options=options, design=layout.design),
     )
+
+
+def _wants_lanes(parameters: RunParameters) -> bool:
+    """Whether the models of a sweep have enough runs for lanes."""
+    models = len({id(variant.model) for variant in parameters.variants})
+    return parameters.design.count >= LANE_RUNS * models
+
+
+def _compute(
+    collected: _Collected,
+    programs: Programs,
+    parameters: RunParameters,
+    scheduler: object,
+    threads: int | None,
+) -> bool:
+    """Compute all runs, in threads or on a cluster; returns whether all are done."""
+    groups = programs.groups_of(parameters)
+    if any(variant.model.compiled.called for variant in parameters.variants):
+        threads = 1  # called Python functions
+    if scheduler is None:
+        return collected.collect(Scheduler(groups, threads or default_threads()))
+    with connected(scheduler) as client:
+        return collected.collect(ClusterScheduler(groups, client, programs.maker))
 
 
 class _Collected:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from armblocks.sweeps.scheduling import GroupsOf, RunGroup
 from armblocks.sweeps.tables import Layout
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class ProgramRecipe:
     """Everything but the model that the program of a sweep needs. ``lanes``: whether lanes are wanted."""
 
@@ -107,6 +108,11 @@ class Programs:
             # The reference keeps the model alive, so that its id stays unique.
             entry = self._known[id(model)] = (model, self.recipe.program(model))
         return entry[1]
+
+    def maker(self, program: RunProgram) -> Callable[[], RunProgram]:
+        """A function that makes the program again, in another process."""
+        model = next(model for model, known in self._known.values() if known is program)
+        return partial(self.recipe.program, model)
 
     @property
     def general_reason(self) -> str:
