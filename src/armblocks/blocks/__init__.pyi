@@ -133,6 +133,9 @@ from armblocks.blocks.mechanics.bushing_joint import BushingJoint as BushingJoin
 from armblocks.blocks.mechanics.cartesian_joint import CartesianJoint as CartesianJoint
 from armblocks.blocks.mechanics.cylindrical_joint import CylindricalJoint as CylindricalJoint
 from armblocks.blocks.mechanics.cylindrical_solid import CylindricalSolid as CylindricalSolid
+from armblocks.blocks.mechanics.external_force_and_torque import ExternalForceAndTorque as ExternalForceAndTorque
+from armblocks.blocks.mechanics.forces_along_a_line import InternalForce as InternalForce
+from armblocks.blocks.mechanics.forces_along_a_line import SpringAndDamperForce as SpringAndDamperForce
 from armblocks.blocks.mechanics.frames import MechanismConfiguration as MechanismConfiguration
 from armblocks.blocks.mechanics.frames import ReferenceFrame as ReferenceFrame
 from armblocks.blocks.mechanics.frames import RigidTransform as RigidTransform
@@ -148,6 +151,7 @@ from armblocks.blocks.mechanics.six_dof_joint import SixDofJoint as SixDofJoint
 from armblocks.blocks.mechanics.spherical_joint import SphericalJoint as SphericalJoint
 from armblocks.blocks.mechanics.spherical_solid import SphericalSolid as SphericalSolid
 from armblocks.blocks.mechanics.telescoping_joint import TelescopingJoint as TelescopingJoint
+from armblocks.blocks.mechanics.transform_sensor import TransformSensor as TransformSensor
 from armblocks.blocks.mechanics.universal_joint import UniversalJoint as UniversalJoint
 from armblocks.blocks.mechanics.weld_joint import WeldJoint as WeldJoint
 from armblocks.blocks.robots.arm_plant import ArmPlant as ArmPlant

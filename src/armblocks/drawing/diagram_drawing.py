@@ -16,7 +16,6 @@ from armblocks.diagram import (
     ViewKind,
     diagram_views,
     flatten_hierarchy,
-    frames_of,
     infer_shapes,
     levels_of,
 )
@@ -36,11 +35,11 @@ from armblocks.drawing.block_colours import coloured_marks
 from armblocks.drawing.comment_marks import COMMENT_WORDS, commented_marks, grey_mark
 from armblocks.drawing.diagram_layout import boxes
 from armblocks.drawing.face_marks import FaceArea
+from armblocks.drawing.frame_lines import FRAME_TONE, drawn_frames, frame_nets, frame_port_marks
 from armblocks.drawing.rates import Rates
 from armblocks.drawing.sink_faces import Trend
 from armblocks.drawing.structure_faces import control_ports
 from armblocks.drawing.wire_marks import (
-    FRAME_TONE,
     WireKind,
     arrow_head,
     frame_line_marks,
@@ -58,7 +57,6 @@ from armblocks.pictures.picture import (
     Mark,
     Picture,
     Polyline,
-    Rectangle,
     Text,
     moved,
     rotated_clockwise,
@@ -98,12 +96,12 @@ def diagram_picture(
     placed_boxes = boxes(level)
     nets, wires = wire_nets(level.connections, drawn_bends(level), placed_boxes)
     obstacles = [obstacle(box) for box in placed_boxes.values()]
-    lines = frame_nets(level, placed_boxes)
+    lines = frame_nets(drawn_frames(level, placed_boxes), placed_boxes)
     every = route(obstacles, [*nets, *(net for _, net in lines)])
     routed, routed_lines = every[: len(nets)], every[len(nets) :]
     marks: list[Mark] = []
     for (ends, net), line in zip(lines, routed_lines):
-        marks += frame_line_marks(net, line, " and ".join(map(str, ends)), str(ends[0]))
+        marks += frame_line_marks(net, line, " and ".join(map(str, ends)), str(ends[0]), FRAME_TONE)
     for (source, _), net in zip(wires.items(), routed):
         kind = contents.kind(PortRef(path + source.block, source.port))
         _, tone = clocks.mark(path + source.block) or ("", Tone.WIRE)
@@ -214,32 +212,6 @@ def wire_nets(
     return nets, wires
 
 
-def frame_nets(diagram: Diagram, placed_boxes: Mapping[str, Box]) -> list[tuple[tuple[PortRef, ...], Net]]:
-    """The nets of the frames of a sheet: the ports of each, and the net from the first port to the others.
-
-    The first port is the rightmost one that leads to the right, as if the line were a signal.
-    """
-    nets: list[tuple[tuple[PortRef, ...], Net]] = []
-    for members in frames_of(diagram.frame_lines):
-        ports = {ref: port for ref in members if (port := _frame_port(placed_boxes, ref)) is not None}
-        if len(ports) < 2:
-            continue
-        first, *others = sorted(ports, key=lambda ref: (-ports[ref].dx, ports[ref].x, ref))
-        source = ports[first]
-        ends = tuple(
-            WireEnd(port.x, port.y, -port.dx, -port.dy) for port in (ports[other] for other in others)
-        )
-        net = Net(WireEnd(source.x, source.y, source.dx, source.dy), ends, ((),) * len(ends))
-        nets.append(((first, *others), net))
-    return nets
-
-
-def _frame_port(placed_boxes: Mapping[str, Box], ref: PortRef) -> BoxPort | None:
-    """A frame port; ``None`` if it does not exist in an incomplete diagram."""
-    box = placed_boxes.get(ref.block)
-    return None if box is None else next((port for port in box.frames if port.name == ref.port), None)
-
-
 def _end(ports: tuple[BoxPort, ...], name: str) -> WireEnd:
     port = next(port for port in ports if port.name == name)
     return WireEnd(port.x, port.y, port.dx, port.dy)
@@ -339,15 +311,6 @@ def _plain_marks(box: Box, trend: Trend | None) -> list[Mark]:
     return marks + (
         port_marks if port_marks is not None else block_faces.face(block, area, trend, flipped=flipped)
     )
-
-
-def frame_port_marks(box: Box) -> list[Mark]:
-    """Small squares at the frame ports."""
-    half = 3.0
-    return [
-        Rectangle(port.x - half, port.y - half, 2 * half, 2 * half, 1.0, Tone.SURFACE, FRAME_TONE, 1.2)
-        for port in box.frames
-    ]
 
 
 def _outline(box: Box) -> Mark:

@@ -18,10 +18,6 @@ LABEL_STUB = 8.0
 _LABEL_HEIGHT = 13.0
 
 
-FRAME_TONE = Tone.TRACE_2
-"""The colour of frame lines and frame ports."""
-
-
 class WireKind(IntEnum):
     """The content of a line."""
 
@@ -47,12 +43,12 @@ def wire_marks(net: RoutedNet, kind: WireKind, title: str, tone: Tone) -> list[M
     return [Group(tuple(marks), title=title)]
 
 
-def frame_line_marks(net: Net, routed: RoutedNet, title: str, name: str) -> list[Mark]:
+def frame_line_marks(net: Net, routed: RoutedNet, title: str, name: str, tone: Tone) -> list[Mark]:
     """The lines of a frame: of equal width, without an arrow head, because a frame has no direction."""
     lines = [rounded_path(path, routed.dots) for path in routed.paths if path]
-    marks: list[Mark] = [Curve(line, stroke=FRAME_TONE, width=1.8) for line in lines]
-    marks += [Disc(x, y, 2.6, fill=FRAME_TONE) for x, y in routed.dots]
-    return [Group(tuple(marks), title=f"frame of {title}"), *label_marks(net, routed, name, FRAME_TONE)]
+    marks: list[Mark] = [Curve(line, stroke=tone, width=1.8) for line in lines]
+    marks += [Disc(x, y, 2.6, fill=tone) for x, y in routed.dots]
+    return [Group(tuple(marks), title=f"frame of {title}"), *label_marks(net, routed, name, tone)]
 
 
 def _shortened(path: tuple[Point, ...], by: float) -> tuple[Point, ...]:

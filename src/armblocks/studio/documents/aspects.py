@@ -29,6 +29,9 @@ def changed_aspects(before: Diagram, after: Diagram, path: Aspect = ()) -> set[A
     if before.connections is not after.connections:
         for wire in set(before.connections) ^ set(after.connections):
             aspects.add((*path, wire.target.block, f"{wire.target.port} <- wire"))
+    for line in set(before.frame_lines) ^ set(after.frame_lines):
+        for end in line.ends:
+            aspects.add((*path, end.block, f"{end.port} -- line"))
     for wire in before.bends.keys() | after.bends.keys():
         if before.bends.get(wire) != after.bends.get(wire):
             aspects.add((*path, wire.target.block, f"{wire.target.port} <- bends"))

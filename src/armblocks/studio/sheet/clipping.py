@@ -52,6 +52,9 @@ def clipped(
             for wire in diagram.connections
             if wire.source.block in copied_blocks and wire.target.block in copied_blocks
         ),
+        frame_lines=tuple(
+            line for line in diagram.frame_lines if all(end.block in copied_blocks for end in line.ends)
+        ),
         layout={name: place for name, place in diagram.layout.items() if name in copied_blocks},
         bends=diagram.bends,
         notes={name: note for name, note in diagram.notes.items() if name in notes},
@@ -107,6 +110,7 @@ def pasted(
         diagram,
         blocks={**diagram.blocks, **blocks},
         connections=(*diagram.connections, *wires.values()),
+        frame_lines=(*diagram.frame_lines, *(line.renamed(names) for line in copied.frame_lines)),
         layout={**diagram.layout, **layout},
         bends={**diagram.bends, **bends},
         notes={**diagram.notes, **shifted},

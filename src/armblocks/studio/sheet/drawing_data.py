@@ -12,7 +12,7 @@ from armblocks.blocks import BLOCKS
 from armblocks.diagram import Block, Connection, Diagram, DiagramBlock, Parameter, ParameterKind, Placement
 from armblocks.diagram.signs import Outline
 from armblocks.drawing.block_boxes import Box, box_at_placement
-from armblocks.drawing.block_faces import face_size, port_labels
+from armblocks.drawing.block_faces import face_size, frame_labels, port_labels
 from armblocks.drawing.diagram_drawing import block_marks
 from armblocks.drawing.diagram_layout import SumSides, drawn_blocks, sum_sides, sum_with_sides
 from armblocks.errors import ArmblocksError
@@ -31,6 +31,7 @@ from armblocks.studio.protocol.messages.sheets import (
     WireLines,
 )
 from armblocks.studio.sheet.edits import DEFAULT_ROBOT
+from armblocks.studio.sheet.frame_lines import shown_lines
 from armblocks.studio.sheet.nesting import inside
 from armblocks.studio.sheet.parameter_values import parameter_json
 
@@ -43,7 +44,7 @@ def sheet(diagram: Diagram, lines: Mapping[str, WireLines] = MappingProxyType({}
         name=diagram.name,
         description=diagram.description,
         blocks={name: _sheet_block(name, block, diagram) for name, block in diagram.blocks.items()},
-        wires=[_wire(wire, diagram) for wire in diagram.connections],
+        wires=[*(_wire(wire, diagram) for wire in diagram.connections), *shown_lines(diagram)],
         lines=dict(lines),
         notes=_notes(diagram),
         logged=[str(ref) for ref in diagram.logged],
@@ -69,13 +70,21 @@ def sheet_change(
     )
     return SheetChange(
         blocks=blocks,
-        wires_added=[_wire(wire, after) for wire, _ in sorted(new - old)],
-        wires_removed=[_wire(wire, before) for wire, _ in sorted(old - new)],
+        wires_added=[*(_wire(wire, after) for wire, _ in sorted(new - old)), *_only(after, before)],
+        wires_removed=[*(_wire(wire, before) for wire, _ in sorted(old - new)), *_only(before, after)],
         lines=dict(lines),
         notes=_notes(after) if after.notes != before.notes else None,
         description=after.description if after.description != before.description else None,
         logged=[str(ref) for ref in after.logged] if after.logged != before.logged else None,
     )
+
+
+def _only(diagram: Diagram, other: Diagram) -> list[Wire]:
+    """The shown frame lines of a diagram that another one does not show."""
+    if not diagram.frame_lines:
+        return []
+    known = {(wire.source, wire.target) for wire in shown_lines(other)}
+    return [wire for wire in shown_lines(diagram) if (wire.source, wire.target) not in known]
 
 
 def outer_comment(diagram: Diagram, path: Sequence[str]) -> OuterComment | None:
@@ -205,7 +214,20 @@ def _sheet_ports(box: Box, labels: tuple[str, ...], *, inputs: bool) -> list[She
     shown_labels = labels if len(labels) == len(ports) else ("",) * len(ports)
     if face_size(box.block)[0] is Outline.CIRCLE:
         shown_labels = ("",) * len(ports)
-    return [
+    frames = [
+        SheetPort(
+            name=port.name,
+            doc=port.doc,
+            label=label if (port.side == "left") is inputs else "",
+            unit="",
+            x=place.x,
+            y=place.y,
+            dx=-place.dx if inputs else place.dx,
+            dy=-place.dy if inputs else place.dy,
+        )
+        for port, place, label in zip(box.block.frame_ports(), box.frames, frame_labels(box.block))
+    ]
+    signals = [
         SheetPort(
             name=port.name,
             doc=port.doc,
@@ -218,6 +240,7 @@ def _sheet_ports(box: Box, labels: tuple[str, ...], *, inputs: bool) -> list[She
         )
         for port, label in zip(ports, shown_labels)
     ]
+    return [*frames, *signals]
 
 
 def _wire(wire: Connection, diagram: Diagram) -> Wire:

@@ -74,6 +74,7 @@ from armblocks.studio.protocol.messages.sheet_edits import (
 )
 from armblocks.studio.sheet import bookmarks, parameter_sets, scope_triggers
 from armblocks.studio.sheet.clipping import ReadDiagram, leaves_horizontally, pasted, reader
+from armblocks.studio.sheet.frame_lines import split_wires, with_lines, without_blocks, without_lines
 from armblocks.studio.sheet.grounding import grounded
 from armblocks.studio.sheet.mask_edits import with_mask
 from armblocks.studio.sheet.nesting import check_free, grouped, unlinked, with_block
@@ -187,7 +188,9 @@ def _remove(edit: RemoveBlocks, diagram: Diagram, _: EditContext) -> Diagram:
 
 def _without_removed(edit: RemoveBlocks, diagram: Diagram) -> Diagram:
     removed = {_checked_block(name, diagram) for name in edit.blocks}
-    removed_wires = {connection(wire) for wire in edit.wires}
+    wires, lines = split_wires(edit.wires, diagram)
+    diagram = without_lines(diagram, lines)
+    removed_wires = {connection(wire) for wire in wires}
     for wire in removed_wires:
         _checked_wire(wire, diagram)
     return dataclasses.replace(
@@ -202,6 +205,7 @@ def _without_removed(edit: RemoveBlocks, diagram: Diagram) -> Diagram:
             and wire.source.block not in removed
             and wire.target.block not in removed
         ),
+        frame_lines=without_blocks(diagram.frame_lines, removed),
         logged=tuple(ref for ref in diagram.logged if ref.block not in removed),
     )
 
@@ -231,6 +235,8 @@ def _connect(edit: Connect, diagram: Diagram, _: EditContext) -> Diagram:
 
 
 def _with_wires(wires: Sequence[Wire], diagram: Diagram, *, replace: bool) -> Diagram:
+    wires, lines = split_wires(wires, diagram)
+    diagram = with_lines(diagram, lines)
     connections = {wire.target: wire for wire in diagram.connections}
     for wire in wires:
         added = connection(wire)
@@ -367,6 +373,7 @@ def _rename(edit: Rename, diagram: Diagram, _: EditContext) -> Diagram:
         layout={renamed(name): place for name, place in diagram.layout.items()},
         connections=tuple(wires.values()),
         bends={wires[wire]: bends for wire, bends in diagram.bends.items()},
+        frame_lines=tuple(line.renamed({edit.block: edit.name}) for line in diagram.frame_lines),
         logged=tuple(moved(ref) for ref in diagram.logged),
         commented={renamed(name): comment for name, comment in diagram.commented.items()},
         signal_names={moved(ref): name for ref, name in diagram.signal_names.items()},

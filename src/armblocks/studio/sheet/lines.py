@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from armblocks.diagram import Connection, Diagram, PortRef
 from armblocks.drawing.diagram_drawing import obstacle, shown_name, wire_label, wire_nets
 from armblocks.drawing.diagram_layout import boxes
+from armblocks.drawing.frame_lines import drawn_frames, frame_nets
 from armblocks.drawing.wire_names import name_position
 from armblocks.drawing.wire_routing import Routing
 from armblocks.drawing.wires import moved_bends
@@ -58,6 +59,9 @@ class SheetLines:
                 is_horizontal = any(port.name == wire.source.port and port.dx != 0 for port in ports)
                 moved[wire] = moved_bends(values, is_horizontal, shift)
         nets, wires = wire_nets(connections, moved, placed)
+        frames = frame_nets(drawn_frames(sheet, boxes(sheet)), placed)
+        nets += [net for _, net in frames]
+        wires |= {first: list(others) for (first, *others), _ in frames}
         obstacles = {name: obstacle(box) for name, box in placed.items() if name != passed}
         routed = self._routing.update(obstacles, dict(zip(map(str, wires), nets)))
         return {

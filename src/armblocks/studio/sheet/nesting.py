@@ -12,12 +12,15 @@ from armblocks.diagram import (
     Connection,
     Diagram,
     DiagramBlock,
+    FrameLine,
     Inport,
     Outport,
     Placement,
     PortRef,
     Subsystem,
+    frames_of,
 )
+from armblocks.diagram.connection_port import FRAME, ConnectionPort
 from armblocks.diagram.names import FreeNames, check_block_name, folded
 from armblocks.errors import ArmblocksError, DiagramError, UnknownNameError
 from armblocks.robot import Robot
@@ -91,6 +94,7 @@ def with_block(diagram: Diagram, name: str, block: Block) -> Diagram:
     """Return the diagram with one block replaced; wires to ports that no longer exist are removed."""
     into = {port.name for port in block.input_ports()}
     out = {port.name for port in block.output_ports()}
+    frames = {port.name for port in block.frame_ports()}
     return dataclasses.replace(
         diagram,
         blocks={**diagram.blocks, name: block},
@@ -99,6 +103,11 @@ def with_block(diagram: Diagram, name: str, block: Block) -> Diagram:
             for wire in diagram.connections
             if (wire.source.block != name or wire.source.port in out)
             and (wire.target.block != name or wire.target.port in into)
+        ),
+        frame_lines=tuple(
+            line
+            for line in diagram.frame_lines
+            if all(end.block != name or end.port in frames for end in line.ends)
         ),
         logged=tuple(ref for ref in diagram.logged if ref.block != name or ref.port in out),
         signal_names={
@@ -174,15 +183,18 @@ def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:
         for wire in diagram.connections
         if wire.target.block in group
     ]
+    frames = _FramesOfGroup(diagram, group, name, free)
     inner = Diagram(
         name=name,
         blocks={
             **group,
+            **frames.ports,
             **{key: Inport(port=number) for number, key in enumerate(ins.values(), start=1)},
             **{key: Outport(port=number) for number, key in enumerate(outs.values(), start=1)},
         },
         connections=(*inner_wires, *(Connection(port, PortRef(key, "u")) for port, key in outs.items())),
-        layout=_inner_layout(diagram, list(group), list(ins.values()), list(outs.values())),
+        frame_lines=frames.inside,
+        layout=_inner_layout(diagram, list(group), [*ins.values(), *frames.ports], list(outs.values())),
         bends=diagram.bends,
         logged=tuple(ref for ref in diagram.logged if ref.block in group),
         commented={entry: comment for entry, comment in diagram.commented.items() if entry in group},
@@ -203,6 +215,7 @@ def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:
         diagram,
         blocks={k: b for k, b in diagram.blocks.items() if k not in group} | {name: Subsystem(diagram=inner)},
         connections=tuple(outer_wires),
+        frame_lines=frames.outside,
         layout={k: p for k, p in diagram.layout.items() if k not in group} | {name: middle},
         logged=tuple(ref for ref in diagram.logged if ref.block not in group),
         signal_names={
@@ -212,6 +225,30 @@ def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:
         },
         commented={entry: comment for entry, comment in diagram.commented.items() if entry not in group},
     )
+
+
+class _FramesOfGroup:
+    """The frame lines inside and outside of a new subsystem, and its Connection Ports.
+
+    Each frame with ports on both sides of the border gets one Connection Port.
+    """
+
+    def __init__(self, diagram: Diagram, group: Mapping[str, Block], name: str, free: FreeNames) -> None:
+        self.ports: dict[str, Block] = {}
+        inside: list[FrameLine] = []
+        outside: list[FrameLine] = []
+        for members in frames_of(diagram.frame_lines):
+            own = [ref for ref in members if ref.block in group]
+            others = [ref for ref in members if ref.block not in group]
+            lines = [line for line in diagram.frame_lines if line.first in members]
+            if not own or not others:
+                (inside if own else outside).extend(lines)
+                continue
+            port = free.take(own[0].port if len(own[0].port) > 1 else f"{own[0].block} {own[0].port}")
+            self.ports[port] = ConnectionPort()
+            inside += [FrameLine(ref, PortRef(port, FRAME)) for ref in own]
+            outside += [FrameLine(ref, PortRef(name, port)) for ref in others]
+        self.inside, self.outside = tuple(inside), tuple(outside)
 
 
 def _inner_layout(

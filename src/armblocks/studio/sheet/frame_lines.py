@@ -1,0 +1,75 @@
+"""Frame lines in the studio: shown and edited as wires between frame ports.
+
+The ports of one frame are shown as wires from one of them to each of the others. A wire of this star need
+not be a line of the diagram: its removal takes its second port out of the frame.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection, Sequence
+
+from armblocks.diagram import Diagram, FrameLine, PortRef, frames_of
+from armblocks.drawing.diagram_layout import boxes
+from armblocks.drawing.frame_lines import drawn_frames
+from armblocks.studio.protocol.messages.sheet_edits import Wire
+
+
+def shown_lines(diagram: Diagram) -> list[Wire]:
+    """Return the wires that show the frame lines of a sheet whose blocks have positions."""
+    if not diagram.frame_lines:
+        return []
+    return [
+        Wire(source=str(first), target=str(other), bends=())
+        for first, *others in drawn_frames(diagram, boxes(diagram))
+        for other in others
+    ]
+
+
+def split_wires(wires: Sequence[Wire], diagram: Diagram) -> tuple[list[Wire], list[FrameLine]]:
+    """Return the wires of signals, and the frame lines that the other wires mean."""
+    signals: list[Wire] = []
+    lines: list[FrameLine] = []
+    for wire in wires:
+        ends = [PortRef(*end.rpartition("/")[::2]) for end in (wire.source, wire.target)]
+        if all(_is_frame(end, diagram) for end in ends):
+            lines.append(FrameLine(*ends))
+        else:
+            signals.append(wire)
+    return signals, lines
+
+
+def with_lines(diagram: Diagram, lines: Sequence[FrameLine]) -> Diagram:
+    """Return the diagram with further frame lines."""
+    if not lines:
+        return diagram
+    return dataclasses.replace(diagram, frame_lines=(*diagram.frame_lines, *lines))
+
+
+def without_lines(diagram: Diagram, lines: Sequence[FrameLine]) -> Diagram:
+    """Return the diagram without shown lines.
+
+    The port of a line that is not the first of its frame is removed from the frame; the others remain one
+    frame.
+    """
+    for line in lines:
+        present = set(diagram.frame_lines)
+        members = next((refs for refs in frames_of(present) if line.first in refs), ())
+        first = next((refs[0] for refs in drawn_frames(diagram, boxes(diagram)) if line.first in refs), None)
+        removed = line.second if line.first == first else line.first
+        kept = [ref for ref in members if ref != removed]
+        if any(removed in other.ends for other in present):
+            present -= {other for other in present if removed in other.ends}
+            present |= {FrameLine(kept[0], ref) for ref in kept[1:]}
+        diagram = dataclasses.replace(diagram, frame_lines=tuple(present))
+    return diagram
+
+
+def without_blocks(lines: Sequence[FrameLine], blocks: Collection[str]) -> tuple[FrameLine, ...]:
+    """Return the lines that do not end at one of the blocks."""
+    return tuple(line for line in lines if not any(end.block in blocks for end in line.ends))
+
+
+def _is_frame(ref: PortRef, diagram: Diagram) -> bool:
+    block = diagram.blocks.get(ref.block)
+    return block is not None and any(port.name == ref.port for port in block.frame_ports())
