@@ -344,14 +344,14 @@ def _port_names(box: Box) -> tuple[list[Mark], FaceArea]:
     marks: list[Mark] = []
     label_width = {"left": 0.0, "right": 0.0}
     into, out = block_faces.port_labels(box.block)
-    frames = list(zip(box.frames, block_faces.frame_labels(box.block)))
+    named = list(zip(box.frames, block_faces.frame_labels(box.block), box.block.frame_ports()))
     flipped = box.flipped != (box.rotation == 180)
-    for ports, labels, side in (
-        (box.inputs, into, "right" if flipped else "left"),
-        (box.outputs, out, "left" if flipped else "right"),
+    for ports, labels, side, own_side in (
+        (box.inputs, into, "right" if flipped else "left", "left"),
+        (box.outputs, out, "left" if flipped else "right", "right"),
     ):
-        edge = box.x if side == "left" else box.x + box.width
-        shown = [*zip(ports, labels), *((port, label) for port, label in frames if port.x == edge)]
+        frames = [(port, label) for port, label, frame in named if frame.side == own_side]
+        shown = [*zip(ports, labels), *frames]
         if not any(label for _, label in shown):
             continue
         label_width[side] = max(text_width(label, PORT_TEXT) for _, label in shown) + 5
