@@ -214,7 +214,7 @@ export interface SheetPart {
   height: number;
 }
 /**
- * Insert a new link after another one, or at the base if ``after`` is empty.
+ * Insert a new link after another link, or at the base if ``after`` is empty.
  */
 export interface AddJoint {
   kind: "add_joint";
@@ -390,7 +390,7 @@ export interface SheetNote {
   text: string;
 }
 /**
- * Exchange a link of a chain with the previous link (``by`` is -1) or with the next one (1).
+ * Exchange a link of a chain with the previous link (``by`` is -1) or with the next link (1).
  */
 export interface MoveJoint {
   kind: "move_joint";
@@ -447,7 +447,7 @@ export interface PasteBlocks {
   shift?: number | [number, number];
 }
 /**
- * Append a pose, or insert it after another one. Without a name it is called P1, P2 …
+ * Append a pose, or insert it after another pose. Without a name it is called P1, P2 …
  */
 export interface RecordPose {
   kind: "record_pose";
@@ -690,7 +690,7 @@ export interface New {
 /**
  * Open a file of the project: a diagram, a robot, or a script of robots.
  *
- * The reply contains the keys of the documents; the front end shows the first one.
+ * The reply contains the keys of the documents; the front end shows the first document.
  */
 export interface Open {
   kind: "open";
@@ -1841,7 +1841,7 @@ export interface SceneJoint {
 /**
  * A rod between the point ``first`` (3,) m in the frame of row ``first_row`` and ``second``.
  *
- * The front end computes its pose: the origin is the first point, z points to the second one.
+ * The front end computes its pose: the origin is the first point, z points to the second point.
  */
 export interface SceneRod {
   first_row: number;

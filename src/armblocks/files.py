@@ -12,7 +12,7 @@ from armblocks.errors import FormatError
 
 
 def write_atomically(path: str | Path, data: bytes, *, mode: int = 0o666) -> os.stat_result:
-    """Replace the file at ``path`` by ``data``, atomically: readers see the old file or the new one.
+    """Replace the file at ``path`` by ``data``, atomically: readers find either the old or the new file.
 
     Returns the ``stat`` of the new file: a later change of size, time or inode means that another program has
     written the file. ``mode``: the permissions of a new file, less the user's umask.

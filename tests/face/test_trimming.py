@@ -204,7 +204,7 @@ def test_unknown_names_and_unsuitable_values_are_refused() -> None:
         ab.trim(pendulum(), outputs={"angle": 1.0})
     with pytest.raises(InputError, match="is given values of shape"):
         ab.trim(pendulum(), states={"q": [1.0, 2.0]})
-    with pytest.raises(InputError, match=r"the bounds of 'q' are 2 and 1.*the lower one first"):
+    with pytest.raises(InputError, match=r"the bounds of 'q' are 2 and 1.*the lower number first"):
         ab.trim(pendulum(), bounds={"q": (2.0, 1.0)})
 
 

@@ -142,7 +142,7 @@ def _jacobian(model: mujoco.MjModel, tree_q: np.ndarray, order: list[int]) -> np
     [
         ("<joint joint1='a1' joint2='b1' polycoef='0 1 2 0 0'/>", "its polynomial is not linear"),
         ("<joint joint1='a1' joint2='zz'/>", "there is no hinge or slide named 'zz'"),
-        ("<joint joint1='a1' joint2='a1'/>", "both joints are the same one"),
+        ("<joint joint1='a1' joint2='a1'/>", "both joints are the same"),
         ("<connect body1='ab' body2='zz' anchor='0 0 0'/>", "a body does not exist"),
         ("<weld site1='as' site2='zz'/>", "a site does not exist"),
         ("<weld body1='ab' body2='ab'/>", "both frames are on the same body"),

@@ -259,7 +259,7 @@ def test_data_that_a_format_does_not_have_give_warnings(format: str) -> None:
 def test_another_tip_or_order_of_coordinates_gives_a_warning(format: str) -> None:
     for parents, text in (
         ({"a": None, "b": None, "c": "a", "d": "b"}, "the file are in another order: a, c, b, d"),
-        ({"a": None, "c": "a", "e": "c", "b": None}, "load this one with tip='b'"),
+        ({"a": None, "c": "a", "e": "c", "b": None}, "load the file with tip='b'"),
     ):
         links = tuple(
             Link(name=name, parent=parent, mass=1.0, inertia=np.eye(3)) for name, parent in parents.items()

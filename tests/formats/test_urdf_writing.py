@@ -172,7 +172,7 @@ class Rail(Prismatic):
             {"a": None, "b": None, "c": "a", "d": "b"},
             "coordinates of the file are in another order: a, c, b, d",
         ),
-        ({"a": None, "c": "a", "e": "c", "b": None}, "load this one with tip='b'"),
+        ({"a": None, "c": "a", "e": "c", "b": None}, "load the file with tip='b'"),
     ],
 )
 def test_another_tip_or_order_of_coordinates_gives_a_warning(

@@ -147,7 +147,7 @@ def _collected(terms: Iterable[tuple[Monomial, tuple[float, float]]]) -> dict[Mo
 
 
 def _contracted_once(terms: dict[Monomial, tuple[float, float]], monomial: Monomial) -> bool:
-    """Contract a monomial and another one of ``terms``, if there is one; whether there was."""
+    """Contract a monomial with another monomial of ``terms``; returns whether this was possible."""
     if monomial not in terms:
         return False
     a, size = terms[monomial]

@@ -50,7 +50,7 @@ def poles(system: StateSpaceModel) -> Complex:
 
 
 def eigenvalues(matrix: Array) -> Complex:
-    """The eigenvalues of a matrix; simple small ones are refined.
+    """The eigenvalues of a matrix; simple small eigenvalues are refined.
 
     The error of the usual algorithm is proportional to the norm of the matrix, which can be much larger
     than an eigenvalue. Such eigenvalues are improved by Newton's method with deflation of the other

@@ -310,7 +310,7 @@ class Axes:
 
 
 def axis(points: SX | Sequence[float | SX], method: str, extrapolation: str) -> Axis:
-    """An axis; a long one if its points are a column of symbols (a run input)."""
+    """An axis. It is long if its points are a column of symbols (a run input)."""
     if isinstance(points, SX):
         return LongAxis(points, method, extrapolation)
     return ShortAxis(points, method, extrapolation)

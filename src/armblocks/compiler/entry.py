@@ -144,7 +144,7 @@ def make_entry(
 
     ``table`` is the address of the module's :data:`TABLE`. Calls that the C function does not handle go to
     ``fallback``. ``code`` (the machine code) lives as long as the builtin, which is pickled by its ``maker``.
-    Where the binary interface of Python or NumPy differs from the expected one, ``fallback`` itself is
+    Where the binary interface of Python or NumPy differs from the expected interface, ``fallback`` itself is
     returned.
     """
     addresses = _addresses()
@@ -174,7 +174,7 @@ class _View:
 
 @cache
 def _addresses() -> list[int] | None:
-    """The content of the table, in order; None if an interface differs from the expected one."""
+    """The content of the table, in order; None if an interface differs from the expected interface."""
     if ctypes.sizeof(ctypes.c_void_p) != 8 or not _layout_is_known():
         return None
     try:

@@ -297,7 +297,7 @@ class _Call:
         batched: Boolean,
         arguments: Sequence[_Argument],
     ) -> None:
-        """Continue only if the array matches a new one and does not overlap inputs."""
+        """Continue only if the array matches a new array and does not overlap inputs."""
         r, objects = self.r, self.objects
         objects.require_array(out, C_CONTIGUOUS_AND_ALIGNED | WRITEABLE)
         sample_axes = batched.count()

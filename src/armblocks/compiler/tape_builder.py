@@ -209,7 +209,7 @@ class TapeBuilder:
             if not isinstance(node, tuple) or node[0] not in (Opcode.ADD, Opcode.SUBTRACT):
                 continue
             a, b = node[1]
-            # Of two products the later one is fused, because the earlier one is available sooner.
+            # Of two products the later product is fused, because the earlier product is available sooner.
             left, right = product(a), product(b)
             if left and right:
                 left, right = (left, None) if a > b else (None, right)

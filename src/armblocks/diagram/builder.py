@@ -145,7 +145,7 @@ class DiagramBuilder(metaclass=ArgumentErrors):
         """Add a block under a new name and connect its inputs, in order or by port name.
 
         The name of a frame port draws a frame line: ``builder.add("hinge", RevoluteJoint(), B=world)``.
-        In and Out blocks without a number get the next one.
+        In and Out blocks without a number get the next number.
         """
         where = f"diagram '{self.name}'"
         _check_block(block, where)

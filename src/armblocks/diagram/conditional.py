@@ -56,7 +56,7 @@ class TriggeredSubsystem(DiagramBlock):
 
     The trigger fires where it becomes positive (rising), stops being positive (falling), or at both (either).
     Sampled blocks inside take one step at each trigger event; their period is the time since the previous
-    event. Integrals therefore use the interval from the previous event to the present one.
+    event. Integrals therefore use the interval from the previous to the present event.
     """
 
     title: ClassVar[str] = "Triggered Subsystem"

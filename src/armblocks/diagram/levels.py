@@ -26,7 +26,7 @@ def name_of(path: str) -> str:
 
 
 def levels_of(diagram: Diagram) -> dict[str, Diagram]:
-    """All diagrams of a hierarchy by path, outer ones first.
+    """All diagrams of a hierarchy by path, outer diagrams first.
 
     Raises ``DiagramError`` for too deeply nested subsystems.
     """

@@ -59,7 +59,7 @@ def with_comments(diagram: Diagram, comments: Mapping[str, Comment | None]) -> D
 
 
 Outside = Sequence[tuple[Diagram, str, DiagramBlock]]
-"""The enclosing subsystems of a level: their levels, names and blocks, outer ones first."""
+"""The enclosing subsystems of a level: their levels, names and blocks, outer subsystems first."""
 
 
 def found_block(diagram: Diagram, path: str) -> tuple[Outside, Diagram, str]:

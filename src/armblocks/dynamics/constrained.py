@@ -153,7 +153,7 @@ def independent_relations(robot: Robot, near: Array | None = None) -> tuple[int,
     """The indices of the relations that the equations of motion contain, see :meth:`Mechanism.mobility`.
 
     ``near`` (nq,): coordinates near which the mechanism is assembled to find them; by default the neutral
-    configuration, or any other one that can be assembled.
+    configuration, or any other configuration that can be assembled.
     """
     if not robot.closures:
         return ()

@@ -32,7 +32,7 @@ RESIDUAL_TOLERANCE = 1e-12
 """Largest residual of an assembled configuration: cosine of an angle, or displacement in the unit of
 :func:`characteristic_length`, which is 1 m for most robots."""
 RANK_TOLERANCE = 1e-5
-"""Singular values below this fraction of the largest one count as zero.
+"""Singular values below this fraction of the largest singular value count as zero.
 
 Near a singular configuration a smaller tolerance would count a direction in which the mechanism can almost
 move as locked. With 1e-9 Bricard's mechanism has no degree of freedom at inaccurate coordinates."""

@@ -79,7 +79,7 @@ class JumpModes:
         return mode
 
     def _steps(self, mode: SX, up: SX, down: SX) -> None:
-        """The guards of an integer: the next one, and the one below."""
+        """The guards of an integer: at the next and at the previous integer."""
         self._guard(up, mode + 1.0, mode, 1)
         self._guard(down, mode, mode - 1.0, -1)
 

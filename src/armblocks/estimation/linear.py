@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 _ROUNDS = 50
 _SETTLED = 1e-8
 RANK_TOLERANCE = 1e-10
-"""Singular values of the matrix with columns of length 1 below this fraction of the largest one are 0."""
+"""Singular values of the matrix with columns of length 1 below this fraction of the largest value are 0."""
 
 
 @dataclass(eq=False)

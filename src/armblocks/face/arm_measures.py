@@ -20,7 +20,7 @@ ROWS = {"all": slice(0, 6), "trans": slice(0, 3), "rot": slice(3, 6)}
 """Rows of the Jacobian by the name of the axes: linear, angular, or both."""
 KINDS = ("yoshikawa", "asada", "condition", "smallest")
 RANK = 1e-12
-"""Singular values below this fraction of the largest one are zero."""
+"""Singular values below this fraction of the largest singular value are zero."""
 
 
 class _Function(Protocol):

@@ -193,7 +193,7 @@ def shipped_robot(name: str) -> Robot:
 
 
 def fitting_drivers(block: Block, given_drivers: Mapping[str, Driver]) -> Mapping[str, Driver]:
-    """The driver of each input: the given one, else a signal with a shape that the block accepts."""
+    """The driver of each input: as given, else a signal with a shape that the block accepts."""
     shapes = _fitting_shapes(block)
     ports = block.input_ports()
     robot = next(

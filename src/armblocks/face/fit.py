@@ -203,7 +203,7 @@ class _Problem:
         return np.array(found)
 
     def evaluate(self, theta: Array) -> tuple[list[Array], list[Array]] | None:
-        """Residuals and derivatives of each sensor; ``None`` if a run fails, except the first one."""
+        """Residuals and derivatives of each sensor; ``None`` if a run fails, except the first run."""
         residuals: dict[str, list[Array]] = {name: [] for name in self.sensors}
         derivatives: dict[str, list[Array]] = {name: [] for name in self.sensors}
         for run, (names, _), measured in zip(self.runs, self.columns, self.measured):

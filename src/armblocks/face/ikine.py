@@ -88,7 +88,7 @@ class IkineCall:
 def checked_options(
     mask: ArrayLike | None, limits: object, tolerance: object, restarts: object, seed: object, where: str
 ) -> Options:
-    """The options of a call. Raises InputError for invalid ones."""
+    """The options of a call. Raises InputError for invalid options."""
     if not isinstance(limits, bool):
         raise InputError(
             f"limits={limits!r}",

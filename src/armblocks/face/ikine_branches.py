@@ -153,7 +153,7 @@ class ClosedForm:
         q, errors, measures = self.kernel.entry(targets, threads=check_threads(where, threads))
         has_pose = (errors[..., 0] <= tolerance) & (errors[..., 1] <= tolerance)
         singular = measures < SINGULAR
-        # At a pose where a choice has infinitely many solutions, the selected one may miss the position.
+        # At a pose where a choice has infinitely many solutions, the selected solution may miss the position.
         rest = np.flatnonzero(~has_pose.any(axis=1))
         if rest.size and (rest := rest[singular[rest].any(axis=(1, 2))]).size:
             found = self.iterate(targets[rest], None)

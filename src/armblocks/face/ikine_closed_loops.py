@@ -148,7 +148,7 @@ class ClosedLoopCall:
         return q, MAX_STEPS
 
     def closed(self, q: Array) -> Array:
-        """The configuration near ``q`` that satisfies the constraints, or the last one of the iteration."""
+        """The configuration near ``q`` that satisfies the constraints, or the last iterate."""
         return self._mechanism.descended(q)
 
     def tangents(self, q: Array) -> Array:
@@ -162,7 +162,7 @@ class ClosedLoopCall:
         return self._mechanism.moved(q, step)
 
     def starts(self, first: Array, limited: bool) -> Iterator[Array]:
-        """The first start, then starts near it and random ones in turn."""
+        """The first start, then alternately starts near it and random starts."""
         random = np.random.default_rng(self._options.seed)
         yield first
         k = 0

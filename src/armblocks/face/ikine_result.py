@@ -38,7 +38,7 @@ class IkineResult(metaclass=ArgumentErrors):
     - ``"steps"``: the maximum number of iterations was reached.
 
     ``position_error`` m and ``rotation_error`` rad of ``q``, without the components that a mask excludes;
-    ``iterations``: evaluations of the kinematics; ``restarts``: starts after the first one.
+    ``iterations``: evaluations of the kinematics; ``restarts``: starts after the first start.
     ``lost_direction`` (6,): a direction in the world, or in the axes of the mask, first translation (m), then
     rotation (rad); NaN for the other reasons. ``names``: the names of the coordinates.
     """

@@ -29,9 +29,10 @@ _ROUNDING = 1e-12
 _QUARTERS = np.array([0.25, 0.75])
 _SMALL, _ACCEPTED = 8e-4, 2e-2
 """Excess over a limit between grid points, relative to the limit: above the first number the limits are
-corrected, above the second one an error is raised."""
+corrected, above the second number an error is raised."""
 _ROUNDS, _CORRECTION = 8, 1.3
-"""Maximum number of corrections, and the multiple of the excess by which each one reduces the limits."""
+"""Maximum number of corrections, and the multiple of the excess by which each correction reduces the
+limits."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -194,7 +195,7 @@ def path_through(points: Array, limits: MotionLimits, blend: float | None) -> Pi
         raise InputError(
             f"the points {same[0] + 1} and {same[0] + 2} are the same",
             where="least_time",
-            allowed="points that differ from the one before",
+            allowed="points that differ from the previous point",
             fix="remove one of them",
         )
     scale = np.where(np.isfinite(limits.speed), limits.speed, 1.0)

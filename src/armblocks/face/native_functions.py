@@ -119,7 +119,7 @@ class NativeFunctions(metaclass=ArgumentErrors):
         Row k is the wrench that its parent exerts on link k, about the origin and in the axes of the distal
         frame of the joint (NOTATION.md). The component along the axis is the torque of the rigid bodies:
         ``rne`` without friction and rotor inertia. The last K rows are the wrenches of the closures of loops,
-        which the first link exerts on the second one, in the second frame. Forces of redundant closure
+        which the first link exerts on the second link, in the second frame. Forces of redundant closure
         equations are statically indeterminate and are 0 in the result. ``wrench=`` and ``payload=`` as for
         ``rne``.
         """

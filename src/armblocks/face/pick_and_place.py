@@ -89,7 +89,7 @@ def pick_and_place(
     up vertically over the height ``lift`` (m) at both poses, and rests ``grip_time`` (s) there. Between the
     vertical lines the joints move on straight lines in joint space. ``blend`` rounds the corners, and
     ``speed``, ``acceleration`` and ``torque`` are limits, as for :func:`~armblocks.least_time`. Each of the
-    three motions is time-optimal, the second one with the ``payload``. ``mask``: as for ``arm.ikine``.
+    three motions is time-optimal, the second motion with the ``payload``. ``mask``: as for ``arm.ikine``.
     ``dt``: time between samples, s.
 
     Raises InputError for a pose that the arm does not reach, with the reason, and for a vertical line on
@@ -165,5 +165,5 @@ def _vertical_line(
 
 
 def _differs(points: Array) -> NDArray[np.bool_]:
-    """Whether each point differs from the one before."""
+    """Whether each point differs from the previous point."""
     return np.append(True, (np.abs(np.diff(points, axis=0)) > 1e-9).any(axis=1))

@@ -121,7 +121,7 @@ def spline_trajectory(
         raise InputError(
             f"points {int(np.argmin(distances)) + 1} and {int(np.argmin(distances)) + 2} are the same",
             where=where,
-            allowed="points that differ from the one before, unless times are given",
+            allowed="points that differ from the previous point, unless times are given",
             fix="remove one of them, or give times",
         )
     curve = make(np.append(0.0, np.cumsum(distances)), via, *ends)

@@ -29,8 +29,8 @@ def load_robot(
 
     ``name`` selects one of several robots in a script or a world. ``friction_model``: the formula of another
     toolbox release, see :class:`FrictionModel`; by default the formula of the file. ``tip``: the link that
-    carries the tool, by default the last one; in URDF and SDF files, the end of the chain with the most
-    joints. If the joint of ``tip`` moves, its coordinate is the last one in q. ``packages``: folders of ROS
+    carries the tool, by default the last link; in URDF and SDF files, the end of the chain with the most
+    joints. If the joint of ``tip`` moves, its coordinate is the last entry of q. ``packages``: folders of ROS
     packages and Gazebo models by name, for ``package://`` and ``model://``. Other packages and models are
     searched for in the folders above the file. ``arguments``: values of the arguments of a xacro file, which
     needs the extra ``xacro``.

@@ -83,8 +83,8 @@ class SizingReport(metaclass=ArgumentErrors):
     def picture(self, joint: str, drive: str | None = None) -> Picture:
         """Torque over speed of a joint's drive against its curves.
 
-        ``drive``: the name of the candidate, by default the suggested one, else the first one. Raises
-        UnknownNameError for other names.
+        ``drive``: the name of the candidate, by default the suggested candidate, else the first candidate.
+        Raises UnknownNameError for other names.
         """
         joints = list(dict.fromkeys(load.joint for load in self.loads))
         if joint not in joints:

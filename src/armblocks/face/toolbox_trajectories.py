@@ -152,11 +152,11 @@ def mstraj(
     """The toolbox's ``mstraj``: linear segments between via points with quintic blends.
 
     ``points`` (K, n): the via points. ``qdmax``, a number or (n,): greatest joint speeds, or ``tsegment``
-    (K,): durations of the segments in s; the other one is ``None``. ``q0`` (n,): the start; ``None``: the
-    first point. ``dt``: the sample time, s. ``tacc``, a number or one for each segment: durations of the
+    (K,): durations of the segments in s; the other argument is ``None``. ``q0`` (n,): the start; ``None``:
+    the first point. ``dt``: the sample time, s. ``tacc``, a number or one for each segment: durations of the
     blends, s. ``qd0``, ``qdf`` (n,): speeds at the ends.
 
-    The motion passes near the inner points and ends at the last one. As in releases 9 and 10, the durations
+    The motion passes near the inner points and ends at the last point. As in releases 9 and 10, the durations
     of blends and, for given ``qdmax``, of segments are rounded up to multiples of ``dt``, a segment takes at
     least two blends, and its speed is the distance between the points divided by its duration. The table
     includes the start, which the toolbox omits. A duration that is a multiple of ``dt`` up to rounding is not
@@ -171,7 +171,7 @@ def mstraj(
             "qdmax and tsegment are " + ("both given" if qdmax is not None else "both None"),
             where="mstraj",
             allowed="exactly one of them: the greatest speeds, or the durations of the segments",
-            fix="give None for the other one",
+            fix="give None for the other argument",
         )
     blends = np.broadcast_to(np.asarray(tacc, dtype=np.float64), (len(via),)) if np.ndim(tacc) == 0 else tacc
     blends = np.asarray(blends, dtype=np.float64)

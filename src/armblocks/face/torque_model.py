@@ -151,7 +151,7 @@ class TorqueModel:
         """The conditions of physical consistency, with units of the size of the robot.
 
         ``values``, ``errors`` (b,): estimated base parameters and their standard errors, 0 if not identified.
-        They enlarge the units of a description that has no friction, or no masses or far too small ones.
+        They enlarge the units of a description that has no friction, no masses, or far too small masses.
         """
         masses = [max(link.mass, 0.0) for link in map(self.robot.link, self.links)]
         typical = max(float(np.mean(masses)) if masses else 0.0, 1e-3)

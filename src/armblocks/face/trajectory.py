@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _JUMP = 1e-9
-"""Derivatives that differ by less, relative to the largest one, are continuous between two pieces."""
+"""Derivatives that differ by less, relative to the largest derivative, are continuous between two pieces."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)

@@ -106,7 +106,7 @@ def ascending(name: str, value: ArrayLike, count: int, where: str) -> Array:
             f"{name} has the shape {times.shape}",
             where=where,
             allowed=f"{counted(count, 'ascending time')}, in s",
-            fix=f"give {name} one time for each point, each later than the one before",
+            fix=f"give {name} one time for each point, in ascending order",
         )
     return times
 

@@ -35,12 +35,12 @@ BINDING = 0.95
 _SHORT = 0.01
 """Fraction of the cycle time below which intervals are omitted."""
 _ROUNDING = 1e-14
-"""Positions that are smaller, relative to the largest one of the joint, are rounding errors of 0."""
+"""Positions that are smaller, relative to the largest position of the joint, are rounding errors of 0."""
 _SAMPLES = 1000
 _INSTANT = 1e-9
 """Times that differ by less (s) are the two sides of a jump."""
 _AT_REST = 1e-9
-"""Speeds below this fraction of the largest one of the joint are rounding errors, without friction."""
+"""Speeds below this fraction of the largest speed of the joint are rounding errors, without friction."""
 _STILL = 1e-12
 """All speeds of a joint that moves by less (rad or m) in the whole motion are rounding errors."""
 _MAX_TEXT_INTERVALS = 12

@@ -182,7 +182,7 @@ def _bounds(
         if not low <= high:
             raise InputError(
                 f"the bounds of '{name}' are {low:g} and {high:g}",
-                allowed="the lower one first",
+                allowed="the lower number first",
                 fix="swap them",
                 where=system.name,
             )

@@ -50,7 +50,7 @@ INNER_KEYS = (
     "scope_trigger",
     "settings",
 )
-"""The keys of a diagram inside another one."""
+"""The keys of a diagram inside another diagram."""
 _SETTINGS = {field.name: field.default for field in dataclasses.fields(SimulationOptions)}
 
 

@@ -20,7 +20,7 @@ _CONFIGURATION = re.compile(r"q(?!d{1,2}$)(?!lim)(?!\w*deg)\w+")
 class Script:
     """The results of a script, by the names of its variables.
 
-    ``robots``: in the order in which the variables first appeared, without copies of an earlier one.
+    ``robots``: in the order in which the variables first appeared, without copies of an earlier robot.
     ``variables``: texts, and matrices (rows, columns) in the units of the script.
     """
 

@@ -30,8 +30,8 @@ class RobotFormat:
     raises ``FormatError``. A format whose files refer to other files, or that reports findings, has
     ``read_in_context`` instead, with a :class:`FileContext` as third argument. ``correct``: a function of a
     file's bytes, its name and its findings, which corrects findings with an unambiguous remedy.
-    ``recognises``: for a format that shares its suffix with another one, whether a file's bytes are of this
-    format.
+    ``recognises``: for a format that shares its suffix with another format, whether a file's bytes are of
+    this format.
     """
 
     name: str

@@ -47,7 +47,7 @@ class Mimic(NamedTuple):
 
 
 def mimics_of(robot: Robot, format: str, closures: Collection[type[Closure]] = ()) -> dict[str, Mimic]:
-    """The joints that follow another one, by the name of their link; a warning for prescribed motions.
+    """The joints that depend on another joint, by the name of their link; a warning for prescribed motions.
 
     Raises ``FormatError`` for closures of other types than ``closures``, and for couplings of one joint or of
     three or more.
@@ -126,7 +126,7 @@ def warn_of_order(robot: Robot, tip: str, copy: Robot, format: str) -> None:
     """
     where = f"robot '{robot.name}'"
     if copy.links[-1].name != tip:
-        warn_of_loss(where, f"the tip is not part of the {format} file; load this one with tip={tip!r}")
+        warn_of_loss(where, f"the tip is not part of the {format} file; load the file with tip={tip!r}")
         copy = with_tip(copy, tip)
     if copy.joint_names != robot.joint_names and sorted(copy.joint_names) == sorted(robot.joint_names):
         order = ", ".join(copy.joint_names)

@@ -168,7 +168,7 @@ def _times_by_rows(name: str, array: Array, notes: list[str]) -> Array:
             fix="transpose the matrix, or store the times as a vector 'time'",
         )
     if is_time_row:
-        notes.append(f"The rows of '{name}' are its signals, the first one the times.")
+        notes.append(f"The rows of '{name}' are its signals, the first row the times.")
         return array.T
     return array
 

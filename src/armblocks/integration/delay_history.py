@@ -107,7 +107,7 @@ class DelayHistory:
         # The search does not start at a middle row whose end row does not exist yet.
         newest = newest - self.middle(reals, newest).to_integer()
         last = select(last < 0, newest, last)
-        # The last row at or before the time, by bisection; the first one if there is none.
+        # The last row at or before the time, by bisection; the first row if there is none.
         low, high = r.integer(first), r.integer(last)
         with r.loop() as bisection:
             a, b = low.value, high.value
@@ -173,7 +173,7 @@ class DelayHistory:
     def write_row(
         self, r: Routine, t: Reals, x: Reals, reals: Reals, counts: Integers, p: Reals, middle: Real | float
     ) -> Integer:
-        """Write the row after the last one without increasing the number of rows; return its index."""
+        """Write the row after the last row without increasing the number of rows; return its index."""
         rows = counts[Count.HISTORY_ROWS]
         z, unknowns = (reals.after(place) for place in (self.workspace.z, self.workspace.trial_w))
         reals[self.entry(rows, 0)] = t[0]
@@ -195,7 +195,7 @@ class DelayHistory:
     def _write_change(
         self, r: Routine, t: Reals, x: Reals, reals: Reals, counts: Integers, p: Reals, middle: Real
     ) -> None:
-        """Add a row for a point only if it differs from the last one."""
+        """Add a row for a point only if it differs from the last row."""
         rows = self.write_row(r, t, x, reals, counts, p, middle)
         before = rows - 1
         same = r.real(1.0)
@@ -239,7 +239,7 @@ class DelayHistory:
     # Jumps of signals.
 
     def _pass_jumps(self, r: Routine, time: Real, reals: Reals, counts: Integers) -> None:
-        """Move each line past the jumps that it has reached, and find the next one."""
+        """Move each line past the jumps that it has reached, and find the next jump."""
         until = time * SAME_ABOVE
         first_rows, last_rows = self.first_rows(counts), self.last_rows(counts)
         for k, line in enumerate(self.lines):

@@ -19,7 +19,7 @@ class Row(IntEnum):
     LENGTH = 1
     """Length of the next step, adaptive methods."""
     GROWTH = 2
-    """Maximum ratio of the following step to the present one; 1 after a rejection."""
+    """Maximum ratio of the following to the present step; 1 after a rejection."""
     SEGMENT_END = 3
     CLAMP = 4
     """The latest time at which the derivative may be evaluated in this segment."""

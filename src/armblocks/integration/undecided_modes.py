@@ -8,7 +8,7 @@ be above the end; with the small positive ``y`` above the zone, ``u`` may be bel
 If mode iteration finds no consistent modes, the inconsistent following modes are marked as *undecided* for
 the rest of the run. From then on an undecided mode counts as inconsistent only if it is also inconsistent
 after small relative changes of the time, the states, the parameters and the stored values. The accepted modes
-thus solve a problem that differs from the given one by rounding errors (a small backward error: Higham,
+thus solve a problem that differs from the given problem by rounding errors (a small backward error: Higham,
 *Accuracy and Stability of Numerical Algorithms*, section 1.5). A loop without a solution stays inconsistent.
 """
 

@@ -234,7 +234,7 @@ class _Search:
         self.rows["previous_cost"].reals[lane] = float("inf")
 
     def _store_result(self, lane: Integer) -> None:
-        """Store the end of an attempt if it is a solution, or nearer to the target than earlier ones."""
+        """Store the end of an attempt if it is a solution, or nearer to the target than earlier ends."""
         r, nq = self.r, self.sizes.positions
         sample = self.samples[lane]
         counts, numbers = self._counts(sample), self._numbers(sample)

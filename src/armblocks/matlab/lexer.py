@@ -149,7 +149,7 @@ class _Lexer:
         return text[position] == "#"
 
     def _token(self, number: int, text: str, position: int, spaced: bool) -> int:
-        """Read one token and return where the next one starts."""
+        """Read one token and return the start of the next token."""
         character = text[position]
         at = Position(number, position + 1)
         if (match := _NUMBER.match(text, position)) is not None:

@@ -126,11 +126,11 @@ class Picture:
     marks: list[Mark] = field(default_factory=list[Mark])
 
     def add(self, *marks: Mark) -> None:
-        """Add marks on top of the existing ones."""
+        """Add marks on top of the existing marks."""
         self.marks.extend(marks)
 
     def extend(self, marks: Iterable[Mark]) -> None:
-        """Add many marks on top of the existing ones."""
+        """Add many marks on top of the existing marks."""
         self.marks.extend(marks)
 
     def place(self, other: Picture, x: float, y: float) -> None:

@@ -1,9 +1,9 @@
 """The geometry of a robot: shapes of the links, or castings derived from the kinematics.
 
 A link without ``geometry`` gets a body that follows its joint axes. The body begins at the joint of the link.
-It follows the axis to the common normal of this axis and the next one, then the normal, then the next axis to
-the next joint. For a standard D-H row these are the lengths d and a, so the drawing shows the D-H table. Each
-revolute joint gets a motor drum, each prismatic joint a rail and a carriage, the tip a flange.
+It follows the axis to the common normal of this axis and the next axis, then the normal, then the next axis
+to the next joint. For a standard D-H row these are the lengths d and a, so the drawing shows the D-H table.
+Each revolute joint gets a motor drum, each prismatic joint a rail and a carriage, the tip a flange.
 
 The sizes affect the appearance only, not the dynamics.
 """

@@ -20,7 +20,7 @@ def with_tip(robot: Robot, tip: str) -> Robot:
 
 
 def deepest_tip(links: Sequence[Link]) -> str:
-    """The end link of the chain with the most degrees of freedom; the last one of several such links.
+    """The end link of the chain with the most degrees of freedom; of several such links, the last.
 
     ``links``: parents before their children.
     """

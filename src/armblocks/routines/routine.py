@@ -433,7 +433,7 @@ class Stages:
 
 
 def _parameters(write: Callable[..., object]) -> dict[str, type[Value]]:
-    # The first annotation is the routine, the last one the result.
+    # The first annotation is the routine, the last annotation the result.
     hints = list(write.__annotations__.items())[1:-1]
     return {name: _value_type(hint) for name, hint in hints}
 

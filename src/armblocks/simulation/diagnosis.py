@@ -131,7 +131,7 @@ def _unsolved(system: CompiledSystem, time: float) -> SimulationError:
         f"Newton's method found no solution of the implicit equations of the loop through {names} at "
         f"{time:.9g} s",
         where=system.name,
-        allowed="loops with one solution near the previous one: the Jacobian must not be singular",
+        allowed="loops with one solution near the previous solution: the Jacobian must not be singular",
         fix="check whether the loop has a unique solution; a delay or an integrator breaks the loop",
     )
 

@@ -87,13 +87,13 @@ class SampleTimes:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ListedTimes(SampleTimes):
-    """Sample times at any distances: ``times`` (N,) s, ascending, the first one is the start of the run."""
+    """Sample times at any distances: ``times`` (N,) s, ascending, from the start of the run."""
 
     times: Array
 
     @staticmethod
     def of(times: Array) -> ListedTimes:
-        """The sample times of a run that ends at the last one."""
+        """The sample times of a run that ends at the last sample time."""
         start, stop = float(times[0]), float(times[-1])
         step = (stop - start) / DEFAULT_INTERVALS if stop > start else 1.0
         return ListedTimes(

@@ -267,7 +267,7 @@ class RunPart:
         if self.integration is not None:
             self.integration.advance(steps, pause)
             return
-        # Without states each sample counts as a step, and the last one is at `pause`.
+        # Without states each sample counts as a step, and the last sample is at `pause`.
         until = max(0, self._sample_times.up_to(pause) - self.begin)
         self._position = min(self._time.size, self._position + steps, max(until, self._position))
 

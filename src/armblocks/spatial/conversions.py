@@ -5,7 +5,7 @@ Names are the same as in the Robotics Toolbox. Every function takes one value or
 ``SO3``, ``UnitQuaternion`` or ``Twist3`` of spatialmath; functions that return poses or rotations then return
 objects of spatialmath, too. Angles are in rad, or with ``unit="deg"`` in degrees. NaN gives NaN.
 
-Results are accurate to rounding for all angles, including small ones and half a turn. Sources: Siciliano et
+Results are accurate to rounding for all angles, including small angles and half a turn. Sources: Siciliano et
 al., Robotics, 2009, chapter 2; Lynch and Park, Modern Robotics, 2017, 3.2 and 3.3; Shepperd, J. Guidance and
 Control 1(3), 1978.
 """

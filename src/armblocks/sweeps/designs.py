@@ -50,7 +50,7 @@ def _bounds(kind: str, low: float, high: float) -> tuple[float, float]:
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise InputError(
             f"{kind} has the bounds {low!r} and {high!r}",
-            allowed="two finite numbers, the lower one first",
+            allowed="two finite numbers, the lower number first",
             where="sweep",
             fix="exchange them, or vary a list with one value",
         )

@@ -26,7 +26,7 @@ from armblocks.errors import InputError, counted
 
 Matrix = NDArray[np.float64]
 RELATIVE_TOLERANCE = 1e-12
-"""Singular values and matrix entries below this fraction of the largest one count as 0."""
+"""Singular values and matrix entries below this fraction of the largest value count as 0."""
 
 
 @dataclass(frozen=True, kw_only=True)

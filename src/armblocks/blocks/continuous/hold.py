@@ -41,7 +41,7 @@ class FirstOrderHold(Block):
     ``extrapolation`` continues the straight line through the last two samples. It is exact for a linear
     input; at each sample time y may jump to the new sample. ``interpolation`` connects the samples without a
     jump, one period late: y(t) = u(t_(k-1)) + (u(t_k) - u(t_(k-1))) (t - t_k) / T. Simulink's First Order
-    Hold extrapolates. ``initial`` is the sample before the first one, and y before ``offset``.
+    Hold extrapolates. ``initial`` is the sample before the first sample, and y before ``offset``.
 
     A sampled block that ticks at t_k reads the left limit of y.
     """
@@ -61,7 +61,7 @@ class FirstOrderHold(Block):
     period: float = parameter(0.1, above=0.0, doc="sampling period T", unit="s")
     offset: float = parameter(0.0, minimum=0.0, doc="time of the first sample", unit="s")
     initial: ArrayLike = parameter(
-        0.0, kind=ParameterKind.ARRAY, doc="value of the sample before the first one"
+        0.0, kind=ParameterKind.ARRAY, doc="value of the sample before the first sample"
     )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -77,7 +77,7 @@ class FirstOrderHold(Block):
         shape = self.output_shapes(inputs)["y"]
         samples = (
             State("last", shape, "the last sample"),
-            State("before", shape, "the sample before the last one"),
+            State("before", shape, "the last sample but one"),
         )
         return (COUNT, WHEN, ODD, *samples)
 

@@ -134,7 +134,7 @@ class WrapToZero(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class HitCrossing(Block):
-    """The number of crossings of an offset and the time of the last one; crossings are located exactly.
+    """The number of crossings of an offset and the time of the last crossing; crossings are located exactly.
 
     Simulink's block outputs 1 during the step that ends at the crossing. Here the count keeps its value after
     the crossing, and a triggered subsystem can detect the change of the count.
@@ -158,7 +158,7 @@ class HitCrossing(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (
             Port("count", "number of crossings so far"),
-            Port("last", "time of the last crossing; 0 before the first one", "s"),
+            Port("last", "time of the last crossing; 0 before the first crossing", "s"),
         )
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:

@@ -114,7 +114,7 @@ class ToFile(Block):
     The run itself writes no file. ``write_report`` (and thus ``armblocks run``) writes the file into the
     report's folder; ``write_files`` writes it into a given folder. The path must be inside that folder. The
     file has one row for every ``decimation``-th recorded sample time, beginning with the first. If there are
-    more than ``limit`` rows, the file has only the last ones.
+    more than ``limit`` rows, the file has only the last rows.
     """
 
     title: ClassVar[str] = "To File"
@@ -129,7 +129,7 @@ class ToFile(Block):
     variable: str = parameter("simout", doc="the name of the variable in the file")
     decimation: int = parameter(1, minimum=1, doc="every n-th recorded sample time is stored")
     limit: int = parameter(
-        1_000_000, minimum=1, maximum=10_000_000, doc="maximum number of rows; the last ones are stored"
+        1_000_000, minimum=1, maximum=10_000_000, doc="maximum number of rows; the last rows are stored"
     )
 
     def face_sign(self) -> FaceSign:

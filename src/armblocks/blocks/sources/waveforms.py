@@ -150,7 +150,7 @@ class FromTable(Block):
     title: ClassVar[str] = "From Workspace"
     sign: ClassVar[FaceSign] = graph((0, 0.2), (0.3, 0.9), (0.6, 0.4), (1, 0.7))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A cubic spline through four points; after the last one its value is held.",
+        shows="A cubic spline through four points; after the last point its value is held.",
         parameters={"times": (0.0, 2.0, 5.0, 8.0), "values": (0.0, 1.0, -1.0, 0.5), "method": "cubic"},
     )
 

@@ -153,7 +153,7 @@ def arm_of_parallel_axes(chain: Chain) -> Solver | None:
             for angles, root in _planar(second, third, fourth, point, x, total):
                 yield Branch([one, *angles, *end], [shoulder.root, root])
 
-    name = "parallel axes after the first one" if constant is None else "the coupled axes of a palletiser"
+    name = "parallel axes after the first axis" if constant is None else "the coupled axes of a palletiser"
     return Solver(name, 4, ("shoulder", "elbow"), branches)
 
 

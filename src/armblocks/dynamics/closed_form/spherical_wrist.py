@@ -1,7 +1,7 @@
 """Six joints whose last three axes intersect: position and orientation are solved one after the other.
 
 The centre of the wrist does not depend on the last three joints, so the first three follow from its position
-(Pieper, 1968). Supported are two parallel axes after the first one, and two intersecting axes before a third
+(Pieper, 1968). Supported are two parallel axes after the first axis, and two intersecting axes before a third
 joint that is revolute or prismatic.
 """
 

@@ -36,7 +36,7 @@ class Hull(NamedTuple):
 class Body:
     """The n hulls of a link or obstacle: ``points`` (n, K, 3), ``radii`` (n,), and balls around the hulls.
 
-    Hulls of fewer points repeat their first one. ``centres`` (n, 3) and ``sizes`` (n,): the balls, m.
+    Hulls of fewer points repeat their first point. ``centres`` (n, 3) and ``sizes`` (n,): the balls, m.
     """
 
     points: Array

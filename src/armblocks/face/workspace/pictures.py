@@ -70,7 +70,7 @@ def workspace_picture(
 
 
 def default_slices(workspace: WorkspaceCells) -> list[WorkspaceSlice]:
-    """The slice through the base normal to y, and the one with the most cells normal to z.
+    """The slice through the base normal to y, and the slice with the most cells normal to z.
 
     Slices of a region that is a plane or a line are omitted, unless none has an area.
     """

@@ -35,10 +35,10 @@ class Workspace(WorkspaceCells):
         at: float | None = None,
         width: float = 960.0,
     ) -> Picture:
-        """Slices with a measure in colours, by default the first one; ``"count"`` shows the samples.
+        """Slices with a measure in colours, by default the first measure; ``"count"`` shows the samples.
 
         ``normal`` and ``at``: one slice, as :meth:`slice`. By default the slices through the base normal to y
-        and the one with the most cells normal to z are side by side. ``width``: px.
+        and the slice with the most cells normal to z are side by side. ``width``: px.
         """
         from armblocks.face.workspace.pictures import workspace_picture
 

@@ -73,7 +73,7 @@ def workspace(
 
     - ``"manipulability"``: Yoshikawa's product of the singular values of the Jacobian;
     - ``"singularity"``: the smallest singular value, which is the distance to the nearest singular Jacobian;
-    - ``"condition"``: the smallest singular value over the largest one;
+    - ``"condition"``: the smallest divided by the largest singular value;
     - ``"limits"``: the least distance to a joint limit over half the range, 1 in the middle, 0 at a limit;
     - ``"payload"``: the largest mass (kg) at the frame that the ``torque`` limits (n,) hold, by default those
       of the robot. ``centre`` (3,) m: its position in the axes of the frame. At rest, or with the speeds

@@ -50,7 +50,7 @@ class Interpreter:
         )
 
     def run(self, statements: tuple[Statement, ...]) -> None:
-        """Execute all statements in order. Raises ``FormatError`` at the first invalid one."""
+        """Execute all statements in order. Raises ``FormatError`` at the first invalid statement."""
         for statement in statements:
             self.budget.spend(self.source.location(statement.at), 10)
             match statement:

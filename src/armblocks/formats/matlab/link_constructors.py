@@ -146,7 +146,7 @@ def _check_joint(location: Location, link: LinkRecord, assigned: set[str], *, fi
     if is_type_open and {"d", "theta"} <= assigned:
         raise location.error(
             f"{name} is given both 'd' and 'theta'",
-            allowed="'d' of a revolute joint or 'theta' of a prismatic one: the other is the joint variable",
+            allowed="'d' of a revolute joint or 'theta' of a prismatic joint; the other is variable",
         )
     if is_type_open:
         link.sigma = int("theta" in assigned)

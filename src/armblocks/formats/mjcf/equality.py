@@ -95,7 +95,7 @@ def _coupling(element: Element, parts: Parts) -> Coupling | str:
         return "its polynomial is not linear"
     second, r2 = parts.joints[names[1]]
     if first == second:
-        return "both joints are the same one"
+        return "both joints are the same"
     constant = r1 + a[0] - a[1] * r2
     terms = ((first, 1.0), (second, -a[1]))
     return Coupling(name=name or f"{names[0]} follows {names[1]}", terms=terms, constant=constant)
@@ -122,7 +122,7 @@ def _closure(element: Element, parts: Parts, poses: Mapping[str | None, Transfor
         links = [None if body in ("", "world") else body for body in bodies]
         if any(link not in poses for link in links):
             return "a body does not exist"
-        between = poses[links[0]].inverse() @ poses[links[1]]  # pose of the second body in the first one
+        between = poses[links[0]].inverse() @ poses[links[1]]  # pose of the second body in the first body
         anchor = transl(*element.vector("anchor", (0.0, 0.0, 0.0)))
         if element.tag == "weld":
             ends = [

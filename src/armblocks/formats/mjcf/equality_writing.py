@@ -88,7 +88,7 @@ def tendon_lines(robot: Robot, frames: dict[str, NamedFrame], sites: Sites) -> l
 
 
 def _weld(robot: Robot, closure: Closure, names: Mapping[str | None, str]) -> str:
-    """Bodies and relative pose: of the second body in the frame of the first one."""
+    """Bodies and relative pose: of the second body in the frame of the first body."""
     poses = [
         robot.base @ end.pose if end.link is None else end.pose for end in (closure.first, closure.second)
     ]

@@ -79,7 +79,7 @@ def read_mjcf(data: bytes, file: str, context: FileContext) -> Robot:
         raise root.error(
             "the model has no bodies",
             allowed="<worldbody> with <body> elements",
-            fix="load the file that includes this one",
+            fix="load the file that includes this file",
         )
     name = root.attributes.get("model", "").strip() or PurePath(file).stem
     try:
@@ -186,7 +186,7 @@ class _Model:
         name = self._free_name(body.attributes.get("name", ""), "body")
         given = body.attributes.get("name", "").strip()
         if given and given in self.read_bodies:
-            what = f"there is another body of this name; this one is read as '{shortened(name)}'"
+            what = f"there is another body of this name; this body is read as '{shortened(name)}'"
             note(self.context, NAME, body, what)
         self.read_bodies.add(given)
         self.context.lines[name] = body.line

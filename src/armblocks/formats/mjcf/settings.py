@@ -44,7 +44,7 @@ class Settings:
 
 
 def settings_of(root: Element) -> Settings:
-    """The settings of all sections ``<compiler>``; later attributes override earlier ones."""
+    """The settings of all sections ``<compiler>``; later attributes override earlier attributes."""
     settings = Settings()
     for compiler in root.all("compiler"):
         settings = _with(settings, compiler)

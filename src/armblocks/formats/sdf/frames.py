@@ -218,7 +218,7 @@ class Frames:
                 chains[own][ends[own]] = None
 
     def _product(self, chain: list[Frame]) -> Transform:
-        """The pose of the first frame in the frame that follows the last one."""
+        """The pose of the first frame in the frame that follows the last frame."""
         product = Transform()
         for frame in chain:
             product = self._step(frame)[1] @ product

@@ -167,7 +167,7 @@ class _Tree:
         return links
 
     def _group(self, first: _Waiting) -> tuple[list[Link], list[_Waiting]]:
-        """The links of the nodes that welds connect with the first one, and the joints at them."""
+        """The links of the nodes that welds connect with the first node, and the joints at them."""
         links: list[Link] = []
         joints: list[_Waiting] = []
         welded = [first]

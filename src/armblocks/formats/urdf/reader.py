@@ -124,11 +124,11 @@ def _named(root: Element, tag: str, context: FileContext) -> dict[str, Element]:
             place = f"there is another {tag} of this name in line {elements[name].line}"
             if tag == "joint":
                 new = free_joint_name(name, names)
-                note(context, NAME, element, f"{place}; this one is read as '{shortened(new)}'")
+                note(context, NAME, element, f"{place}; this element is read as '{shortened(new)}'")
                 names.add(new)
                 name = element.attributes["name"] = new
             elif _equal(element, elements[name]):
-                note(context, NAME, element, f"{place} with the same content; this one is omitted")
+                note(context, NAME, element, f"{place} with the same content; this element is omitted")
                 continue
             else:
                 raise element.error(place, allowed="unique names", fix="rename one of them")

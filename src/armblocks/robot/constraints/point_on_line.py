@@ -11,7 +11,7 @@ from armblocks.robot.constraints.relations import NoDisplacement, Relation
 
 @dataclass(frozen=True, kw_only=True)
 class PointOnLine(Closure):
-    """A point that stays on a line. The origin of the second frame is on the z axis of the first one."""
+    """A point that stays on a line. The origin of the second frame is on the z axis of the first frame."""
 
     title: ClassVar[str] = "point on line"
 

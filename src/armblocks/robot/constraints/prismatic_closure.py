@@ -11,7 +11,7 @@ from armblocks.robot.constraints.relations import SAME_AXES, NoDisplacement, Rel
 
 @dataclass(frozen=True, kw_only=True)
 class PrismaticClosure(Closure):
-    """A slider that closes a loop. The frames have the same axes; the second one slides along z."""
+    """A slider that closes a loop. The frames have the same axes; the second frame slides along z."""
 
     title: ClassVar[str] = "prismatic"
 

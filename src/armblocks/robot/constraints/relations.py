@@ -2,7 +2,7 @@
 
 A closure is a sequence of relations of three types. The algorithms of :mod:`armblocks.dynamics` use only
 these types, so the sequence describes a type of closure completely. ``a`` is the first frame of a closure and
-``b`` the second one; both have the axes x, y, z with the indices 0, 1, 2.
+``b`` the second frame; both have the axes x, y, z with the indices 0, 1, 2.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from armblocks.spatial import Transform, Vector3, rotation_about
 
 
 class Coordinate(NamedTuple):
-    """One coordinate of a joint: its ``name`` (empty if it is the only one) and its SI ``unit``."""
+    """One coordinate of a joint: its ``name`` (empty for a single coordinate) and its SI ``unit``."""
 
     name: str
     unit: str

@@ -159,7 +159,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         on_disk: Fingerprint | None = None,
         key: str = "",
     ) -> OpenedT:
-        """Open a value as a document, under the given key or a new one."""
+        """Open a value as a document, under the given key or a new key."""
         open_file = self._add(self.kind.edited(value), key or secrets.token_hex(8))
         open_file.path, open_file.origin, open_file.on_disk = path, origin, on_disk
         return open_file

@@ -52,7 +52,7 @@ class StateFolder:
         return session if age < SESSION_SECONDS and len(session.secret) >= 32 else None
 
     def begin_session(self, port: int, *, new: bool = False) -> Session:
-        """Return the session for this port: the previous one if its port is the same, unless ``new``."""
+        """Return the session for this port: the previous session if its port is the same, unless ``new``."""
         last = self.session()
         resumed = last is not None and last.port == port and not new
         session = last if last is not None and resumed else Session(port, secrets.token_urlsafe(32))

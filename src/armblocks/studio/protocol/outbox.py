@@ -52,7 +52,7 @@ class Outbox:
         await self._room.wait()
 
     async def send_all(self) -> None:
-        """Send all messages, also later ones, until the queue is closed; raises connection errors."""
+        """Send all messages until the queue is closed; raises connection errors."""
         try:
             while not self.closed:
                 while self._queue and not self.closed:

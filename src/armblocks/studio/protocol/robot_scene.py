@@ -48,7 +48,7 @@ class SceneJoint:
 class SceneRod:
     """A rod between the point ``first`` (3,) m in the frame of row ``first_row`` and ``second``.
 
-    The front end computes its pose: the origin is the first point, z points to the second one.
+    The front end computes its pose: the origin is the first point, z points to the second point.
     """
 
     first_row: int

@@ -56,7 +56,7 @@ class Column(Generic[Owner]):
 
 
 def number_of(value: Value) -> float:
-    """Return the number in a cell; 0 for an empty one."""
+    """Return the number in a cell; 0 for an empty cell."""
     return float(value or 0.0)
 
 

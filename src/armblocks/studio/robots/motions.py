@@ -71,7 +71,7 @@ def plan(arm: Arm, poses: Sequence[Configuration], course: Course, duration: flo
             raise InputError(
                 f"the poses '{first.name}' and '{second.name}' are the same",
                 where=where,
-                allowed="poses that differ from the one before",
+                allowed="poses that differ from the previous pose",
                 fix="remove one of them",
             )
     points = np.array([pose.q for pose in poses])

@@ -20,7 +20,7 @@ POSE_EDITS: EditTable[Robot, []] = EditTable()
 
 @POSE_EDITS.on(RecordPose, lambda edit: f"record {edit.name or 'a pose'}")
 def _record(edit: RecordPose, robot: Robot) -> Robot:
-    """Append the pose, or insert it after another one."""
+    """Append the pose, or insert it after another pose."""
     poses = list(robot.configurations.entries)
     place = _index(robot, edit.after) + 1 if edit.after else len(poses)
     name = edit.name.strip() or _free_name(robot)

@@ -123,7 +123,7 @@ class _Run:
         self.times: Array = np.empty(0)
         """Times of the rows that were sent: samples and both sides of jumps, s."""
         self.numbers: NDArray[np.intp] = np.empty(0, dtype=np.intp)
-        """For each row, the number of samples up to the one with which it was sent."""
+        """For each row, the number of samples up to the sample with which it was sent."""
         self.began = perf_counter()
 
     def run(self) -> None:

@@ -1,4 +1,4 @@
-"""The pool of worker processes: each is used once, and the next one is started in advance.
+"""The pool of worker processes: each is used once, and the next worker is started in advance.
 
 On Linux, a worker is forked from a process that has imported all modules for a run and does nothing else
 (Python's fork server): it starts within milliseconds and shares that memory. On other systems every worker

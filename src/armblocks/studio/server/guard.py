@@ -63,11 +63,11 @@ class Keys:
         self._logins: list[str] = []
 
     def secrets(self) -> tuple[str, ...]:
-        """All secrets that must not be logged, including invalid ones."""
+        """All secrets that must not be logged, including invalid secrets."""
         return (self.token, self.session, *self._logins)
 
     def new_login(self) -> str:
-        """Create a new one-time login; the previous one becomes invalid."""
+        """Create a new one-time login; the previous login becomes invalid."""
         self._login = secrets.token_urlsafe(32)
         self._logins.append(self._login)
         return self._login

@@ -130,7 +130,7 @@ class Hub:
         self._clients.discard(client)
 
     async def answer(self, client: StudioClient, text: str) -> None:
-        """Handle one request; every request with a number gets a reply, also an invalid one.
+        """Handle one request; every request with a number gets a reply, also an invalid request.
 
         A client repeats a request without a reply, so invalid requests and defects are reported in a reply.
         Raises ``InvalidRequestError`` for a text without a request number.

@@ -99,6 +99,6 @@ def _listener(port: int) -> socket.socket:
             f"port {port} cannot be used ({error.strerror})",
             where="armblocks studio",
             allowed="a free port, or 0 for any",
-            fix="choose another --port, or close the program that uses this one",
+            fix="choose another --port, or close the program that uses this port",
         ) from None
     return listener

@@ -26,7 +26,7 @@ def addition_title(edit: AddBookmark) -> str:
 
 
 def added(edit: AddBookmark, sheet: Diagram, _context: object) -> Diagram:
-    """Return the sheet with a new bookmark, or with another part of the sheet for an existing one."""
+    """Return the sheet with a new bookmark, or with another part of the sheet for an existing bookmark."""
     name = edit.name.strip()
     if edit.replace:
         _check_exists(name, sheet)

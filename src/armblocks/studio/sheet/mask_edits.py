@@ -92,7 +92,8 @@ def _masked(edit: SetMask, diagram: Diagram, resolve_robot: ResolveRobot) -> Dia
     values: dict[str, Value] = {}
     for declaration, rule in zip(edit.parameters, mask):
         before = old.get(declaration.was)
-        # A parameter with a new type takes its default; a value equal to the old default takes the new one.
+        # A parameter with a new type takes its default; a value equal to the old default becomes the new
+        # default.
         if before is None or before.kind is not rule.kind:
             continue
         if (value := diagram.mask_values[declaration.was]) != before.default:

@@ -36,7 +36,7 @@ _PathMap = Callable[[str], str | None]
 
 
 def saved(edit: SaveParameterSet, diagram: Diagram, _context: object) -> Diagram:
-    """Return the diagram with a new parameter set, or with other values of an existing one."""
+    """Return the diagram with a new parameter set, or with other values of an existing set."""
     name, sets = edit.name.strip(), diagram.parameter_sets
     if edit.replace:
         parameter_set(diagram, name)

@@ -76,7 +76,7 @@ class ContentChange(Message):
 class Open(Request[list[str]]):
     """Open a file of the project: a diagram, a robot, or a script of robots.
 
-    The reply contains the keys of the documents; the front end shows the first one.
+    The reply contains the keys of the documents; the front end shows the first document.
     """
 
     kind: Literal["open"] = "open"

@@ -15,7 +15,7 @@ class PoseEdit(RobotEdit):
 
 
 class RecordPose(PoseEdit):
-    """Append a pose, or insert it after another one. Without a name it is called P1, P2 …"""
+    """Append a pose, or insert it after another pose. Without a name it is called P1, P2 …"""
 
     kind: Literal["record_pose"] = "record_pose"
     q: Joints

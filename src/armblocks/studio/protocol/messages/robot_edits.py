@@ -33,7 +33,7 @@ class RenameLink(RobotEdit):
 
 
 class AddJoint(RobotEdit):
-    """Insert a new link after another one, or at the base if ``after`` is empty."""
+    """Insert a new link after another link, or at the base if ``after`` is empty."""
 
     kind: Literal["add_joint"] = "add_joint"
     after: str
@@ -47,7 +47,7 @@ class RemoveJoint(RobotEdit):
 
 
 class MoveJoint(RobotEdit):
-    """Exchange a link of a chain with the previous link (``by`` is -1) or with the next one (1)."""
+    """Exchange a link of a chain with the previous link (``by`` is -1) or with the next link (1)."""
 
     kind: Literal["move_joint"] = "move_joint"
     link: str
