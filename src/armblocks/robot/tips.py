@@ -12,7 +12,7 @@ from armblocks.robot.robot import Robot
 def with_tip(robot: Robot, tip: str) -> Robot:
     """The robot with the link named ``tip`` as its last link; the other links keep their order.
 
-    If the joint of that link moves, its coordinate becomes the last one in q, also in named configurations.
+    If the joint of that link moves, its coordinate becomes the last entry of q, also in named configurations.
     Raises UnknownNameError.
     """
     last = robot.link(tip)
