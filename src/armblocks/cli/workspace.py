@@ -52,7 +52,7 @@ def workspace(
     """Sample the region that the tool reaches, with maps of measures.
 
     Prints reach, bounds and volume, and the range of each measure. The samples themselves are not kept, so
-    that any number of them needs little memory.
+    that memory does not grow with their number.
 
     Exit code 0: done, 2: invalid input.
     """

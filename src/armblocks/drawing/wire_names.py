@@ -59,7 +59,7 @@ def _length(one: Point, other: Point) -> float:
 
 
 def name_marks(name: str, paths: Iterable[Sequence[Point]], obstacles: Iterable[Obstacle]) -> list[Mark]:
-    """The name of a signal; nothing without a name or a line."""
+    """The mark with the name of a signal; empty without a name or a line."""
     position = name_position(name, paths, obstacles)
     if position is None:
         return []

@@ -52,5 +52,5 @@ class Schedule(ABC):
         return new_time
 
     def next_step_length(self, proposed: Real) -> Real:
-        """The length of the step after an accepted one."""
+        """The length of the step after an accepted step."""
         return proposed

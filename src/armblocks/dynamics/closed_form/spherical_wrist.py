@@ -66,7 +66,7 @@ def arm_with_one_wrist_axis(chain: Chain) -> Solver | None:
                 more.append(angle_between(normal, SX(N @ normal), axis.direction))
             yield Branch([*angles, *more], measures)
 
-    return Solver("two parallel axes after the first one", 4, ("shoulder", "elbow"), branches)
+    return Solver("two parallel axes after the first axis", 4, ("shoulder", "elbow"), branches)
 
 
 def _parallel_arm(chain: Chain, centre: Array, y: SX) -> Iterator[tuple[list[SX], list[SX]]]:
@@ -81,7 +81,7 @@ def _parallel_arm(chain: Chain, centre: Array, y: SX) -> Iterator[tuple[list[SX]
     for s in (1.0, -1.0):
         one = shoulder.angle(s)
         x = SX(p1 + rotated(-first.direction, one, SX(y - p1)))
-        # The first angle makes the components along the axes equal; only the other components count.
+        # The first angle makes the components along the axes equal; only the other components are compared.
         target = SX(x - p2) - dot(SX(h), SX(x - p2)) * h
         elbow = distance(_flat(p2 - p3, h), _flat(centre - p3, h), third.direction, SX(dot(target, target)))
         for e in (1.0, -1.0):

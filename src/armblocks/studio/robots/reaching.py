@@ -26,7 +26,7 @@ LARGEST_STEP = 0.05
 LARGEST_TURN = 0.15
 """Largest rotation of one step, rad."""
 LARGEST_CHANGE = 0.8
-"""Change of an angle in one step, rad, from which the solution counts as one of another configuration."""
+"""Change of an angle in one step, rad, from which the solution belongs to another configuration."""
 MAX_STEPS = 400
 MAX_FAILURES = 12
 """Number of steps out of reach after which the motion ends."""
@@ -55,7 +55,7 @@ class Directions(NamedTuple):
 def followed_directions(arm: Arm) -> Directions:
     """The largest set of directions that the joints can follow independently.
 
-    Of several sets, one with all translations is preferred, then rotations in the axes of the tool, about x
+    Sets with all translations are preferred, then rotations in the axes of the tool, about x
     and y before z, because these keep the direction of the tool.
     """
     rng = np.random.default_rng(0)
@@ -85,9 +85,9 @@ def _preference(choice: tuple[tuple[int, ...], str]) -> tuple[int, int, bool, tu
 def reached(arm: Arm, q: Sequence[float], target: Sequence[float]) -> Reached:
     """The configuration nearest to the pose ``target`` (16,), row by row in the world, m.
 
-    The tool moves from its pose at ``q`` to the target in small steps. Each step is solved from the result
-    of the step before, so that the configuration (elbow, wrist) does not change. Out of
-    reach and at limits, the result is the nearest pose.
+    The tool moves from its pose at ``q`` to the target in small steps. Each step is solved from the result of
+    the previous step, so that the configuration (elbow, wrist) does not change. Out of reach and at limits,
+    the result is the nearest pose.
     """
     start = _coordinates(arm, q)
     goal = _pose(arm, target)
@@ -102,7 +102,7 @@ def reached(arm: Arm, q: Sequence[float], target: Sequence[float]) -> Reached:
         if not same_configuration(arm, present, result.q):
             why = why or "the next pose needs another configuration of the arm (elbow or wrist)"
             break
-        # Beyond its reach, the arm follows with the nearest poses.
+        # For poses out of reach, the arm takes the nearest poses.
         present = result.q
         failures += not result.success
         if failures == MAX_FAILURES:
@@ -156,7 +156,7 @@ def _angle(turn: Transform) -> float:
 
 
 def _reason(result: IkineResult) -> str:
-    """Why there is no solution, without the distance to a pose on the way."""
+    """The reason why there is no solution, without a distance."""
     if result.reason == "out of reach":
         return "out of reach"
     if result.reason == "limits":
