@@ -1,10 +1,30 @@
 import { holdKeys } from '../held_keys'
 import { freeShift } from '../model/free_place'
-import { ask, change, freeName, namesInUse, selectIfUnchanged, useStudio } from '../store'
+import { ask, change, freeName, namesInUse, refuse, selectIfUnchanged, useStudio } from '../store'
 import { GRID } from './insert'
 
 /** Displacement of pasted blocks to the right and down, px. */
 const PASTE_OFFSET = 30
+
+/** Access to the clipboard; without the permission of the browser, a notice and undefined. */
+async function withClipboard<T>(access: () => Promise<T>): Promise<T | undefined> {
+  try {
+    return await access()
+  } catch {
+    refuse({
+      what: 'the browser does not give this page access to the clipboard',
+      where: '',
+      fix: 'allow it in the settings of the browser for this page',
+    })
+    return undefined
+  }
+}
+
+const readClipboard = () => withClipboard(() => navigator.clipboard.readText())
+
+/** Write a text to the clipboard; the result is whether this was possible. */
+const writeClipboard = async (text: string): Promise<boolean> =>
+  Boolean(await withClipboard(async () => (await navigator.clipboard.writeText(text), true)))
 
 /** Blocks and notes of the sheet as the text of a diagram file; undefined if there are none. */
 async function copiedText(
@@ -58,18 +78,20 @@ async function duplicateBy(shift: number | [number, number], names?: readonly st
 }
 
 /** Copy the selection as the text of a diagram file, which can be pasted into another window or an e-mail. */
-export const copy = (): Promise<void> => holdKeys(copySelection())
+export const copy = async (): Promise<void> => void (await holdKeys(copySelection()))
 
-async function copySelection(): Promise<void> {
+/** Copy the selection; the result is whether it is in the clipboard. */
+async function copySelection(): Promise<boolean> {
   const text = await copiedText()
-  if (text) await navigator.clipboard.writeText(text)
+  return text !== undefined && writeClipboard(text)
 }
 
 export const cut = (): Promise<void> => holdKeys(cutSelection())
 
 async function cutSelection(): Promise<void> {
   const { document, selection } = useStudio.getState()
-  await copySelection()
+  // Blocks that are not in the clipboard would be lost.
+  if (!(await copySelection())) return
   const blocks = [...selection].filter((name) => document?.blocks[name])
   const notes = [...selection].filter((name) => document?.notes[name])
   if (!blocks.length && !notes.length) return
@@ -80,16 +102,16 @@ async function cutSelection(): Promise<void> {
 export const paste = (): Promise<void> => holdKeys(pasteClipboard())
 
 async function pasteClipboard(): Promise<void> {
-  const text = await navigator.clipboard.readText()
-  if (isDiagram(text)) await pasteText(text)
+  const text = await readClipboard()
+  if (text !== undefined && isDiagram(text)) await pasteText(text)
 }
 
 /** Paste with the top left corner of all blocks and notes at a point of the sheet. */
 export const pasteAt = (point: { x: number; y: number }): Promise<void> => holdKeys(pasteClipboardAt(point))
 
 async function pasteClipboardAt({ x, y }: { x: number; y: number }): Promise<void> {
-  const text = await navigator.clipboard.readText()
-  if (!isDiagram(text)) return
+  const text = await readClipboard()
+  if (text === undefined || !isDiagram(text)) return
   const { layout = {} } = JSON.parse(text) as { layout?: Record<string, { x?: number; y?: number }> }
   const positions = Object.values(layout).filter(
     (position) => position.x !== undefined && position.y !== undefined,

@@ -193,3 +193,18 @@ def test_a_click_beside_the_configuration_parameters_keeps_the_typed_values(shee
     expect(field).to_have_value("12")
     sheet.keyboard.press("Escape")
     expect(sheet.get_by_role("dialog")).to_have_count(0)
+
+
+def test_without_access_to_the_clipboard_nothing_is_cut_and_a_notice_says_why(sheet: Page) -> None:
+    sheet.evaluate("""() => {
+        const denied = () => Promise.reject(new DOMException('Read permission denied.', 'NotAllowedError'))
+        Object.assign(navigator.clipboard, { readText: denied, writeText: denied })
+    }""")
+    notice = sheet.get_by_text("the browser does not give this page access to the clipboard")
+    for key in ("Control+x", "Control+v"):
+        block(sheet, "PID").focus()
+        sheet.keyboard.press(key)
+        expect(notice).to_be_visible()
+        sheet.keyboard.press("Escape")
+        expect(block(sheet, "PID")).to_have_count(1)
+    sheet.evaluate("() => { delete navigator.clipboard.readText; delete navigator.clipboard.writeText }")
