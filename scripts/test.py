@@ -10,6 +10,7 @@ the first unfinished step is shown immediately, that of later steps is buffered.
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 import tempfile
@@ -22,6 +23,9 @@ from threading import Event
 from environment import BINARIES, ENVIRONMENT, PYTHON, ROOT, prepare, prepare_browser, print_line
 
 SOURCES = ("src", "tests", "scripts", "docs", "benchmarks", "hatch_build.py", "frontend")
+CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+TEST_PROCESSES = CORES + (CORES + 1) // 2
+"""More processes than cores: a browser test waits for its page during almost half of its time."""
 WEB_TOOL = (PYTHON, "frontend/node.py", "exec", "--offline", "--")
 
 STEPS: dict[str, tuple[str | object, ...]] = {
@@ -35,7 +39,7 @@ STEPS: dict[str, tuple[str | object, ...]] = {
     "types": (BINARIES / "pyright", "--warnings"),
     "layers": (BINARIES / "lint-imports", "--no-cache"),
     "docs": (PYTHON, "docs/build_site.py"),
-    "tests": (PYTHON, "-m", "pytest", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"),
+    "tests": (PYTHON, "-m", "pytest", f"-n{TEST_PROCESSES}", "--dist=loadfile", "--no-loadscope-reorder"),
 }
 NEEDED = {"web types": "page", "web lint": "page", "web format": "page", "web tests": "page"}
 """Steps that wait for another step: the page downloads the libraries that they use."""
