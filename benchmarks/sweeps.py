@@ -22,6 +22,7 @@ import armblocks as ab
 from armblocks import blocks
 
 RUNS, SINGLE_RUNS, PEER_RUNS, REPEATS = 10_000, 200, 30, 5
+TORQUE_RUNS = 400
 START = np.random.default_rng(0).uniform(-2, 2, (RUNS, 2))
 SETTINGS = {"stop_time": 20.0, "rtol": 1e-6, "atol": 1e-8, "solver": "rk45"}
 END = {"x": "final(x/y)", "v": "final(v/y)"}
@@ -58,6 +59,26 @@ def least_seconds(functions: dict) -> dict[str, float]:
     return least
 
 
+def computed_torque() -> None:
+    """Runs of the Puma 560 under computed torque, 10 s, each with other gains and another start."""
+    model = ab.compile_diagram(ab.load_diagram("puma560_computed_torque"))
+    vary = {"KP.gain": ab.uniform(50, 200), "KD.gain": ab.uniform(10, 40), "arm.q0[1]": ab.uniform(-0.2, 0.2)}
+    measures = {"error": "peak({angle error/y[1]})", "rms": "rms(arm/q[1])"}
+    tables = {}
+
+    def sweep(lanes: bool) -> int:
+        tables[lanes] = ab.sweep(
+            model, vary, runs=TORQUE_RUNS, measures=measures, threads=1, sample_time=0.1, lanes=lanes
+        )
+        return TORQUE_RUNS
+
+    for name, seconds in least_seconds(
+        {"in lanes": lambda: sweep(True), "one run at a time": lambda: sweep(False)}
+    ).items():
+        print(f"computed torque of the Puma, {name}: {seconds * 1e6:.0f} us a run")
+    assert all((tables[True][name] == tables[False][name]).all() for name in tables[True].names)
+
+
 def rate(t, y) -> list:
     return [y[1], (1 - y[0] ** 2) * y[1] - y[0]]
 
@@ -67,9 +88,10 @@ def main() -> None:
     model = ab.compile_diagram(van_der_pol())
     points = [{"x.initial": x, "v.initial": v} for x, v in START.tolist()]
 
-    def sweep(sample_time: float) -> int:
-        result = ab.sweep(model, points, measures=END, threads=1, sample_time=sample_time, **SETTINGS)
-        assert (result["status"] == "completed").all()
+    def sweep(sample_time: float, lanes: bool) -> int:
+        more = {**SETTINGS, "sample_time": sample_time, "lanes": lanes}
+        result = ab.sweep(model, points, measures=END, threads=1, **more)
+        assert (result["status"] == "completed").all() and not result.remark
         return RUNS
 
     def singly(sample_time: float) -> int:
@@ -89,8 +111,10 @@ def main() -> None:
 
     for name, seconds in least_seconds(
         {
-            "sweep, last sample": lambda: sweep(20.0),
-            "sweep, 1001 samples": lambda: sweep(0.02),
+            "sweep in lanes, last sample": lambda: sweep(20.0, True),
+            "sweep in lanes, 1001 samples": lambda: sweep(0.02, True),
+            "sweep, one run at a time, last sample": lambda: sweep(20.0, False),
+            "sweep, one run at a time, 1001 samples": lambda: sweep(0.02, False),
             "simulate, last sample": lambda: singly(20.0),
             "simulate, 1001 samples": lambda: singly(0.02),
             "SciPy solve_ivp RK45": by_solve_ivp,
@@ -102,6 +126,7 @@ def main() -> None:
     ours = ab.sweep(model, points[:PEER_RUNS], measures=END, **SETTINGS)
     error = np.abs(np.column_stack([ours["x"], ours["v"]]) - reference).max()
     print(f"largest difference from solve_ivp at 1e-11: {error:.1e}")
+    computed_torque()
     short, settings = short_run(), {"stop_time": 0.01, "sample_time": 0.01, "solver": "rk4", "step": 0.01}
 
     def many(runs: int, **more) -> int:

@@ -12,7 +12,7 @@ import pytest
 import armblocks as ab
 from armblocks.errors import InputError, UnknownNameError
 from armblocks.pictures.picture import Disc, Picture, Polyline, text_marks
-from armblocks.report.charts.sweep_charts import grouped_percentiles, tornado_ranges
+from armblocks.report.charts.sweep_charts import cell_medians, grouped_percentiles, tornado_ranges
 from armblocks.sweeps.sensitivity_designs import morris_values, sensitivity_points, sobol_values
 
 VARY = {"PID.P": ab.loguniform(1, 20), "x1.initial": ab.uniform(-2, 2), "damping.gain": ab.normal(0.5, 0.1)}
@@ -74,18 +74,23 @@ def test_indices_of_sweeps(tmp_path: Path) -> None:
 
 def test_pictures_of_sweeps(tmp_path: Path) -> None:
     result = ab.sweep("van_der_pol_pid", VARY, runs=40, seed=2, measures=MEASURES, keep="x1/y", **SHORT)
-    for kind in ("response", "tornado", "scatter", "parallel", "bands"):
+    for kind in ("response", "tornado", "scatter", "parallel", "map", "bands"):
         path = tmp_path / f"{kind}.svg"
         picture = result.plot(kind, save=path)
         assert isinstance(picture, Picture) and path.stat().st_size > 1000
         texts = " ".join(mark.text for mark in text_marks(picture))
-        for name in VARY if kind != "bands" else ("x1/y", "time, s"):
+        shown = {"bands": ("x1/y", "time, s"), "map": ("x1.initial",)}
+        for name in shown.get(kind, tuple(VARY)):
             assert name in texts, (kind, name)
         for mark in picture.marks:
             if isinstance(mark, Polyline):
                 assert np.isfinite(np.asarray(mark.points, dtype=float)).all(), kind
             if isinstance(mark, Disc):
                 assert 0.0 <= mark.x <= picture.width and 0.0 <= mark.y <= picture.height, kind
+    with pytest.raises(UnknownNameError, match=r"PID\.X"):
+        result.plot("tornado", parameters=["PID.X"])
+    with pytest.raises(InputError, match="a map has two parameters, and 1 varies"):
+        result.plot("map", parameters=["PID.P"])
     with pytest.raises(UnknownNameError, match="pie"):
         result.plot("pie")
     with pytest.raises(InputError, match="no samples of u/y are kept"):
@@ -111,3 +116,19 @@ def test_percentiles_along_a_parameter() -> None:
     ranges = tornado_ranges({"a": x, "b": -x, "constant": np.ones(5000)}, 2.0 * x)
     assert [entry[0] for entry in ranges] == ["a", "b"]
     assert ranges[0][1] < 0.2 < 1.8 < ranges[0][2] and ranges[1][1] > ranges[1][2]
+
+
+def test_medians_of_cells_and_further_columns() -> None:
+    x, y = np.array([0.5, 0.5, 1.5, 1.5, 0.5]), np.array([0.5, 0.5, 0.5, 1.5, np.nan])
+    edges = np.array([0.0, 1.0, 2.0])
+    medians = cell_medians(x, y, np.array([1.0, 3.0, 5.0, np.nan, 9.0]), edges, edges)
+    assert np.array_equal(medians, [[2.0, np.nan], [5.0, np.nan]], equal_nan=True)
+    result = ab.sweep("van_der_pol_pid", {"PID.P": [1.0, 2.0]}, measures=MEASURES, **SHORT)
+    more = result.with_columns({"double": 2.0 * result["peak"]})
+    assert more.measures == ("peak", "double") and more.largest("double")[0] == result.largest("peak")[0]
+    assert more.to_dataframe()["double"].tolist() == (2.0 * result["peak"]).tolist()
+    assert result.measures == ("peak",)
+    with pytest.raises(InputError, match="the column 'peak' exists"):
+        result.with_columns({"peak": [1.0, 2.0]})
+    with pytest.raises(InputError, match=r"the column 'a' has the shape \(3,\)"):
+        result.with_columns({"a": [1.0, 2.0, 3.0]})

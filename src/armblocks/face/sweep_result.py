@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from armblocks.argument_errors import ArgumentErrors
 from armblocks.equations import SimulationOptions
@@ -26,7 +27,7 @@ from armblocks.sweeps.designs import Design
 from armblocks.sweeps.files import SweepFile, to_dataframe, write_table
 from armblocks.sweeps.sensitivity_designs import MORRIS, SALTELLI
 from armblocks.sweeps.statistics import rank_correlation, wilson_interval
-from armblocks.sweeps.tables import STATUS
+from armblocks.sweeps.tables import STATUS, STEPS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -204,21 +205,61 @@ class SweepResult(metaclass=ArgumentErrors):
         return values
 
     def plot(
-        self, kind: str = "response", name: str | None = None, *, save: str | PathLike[str] | None = None
+        self,
+        kind: str = "response",
+        name: str | None = None,
+        *,
+        parameters: Sequence[str] | None = None,
+        limit: float | None = None,
+        save: str | PathLike[str] | None = None,
     ) -> Picture:
         """A picture of the table. ``name``: a column, by default the first measure.
 
         ``kind``: ``response`` (the column over each parameter, with median and bands of the percentiles 25 to
         75 and 5 to 95), ``tornado`` (medians in the runs with the lowest and the highest tenth of each
         parameter), ``scatter`` (matrix of the parameters and the column), ``parallel`` (parallel
-        coordinates; the tenth of the runs with the highest values in colour), or ``bands`` (the same
-        percentiles of a kept signal over time; ``name`` is by default the first one). ``save``: the ``.svg``
-        or ``.png`` file to write. Raises ``UnknownNameError`` and ``InputError``.
+        coordinates; the tenth of the runs with the highest values in colour), ``map`` (the column over two
+        parameters, in colours; ``limit`` draws a line around the cells above it), or ``bands`` (the same
+        percentiles of a kept signal over time; ``name`` is by default the first one). ``parameters``: by
+        default those with the strongest rank correlation. ``save``: the ``.svg`` or ``.png`` file to write.
+        Raises ``UnknownNameError`` and ``InputError``.
         """
-        picture = sweep_picture(self, kind, name)
+        picture = sweep_picture(self, kind, name, parameters, limit)
         if save is not None:
             save_picture(picture, save, "SweepResult.plot")
         return picture
+
+    def with_columns(self, columns: Mapping[str, ArrayLike]) -> SweepResult:
+        """The table with further measures, such as functions of its columns: ``{"ratio": values}`` with a
+        number for each run, ``(runs,)``.
+
+        Raises ``InputError`` for other numbers of values and for names that exist.
+        """
+        added: dict[str, Array] = {}
+        for name, values in columns.items():
+            array = np.asarray(values, dtype=np.float64)
+            if name in self.names or name in self.kept or not name:
+                raise InputError(
+                    f"the column '{name}' exists",
+                    where="SweepResult.with_columns",
+                    allowed=f"other names than {', '.join((*self.names, *self.kept))}",
+                    fix="give the column another name",
+                )
+            if array.shape != (len(self),):
+                raise InputError(
+                    f"the column '{name}' has the shape {array.shape}",
+                    where="SweepResult.with_columns",
+                    allowed=f"a number for each run, ({len(self)},)",
+                    fix="compute the column from columns of this table",
+                )
+            added[name] = array
+        place = self.names.index(STEPS)
+        return dataclasses.replace(
+            self,
+            names=(*self.names[:place], *added, *self.names[place:]),
+            measures=(*self.measures, *added),
+            columns={**self.columns, **added},
+        )
 
     def _numbers(self, name: str) -> NDArray[np.float64]:
         values = self[name]
@@ -243,9 +284,10 @@ class SweepResult(metaclass=ArgumentErrors):
         write_table(Path(path), self._all())
 
     def _all(self) -> Mapping[str, Array]:
-        if self.file is None or self.columns:
+        if self.file is None or self.columns.keys() >= set(self.names):
             return {name: self[name] for name in self.names}
-        return self.file.read(self.names)
+        stored = self.file.read([name for name in self.names if name not in self.columns])
+        return {name: self.columns[name] if name in self.columns else stored[name] for name in self.names}
 
     def __repr__(self) -> str:
         status = self[STATUS]

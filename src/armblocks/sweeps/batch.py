@@ -98,7 +98,8 @@ class RunProgram:
         self.against_lanes = ""
         """The reason why runs are not computed in lanes."""
         self.lanes = 1
-        if lanes > 1 and self.native and not python_measures:
+        # Without states there is no integration; samples are evaluated in lanes in any case.
+        if lanes > 1 and self.native and not python_measures and self.plan.tableau is not None:
             self.against_lanes = reason_against_lanes(compiled, self.plan, lanes)
             self.lanes = 1 if self.against_lanes else lanes
         if self.lanes > 1:

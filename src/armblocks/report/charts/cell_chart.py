@@ -70,7 +70,7 @@ def cell_chart(
     outline = _outline(np.isnan(values), first, second, cell)
     picture.add(Polyline(area.points(outline[:, 0], outline[:, 1]), Tone.MUTED, 0.8, sharp=True))
     picture.add(Disc(x(origin[0]), y(origin[1]), 3.6, fill=Tone.SURFACE, stroke=Tone.INK, stroke_width=1.4))
-    picture.extend(_colour_bar(area, span, beyond, unit, width))
+    picture.extend(colour_bar(area, span, beyond, unit, width))
     return picture
 
 
@@ -117,7 +117,7 @@ def _outline(empty: NDArray[np.bool_], first: _Array, second: _Array, cell: floa
     return np.array(parts, dtype=np.float64).reshape(-1, 2)
 
 
-def _colour_bar(
+def colour_bar(
     area: PlotArea, span: tuple[float, float], beyond: bool, unit: str, width: float
 ) -> list[Mark]:
     """The colours with their values, at the right of the map."""

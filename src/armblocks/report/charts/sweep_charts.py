@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.pictures.numbers import axis_number, table_number
-from armblocks.pictures.picture import Disc, Mark, Picture, Polyline, Rectangle, Text
+from armblocks.pictures.picture import Disc, Mark, Picture, Polyline, Raster, Rectangle, Text
 from armblocks.pictures.style import FIGURE_WIDTH, SMALL_SIZE, TEXT_SIZE, TITLE_SIZE, Tone
 from armblocks.pictures.text_width import shorten, text_width
 from armblocks.report.charts.axes import PlotArea, linear_area
+from armblocks.report.charts.cell_chart import colour_bar, colours
 from armblocks.report.charts.scale import padded_range
 
 _Array = NDArray[np.float64]
@@ -26,6 +27,8 @@ RUNS_OF_A_GROUP = 12
 HIGHEST = 0.1
 """The share of runs with the highest values that parallel coordinates emphasise."""
 PANEL_HEIGHT = 250.0
+CELLS = 120
+"""Maximum number of values of a parameter of which each has cells of its own."""
 
 
 def response_chart(parameters: _Columns, name: str, values: _Array) -> Picture:
@@ -193,6 +196,90 @@ def bands_chart(time: _Array, samples: _Array, name: str) -> Picture:
         picture.add(_band(area, time, percentiles[low], percentiles[high]))
     picture.add(Polyline(area.points(time, percentiles[2]), Tone.ACCENT, 2.0))
     return picture
+
+
+def map_chart(columns: _Columns, name: str, values: _Array, limit: float | None) -> Picture:
+    """The medians of a measure in cells of two parameters, in colours; a line around the cells above a
+    limit."""
+    (x_name, x), (y_name, y) = columns.items()
+    title = f"{name} over {x_name} and {y_name}"
+    picture = _picture(560.0, title if limit is None else f"{title}; the line is {table_number(limit, 4)}")
+    x_edges, y_edges = _edges(x), _edges(y)
+    cells = cell_medians(x, y, values, x_edges, y_edges)
+    box = (70.0, 54.0, FIGURE_WIDTH - 110.0, 510.0)
+    ranges = [(float(edges[0]), float(edges[-1])) for edges in (x_edges, y_edges)]
+    area = linear_area(ranges[0], ranges[1], box)
+    picture.extend(_frame(area, x_label=x_name, y_label=y_name))
+    finite = cells[np.isfinite(cells)]
+    span = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
+    # One image; the cells may have different sizes.
+    columns_of = _cells_of_pixels(x_edges, round(box[2] - box[0]))
+    rows_of = _cells_of_pixels(y_edges, round(box[3] - box[1]))[::-1]
+    pixels = colours(cells[columns_of][:, rows_of].T, span)
+    picture.add(Raster(box[0], box[1], box[2] - box[0], box[3] - box[1], np.ascontiguousarray(pixels)))
+    if limit is not None:
+        picture.extend(_limit_line(area, cells > limit, np.isfinite(cells), x_edges, y_edges))
+    picture.extend(colour_bar(area, span, False, "", FIGURE_WIDTH))
+    return picture
+
+
+def cell_medians(x: _Array, y: _Array, values: _Array, x_edges: _Array, y_edges: _Array) -> _Array:
+    """The median of the finite values in each cell ``(nx, ny)``; NaN in cells without values."""
+    valid = np.isfinite(x) & np.isfinite(y) & np.isfinite(values)
+    places = [
+        np.clip(np.searchsorted(edges, c[valid], side="right") - 1, 0, len(edges) - 2)
+        for edges, c in ((x_edges, x), (y_edges, y))
+    ]
+    shape = (len(x_edges) - 1, len(y_edges) - 1)
+    cell = np.ravel_multi_index((places[0], places[1]), shape)
+    order = np.lexsort((values[valid], cell))
+    sorted_values, sorted_cells = values[valid][order], cell[order]
+    found, first, counts = np.unique(sorted_cells, return_index=True, return_counts=True)
+    medians = np.full(shape[0] * shape[1], np.nan)
+    low, high = sorted_values[first + (counts - 1) // 2], sorted_values[first + counts // 2]
+    medians[found] = 0.5 * (low + high)
+    return medians.reshape(shape)
+
+
+def _edges(values: _Array) -> _Array:
+    """The edges of cells: around each value of a grid, else at equal distances."""
+    finite = values[np.isfinite(values)]
+    levels = np.unique(finite)
+    if 2 <= levels.size <= CELLS:
+        inner = 0.5 * (levels[1:] + levels[:-1])
+        return np.concatenate(
+            [[1.5 * levels[0] - 0.5 * levels[1]], inner, [1.5 * levels[-1] - 0.5 * levels[-2]]]
+        )
+    count = max(2, min(24, round(np.sqrt(finite.size / RUNS_OF_A_GROUP))))
+    low, high = padded_range(finite, 0.0)
+    return np.linspace(low, high, count + 1)
+
+
+def _cells_of_pixels(edges: _Array, count: int) -> NDArray[np.intp]:
+    """The cell in which the centre of each of ``count`` pixels is."""
+    low, high = float(edges[0]), float(edges[-1])
+    centres: _Array = low + (np.arange(count) + 0.5) / count * (high - low)
+    cells: NDArray[np.intp] = np.searchsorted(edges, centres, side="right") - 1
+    return np.clip(cells, 0, len(edges) - 2)
+
+
+def _limit_line(
+    area: PlotArea, above: NDArray[np.bool_], known: NDArray[np.bool_], x_edges: _Array, y_edges: _Array
+) -> list[Mark]:
+    """The edges between cells below and above the limit."""
+    marks: list[Mark] = []
+    for axis in (0, 1):
+        first, second = (np.take(above, range(k, above.shape[axis] - 1 + k), axis) for k in (0, 1))
+        both = [np.take(known, range(k, known.shape[axis] - 1 + k), axis) for k in (0, 1)]
+        for i, j in zip(*np.nonzero((first != second) & both[0] & both[1])):
+            if axis == 0:
+                at = area.x_scale(float(x_edges[i + 1]))
+                ends = [(at, area.y_scale(float(edge))) for edge in y_edges[j : j + 2]]
+            else:
+                at = area.y_scale(float(y_edges[j + 1]))
+                ends = [(area.x_scale(float(edge)), at) for edge in x_edges[i : i + 2]]
+            marks.append(Polyline(ends, Tone.INK, 2.0))
+    return marks
 
 
 def _picture(height: float, title: str) -> Picture:
