@@ -37,9 +37,10 @@ def collisions(
 
     Bodies are the base, the links and the ``obstacles`` (:class:`Box`, :class:`Sphere`, :class:`Cylinder`,
     :class:`Plane`). Each shape in the file of a link is replaced by its convex hull. A link without shapes
-    has the castings of its drawing. ``motion``: a trajectory, or configurations (nq,) or (N, nq), of which
-    only these are checked. Bodies touch where their distance is at most ``margin`` (m). The hull of a mesh
-    with more than 120 vertices may be too small: it has only those extreme in 120 directions.
+    has the castings of its drawing. The bars of ``Rod`` constraints are not bodies. ``motion``: a trajectory,
+    or configurations (nq,) or (N, nq), of which only these are checked. Bodies touch where their distance is
+    at most ``margin`` (m). The hull of a mesh with more than 120 vertices may be too small: it has only those
+    extreme in 120 directions.
 
     Four kinds of pairs are not compared: links that a joint or a closure connects, the base and an obstacle,
     pairs that touch in almost all configurations (such as the links of a wrist), and the pairs of names in
