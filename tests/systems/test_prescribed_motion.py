@@ -22,6 +22,7 @@ from armblocks.blocks import (
 from armblocks.diagram import Block
 from armblocks.dynamics import (
     trace_accel,
+    trace_constrained_motion,
     trace_hybrid_dynamics,
     trace_hybrid_dynamics_loaded,
     trace_rne,
@@ -178,6 +179,21 @@ def test_an_arm_whose_joints_are_all_prescribed_needs_no_mass() -> None:
     q, qd, qdd, drive = (result[f"arm/{name}"] for name in ("q", "qd", "qdd", "drive"))
     assert qd[:, 0] == pytest.approx(0.3 * np.cos(result.time), abs=1e-15)
     assert drive == pytest.approx(ab.Arm(robot).rne(q, qd, qdd), abs=1e-12)
+
+
+def test_a_mechanism_with_as_many_drives_as_freedom_may_have_links_without_mass() -> None:
+    """The coupler alone has a mass; the accelerations follow from the loop, the torque from rne."""
+    loop = four_bar().with_link("rocker", mass=0.0, inertia=np.zeros((3, 3)))
+    robot, q = driven(loop, "crank"), loop.neutral
+    qd = Mechanism(loop).consistent_speeds(q, np.array([1.5, 0.0, 0.0]), ("crank",))
+    qdd, tau = trace_hybrid_dynamics(robot)(q, qd, np.zeros(3), np.array([0.7, 0.0, 0.0]))
+    assert trace_rne(robot)(q, qd, qdd)[0] == pytest.approx(tau, abs=1e-10)
+    heavy, _ = trace_hybrid_dynamics(driven(four_bar(), "crank"))(
+        q, qd, np.zeros(3), np.array([0.7, 0.0, 0.0])
+    )
+    assert qdd == pytest.approx(heavy, abs=1e-10)
+    with pytest.raises(RobotError, match="joint 'rocker' has no inertia to accelerate"):
+        trace_constrained_motion(loop)
 
 
 @pytest.mark.parametrize(

@@ -66,8 +66,8 @@ def driven_motion(
     The other entries of ``tau`` and ``qdd`` are not read. The state is the consistent one nearest to ``q``,
     ``qd`` with the given coordinates and speeds of the prescribed joints; it is NaN if ``q`` is too far from
     the constraints. ``near``: see :func:`independent_relations`; ``newton_steps``: see
-    :func:`consistent_state`. Raises RobotError for prescribed joints that
-    depend on each other, and for free joints without inertia.
+    :func:`consistent_state`. Raises RobotError for prescribed joints that depend on each other, and for free
+    joints without inertia, unless the constraints determine their motion.
     """
     prescribed = entries_of(robot, robot.prescribed_joints).speeds
     free = entries_of(robot, robot.prescribed_joints, others=True).speeds
@@ -81,19 +81,17 @@ def driven_motion(
     resistance = equations.bias + friction
     given = qdd[prescribed]
     force = tau[free] - resistance[free] - mtimes(M[free, prescribed], given)
-    solve = symmetric_solver(M[free, free])
-    x = SX(vertcat(*solve(entries(force))))
-    multipliers = SX(0, 1)
-    if J.shape[0]:
+    multipliers, count = SX(0, 1), J.shape[0]
+    if count and count == len(free) and not _all_have_inertia(robot, payload is not None):
+        # The constraints determine the motion of the free joints, also if these are without inertia.
         J_free = J[:, free]
-        responses = [SX(vertcat(*solve(entries(J_free[i, :].T)))) for i in range(J.shape[0])]
-        A = SX(J.shape[0], J.shape[0])
-        for k, response in enumerate(responses):
-            A[:, k] = mtimes(J_free, response)
-        rates_to_reach = -equations.J_bias - mtimes(J[:, prescribed], given) - mtimes(J_free, x)
-        multipliers = SX(vertcat(*symmetric_solver(A)(entries(rates_to_reach))))
-        for k, response in enumerate(responses):
-            x = x + multipliers[k] * response
+        by_constraints = symmetric_solver(mtimes(J_free, J_free.T))
+        rates_to_reach = -equations.J_bias - mtimes(J[:, prescribed], given)
+        x = SX(mtimes(J_free.T, vertcat(*by_constraints(entries(rates_to_reach)))))
+        forces = mtimes(M[free, free], x) - force
+        multipliers = SX(vertcat(*by_constraints(entries(mtimes(J_free, forces)))))
+    else:
+        x, multipliers = _free_motion(equations, prescribed, free, force, given)
     result = SX(robot.nv, 1)
     result[prescribed], result[free] = given, x
     torques = SX(tau)
@@ -102,6 +100,27 @@ def driven_motion(
         needed = needed - mtimes(J.T, multipliers)
     torques[prescribed] = needed[prescribed]
     return DrivenMotion(q, qd, result, torques)
+
+
+def _free_motion(
+    equations: MechanismEquations, prescribed: list[int], free: list[int], force: SX, given: SX
+) -> tuple[SX, SX]:
+    """The accelerations of the free joints under ``force``, and the multipliers of the closures."""
+    M, J = equations.M, equations.J
+    solve = symmetric_solver(M[free, free])
+    x = SX(vertcat(*solve(entries(force))))
+    if not J.shape[0]:
+        return x, SX(0, 1)
+    J_free = J[:, free]
+    responses = [SX(vertcat(*solve(entries(J_free[i, :].T)))) for i in range(J.shape[0])]
+    A = SX(J.shape[0], J.shape[0])
+    for k, response in enumerate(responses):
+        A[:, k] = mtimes(J_free, response)
+    rates_to_reach = -equations.J_bias - mtimes(J[:, prescribed], given) - mtimes(J_free, x)
+    multipliers = SX(vertcat(*symmetric_solver(A)(entries(rates_to_reach))))
+    for k, response in enumerate(responses):
+        x = x + multipliers[k] * response
+    return x, multipliers
 
 
 def with_prescribed_joints(robot: Robot, joints: Sequence[str]) -> Robot:
@@ -123,17 +142,33 @@ def check_drives(robot: Robot, near: Array | None, *, with_payload: bool = False
     ``with_payload``: whether a payload may give the inertia.
     """
     free = entries_of(robot, robot.prescribed_joints, others=True).speeds
-    _check_independent(robot, free, near)
+    relations = independent_relations(robot, near)
+    _check_independent(robot, free, relations, near)
+    if len(free) > len(relations):
+        check_accelerations_exist(*_accelerated(robot, with_payload))
+
+
+def _accelerated(robot: Robot, with_payload: bool) -> tuple[KinematicTree, list[int]]:
+    """The tree, perhaps with a payload, and its speeds that the free joints move."""
+    free = entries_of(robot, robot.prescribed_joints, others=True).speeds
     moves = robot.coordinate_map.speeds[:, free].any(axis=1)
     tree = regrouped(KinematicTree.of(robot))
-    if with_payload:
-        tree = carrying(tree, GENERIC_PAYLOAD)
-    check_accelerations_exist(tree, np.flatnonzero(moves).tolist())
+    return carrying(tree, GENERIC_PAYLOAD) if with_payload else tree, np.flatnonzero(moves).tolist()
 
 
-def _check_independent(robot: Robot, free: Sequence[int], near: Array | None) -> None:
+def _all_have_inertia(robot: Robot, with_payload: bool) -> bool:
+    """Whether forces determine the accelerations of all free joints without the closures."""
+    try:
+        check_accelerations_exist(*_accelerated(robot, with_payload))
+    except RobotError:
+        return False
+    return True
+
+
+def _check_independent(
+    robot: Robot, free: Sequence[int], relations: Sequence[int], near: Array | None
+) -> None:
     """Raise RobotError unless the speeds of the free joints follow from any speeds of the prescribed ones."""
-    relations = list(independent_relations(robot, near))
     if not relations:
         return
     where = f"robot '{robot.name}'"
@@ -147,7 +182,7 @@ def _check_independent(robot: Robot, free: Sequence[int], near: Array | None) ->
             allowed="at most as many as the mechanism has; the constraints determine all others",
             fix="prescribe fewer joints",
         )
-    J = mechanism(robot).balanced(assembled_coordinates(robot, near))[relations]
+    J = mechanism(robot).balanced(assembled_coordinates(robot, near))[list(relations)]
     s = np.linalg.svd(J[:, free], compute_uv=False)
     if int(np.sum(s > RANK_TOLERANCE * s.max(initial=0.0))) < len(relations):
         raise RobotError(

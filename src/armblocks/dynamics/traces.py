@@ -318,9 +318,11 @@ def trace_constrained_motion(robot: Robot, near: Array | None = None) -> TracedF
 
     Outputs: ``q (nq,)``, ``qd (n,)``, ``qdd (n,)``; ``q_rates (nq,)``, ``qd_rates (n,)``: see
     :func:`armblocks.dynamics.constrained.restoring_rates`. ``near``: coordinates near which the constraints
-    are assembled to find the independent relations.
+    are assembled to find the independent relations. Raises RobotError that names the joint if the inertia at
+    a joint is zero.
     """
     tree = KinematicTree.of(robot)
+    check_accelerations_exist(regrouped(tree))
 
     def equations(q: SX, qd: SX, tau: SX) -> tuple[SX, ...]:
         motion = constrained_motion(robot, tree, q, qd, tau, near=near)
