@@ -39,7 +39,7 @@ PART_SECONDS, PART_RUNS = 5.0, 100_000
 PROGRESS_SECONDS = 0.1
 LANE_RUNS = 500
 """Number of runs of a model from which on they are computed in lanes by default. The compilation of the code
-takes some seconds for a large model, once."""
+takes some tenths of a second, once."""
 VERSION = "1"
 """Version of the computation; files of another version are not continued."""
 
