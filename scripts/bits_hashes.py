@@ -109,6 +109,7 @@ def robots() -> Numbers:
     import armblocks as ab
     from armblocks import dynamics
     from armblocks.compiler import compile_function
+    from armblocks.errors import RobotError
 
     base = ab.modified_dh("base", alpha=0.4, theta=0.9).before
     oblique = ab.Robot(
@@ -136,8 +137,8 @@ def robots() -> Numbers:
         for name in sorted(name for name in dir(dynamics) if name.startswith("trace_")):
             try:
                 traced = getattr(dynamics, name)(robot)
-            except TypeError:
-                continue  # this function has other arguments than a robot
+            except (TypeError, RobotError):
+                continue  # this function has other arguments than a robot, or needs prescribed motions
             if not hasattr(traced, "casadi_function"):
                 continue
             kernel = compile_function(traced)
