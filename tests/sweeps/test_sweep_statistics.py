@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pickle
 from pathlib import Path
 from typing import Any
@@ -89,6 +90,11 @@ def test_pictures_of_sweeps(tmp_path: Path) -> None:
                 assert 0.0 <= mark.x <= picture.width and 0.0 <= mark.y <= picture.height, kind
     with pytest.raises(UnknownNameError, match=r"PID\.X"):
         result.plot("tornado", parameters=["PID.X"])
+    names = np.array(["one", "two"] * 20, dtype=object)
+    named = dataclasses.replace(result, columns={**result.columns, "PID.P": names})
+    assert named.plot("response").marks  # texts are omitted
+    with pytest.raises(InputError, match=r"the parameter 'PID\.P' has no numbers"):
+        named.plot("response", parameters=["PID.P"])
     with pytest.raises(InputError, match="a map has two parameters, and 1 varies"):
         result.plot("map", parameters=["PID.P"])
     with pytest.raises(UnknownNameError, match="pie"):

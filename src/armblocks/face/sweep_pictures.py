@@ -106,6 +106,13 @@ def _chosen(result: SweepTable, name: str, most: int, given: Sequence[str] | Non
         for parameter in given:
             if parameter not in known:
                 raise UnknownNameError("parameter", parameter, known, where="SweepResult.plot")
+            if result[parameter].dtype == object:
+                raise InputError(
+                    f"the parameter '{parameter}' has no numbers",
+                    where="SweepResult.plot",
+                    allowed="parameters with numbers",
+                    fix="choose another parameter",
+                )
         chosen = [parameter for parameter in given if np.ptp(result[parameter]) > 0.0]
     else:
         correlations = result.correlations(name)
