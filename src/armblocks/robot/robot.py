@@ -174,17 +174,17 @@ class Robot(metaclass=ArgumentErrors):
         """The letters of the joint types in the order of q, as in ``RRRRRR``."""
         return "".join(joint.letter for joint in self.joints)
 
-    @property
+    @cached_property
     def positions(self) -> tuple[Coordinate, ...]:
         """The entries of q: ``arm`` for the only coordinate of joint arm, ``ball.qw`` for one of several."""
         return tuple(_of_link(link, entry) for link in self.moving_links for entry in link.joint.positions)
 
-    @property
+    @cached_property
     def speeds(self) -> tuple[Coordinate, ...]:
         """The entries of qd, qdd and tau with the names of their joints and the units of their integrals."""
         return tuple(_of_link(link, entry) for link in self.moving_links for entry in link.joint.speeds)
 
-    @property
+    @cached_property
     def position_of_speed(self) -> tuple[int | None, ...]:
         """For each entry of qd the index in q of the coordinate whose rate it is; None for ball joints."""
         indices: list[int | None] = []
