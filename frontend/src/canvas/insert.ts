@@ -24,6 +24,9 @@ interface Insertion {
   name?: string
 }
 
+/** Names of new blocks that the sheet does not show yet. */
+const awaitedNames = new Set<string>()
+
 /** Add a new block of a type with its centre at a point, and select it; the result is its name. */
 export async function insertBlock(
   type: string,
@@ -33,7 +36,8 @@ export async function insertBlock(
   const { document, library, selection } = useStudio.getState()
   const blockType = library.get(type)
   if (!document || !blockType) return undefined
-  const name = freeName((preferredName ?? blockType.title).replace(/[/.]/g, ' '), namesInUse())
+  const preferred = (preferredName ?? blockType.title).replace(/[/.]/g, ' ')
+  const name = freeName(preferred, [...namesInUse(), ...awaitedNames])
   const inputY = wireY === undefined ? undefined : leftInputY(blockType)
   const fraction = !connectTo ? 0.5 : connectTo.isOutput ? 0 : 1
   const place: Place = {
@@ -42,6 +46,7 @@ export async function insertBlock(
   }
   const [input, output] = [blockType.inputs[0], blockType.outputs[0]]
   const splitsWire = wire && input && output
+  awaitedNames.add(name)
   const version = await change({
     kind: 'add',
     blocks: [{ name, type, place, parameters }],
@@ -58,7 +63,7 @@ export async function insertBlock(
           ]
         : [],
     instead: splitsWire ? [wire] : [],
-  })
+  }).finally(() => awaitedNames.delete(name))
   if (version === undefined) return undefined
   selectIfUnchanged(selection, [name])
   if (reveal) sheetView.reveal?.({ ...place, width: blockType.width, height: blockType.height })
