@@ -178,6 +178,10 @@ def wrong_parameters() -> Iterator[tuple[Callable[[], Block], str]]:
         r"position_target is 1 for all coordinates, among them",
     )
     yield lambda: SphericalJoint(position_target=(0.0,) * 4), r"position_target has a quaternion of zeros"
+    yield (
+        lambda: RevoluteJoint(lower_limit=1.0, upper_limit=-1.0),
+        r"the lower limit 1.0 is above the upper limit -1.0",
+    )
     yield lambda: SphericalJoint(upper_limit=1.0), r"upper_limit limits a rotation vector"
 
 

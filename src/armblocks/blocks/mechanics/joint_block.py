@@ -148,6 +148,13 @@ class JointBlock(Block):
                     allowed=f"one number, or {count}: {', '.join(self._names(rule.name))}",
                     fix="give one number for each coordinate of the joint",
                 )
+        if np.any(np.asarray(self.lower_limit) > np.asarray(self.upper_limit)):
+            raise InputError(
+                f"the lower limit {self.lower_limit} is above the upper limit {self.upper_limit}",
+                where=f"{self.type_name()}.lower_limit",
+                allowed="a lower limit below the upper limit",
+                fix="exchange the two limits",
+            )
         if part.nq != part.nv:
             self._check_ball_values(part)
 
