@@ -65,7 +65,7 @@ class _Gathered:
         """Add the blocks of a mechanism. Raises ``DiagramError``."""
         self._check_inertia(drawn)
         start = start_of(self.net, drawn)
-        plant = Mechanism(mechanism=drawn, near=tuple(start.q.tolist()))
+        plant = Mechanism(mechanism=drawn, robot=drawn.robot, near=tuple(start.q.tolist()))
         self.blocks[world] = plant
         for joint in drawn.joints:
             self._add_joint(world, drawn, joint.path, start)

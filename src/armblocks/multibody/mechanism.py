@@ -46,12 +46,8 @@ class Mechanism(Block):
     mechanism: DrawnMechanism = parameter(
         kind=ParameterKind.DIAGRAM, of_type=DrawnMechanism, doc="the robot, its joints and force elements"
     )
+    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot of the mechanism")
     near: tuple[float, ...] = parameter((), kind=ParameterKind.DIAGRAM, doc="assembled coordinates (nq,)")
-
-    @property
-    def robot(self) -> Robot:
-        """The robot of the mechanism."""
-        return self.mechanism.robot
 
     # -- ports
 
@@ -83,7 +79,19 @@ class Mechanism(Block):
             ports.append(_port(element.path, "motion", KINEMATICS_SIZE * count))
             if element.part.accelerations:
                 ports.append(_port(element.path, "acceleration", ACCELERATION_SIZE * count))
-        return tuple(ports)
+        return (*ports, *self._joint_ports())
+
+    def _joint_ports(self) -> tuple[Port, ...]:
+        """The coordinates, speeds and accelerations of all joints, from which reports draw the motion."""
+        robot = self.robot
+        positions = tuple(entry.name for entry in robot.positions)
+        speeds = tuple(entry.name for entry in robot.speeds)
+        ports = (
+            Port("q", "coordinates of all joints", "", (robot.nq,), positions),
+            Port("qd", "speeds of all joints", "", (robot.nv,), speeds),
+            Port("qdd", "accelerations of all joints", "", (robot.nv,), speeds),
+        )
+        return ports if self.mechanism.animated else ()
 
     def _has_coordinates(self, joint: PlacedJoint) -> bool:
         return bool(self.robot.closures) or joint.part.nq != joint.part.nv
@@ -114,7 +122,7 @@ class Mechanism(Block):
             _, q_rates, qd_rates = equations.rates(q, qd, (consistent_q, consistent_qd), qdd)
         else:
             q_rates, qd_rates = SX(vertcat(*position_rates(robot, entries(q), entries(qd)))), qdd
-        values: dict[str, SX] = {}
+        values: dict[str, SX] = {"q": consistent_q, "qd": consistent_qd, "qdd": qdd}
         for joint in self.mechanism.joints:
             positions, speeds = _positions(joint), _speeds(joint)
             of_joint = {
@@ -137,7 +145,8 @@ class Mechanism(Block):
         if not self.mechanism.animated:
             return {}
         equations = drawn_motion(self.robot, self.near)
-        frames = equations.frames(*self._consistent(*self._state(u)))
+        q, qd = self._consistent(*self._state(u))
+        frames = equations.frames(q, qd)
         places = [Frame(body=BASE, pose=Transform()), *equations.tree.links, equations.tree.tool]
         return {"poses": SX(vertcat(*(frames.pose(place).matrix() for place in places)))}
 
