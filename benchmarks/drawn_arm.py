@@ -2,8 +2,8 @@
 
     ARMBLOCKS_EFFORT=full python benchmarks/drawn_arm.py
 
-5 s of free motion of the UR5 without motors, RK4 with 5000 steps, without compilation. The runs alternate; the
-least time of sixty counts.
+5 s of free motion of the UR5 without motors, RK4 with 5000 steps, without compilation. The runs alternate;
+the least time of sixty counts.
 """
 
 # pyright: basic
