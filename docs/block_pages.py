@@ -185,6 +185,10 @@ def port_table(block: Block) -> list[str]:
         for side, ports in sides
         for port in ports
     ]
+    rows += [
+        (f"`{port.name}`", "frame", "", "", prose(port.doc))
+        for port in block.frame_ports()
+    ]
     return (
         ["## Ports", "", *table(("port", "side", "shape", "unit", "meaning"), rows)]
         if rows

@@ -121,6 +121,12 @@ def _show(console: Console, kind: type[Block]) -> None:
     console.print(Text.assemble((kind.type_name(), STRONG), f"  ({kind.title}; {BLOCKS.family_of(kind)})"))
     for line in _paragraphs(inspect.cleandoc(kind.__doc__ or "")):
         console.print(line)
+    if frames := block.frame_ports():
+        rows = table(("frame ports", "left"), ("description", "left"))
+        for frame in frames:
+            rows.add_row(frame.name, frame.doc)
+        console.print()
+        console.print(rows)
     for title, ports in (
         ("inputs", block.input_ports()),
         ("outputs", block.output_ports()),
