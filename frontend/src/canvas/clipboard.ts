@@ -1,7 +1,8 @@
 import { holdKeys } from '../held_keys'
-import { freeShift } from '../model/free_place'
+import { freeShift, shiftIntoView } from '../model/free_place'
 import { ask, change, freeName, namesInUse, refuse, selectIfUnchanged, useStudio } from '../store'
 import { GRID } from './insert'
+import { sheetView } from './sheet_actions'
 
 /** Displacement of pasted blocks to the right and down, px. */
 const PASTE_OFFSET = 30
@@ -61,7 +62,18 @@ async function pasteText(text: string, offset: number | [number, number] = PASTE
     ...Object.values(document.blocks).map(({ place }) => place),
     ...Object.values(document.notes),
   ]
-  const shift = typeof offset === 'number' ? freeShift(Object.values(layout), places, offset) : offset
+  const view = sheetView.visible?.()
+  const areas = Object.values(document.blocks).map(({ place, width, height }) => ({
+    ...place,
+    width,
+    height,
+  }))
+  const shift =
+    typeof offset !== 'number'
+      ? offset
+      : // On another sheet, or after the view was moved, the places of the originals may be out of view.
+        ((view && shiftIntoView(Object.values(layout), view, areas, GRID)) ??
+        freeShift(Object.values(layout), places, offset))
   if ((await change({ kind: 'paste', text, names, shift })) !== undefined)
     selectIfUnchanged(selection, Object.values(names))
 }

@@ -76,3 +76,34 @@ export function freeShift(copies: readonly Spot[], places: readonly Spot[], step
   while (collides(shift)) shift += step
   return shift
 }
+
+/** The size that is assumed for blocks whose size is not known, px. */
+const USUAL_SIZE = { width: 70, height: 50 }
+
+/**
+ * The shift, a multiple of `grid`, that brings copies to a free place in the visible part; `null` if one of
+ * them is visible without a shift.
+ */
+export function shiftIntoView(
+  copies: readonly Spot[],
+  view: Rectangle,
+  blocks: readonly Rectangle[],
+  grid: number,
+): [number, number] | null {
+  const spots = copies.filter((copy): copy is { x: number; y: number } => (copy.x ?? copy.y) !== undefined)
+  const isVisible = ({ x, y }: { x: number; y: number }) =>
+    x + USUAL_SIZE.width > view.x &&
+    x < view.x + view.width &&
+    y + USUAL_SIZE.height > view.y &&
+    y < view.y + view.height
+  if (!spots.length || spots.some(isVisible)) return null
+  const [xs, ys] = [spots.map(({ x }) => x), spots.map(({ y }) => y)]
+  const [left, top] = [Math.min(...xs), Math.min(...ys)]
+  const size = {
+    width: Math.max(...xs) - left + USUAL_SIZE.width,
+    height: Math.max(...ys) - top + USUAL_SIZE.height,
+  }
+  const place = freeInView(size, view, blocks)
+  const onGrid = (distance: number) => grid * Math.round(distance / grid)
+  return [onGrid(place.x - left), onGrid(place.y - top)]
+}
