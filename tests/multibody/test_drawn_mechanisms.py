@@ -239,6 +239,12 @@ def test_stiffness_damping_and_targets_are_tuned_without_a_new_trace() -> None:
     tuned = ab.simulate(diagram, stop_time=1.0, parameters=values)
     rebuilt = ab.simulate(with_parameters(diagram, values), stop_time=1.0)
     np.testing.assert_array_equal(tuned["hinge/q"], rebuilt["hinge/q"])
+    run = ab.begin(diagram)
+    run.advance(0.2)
+    run.set("hinge.damping_coefficient", 2.0)
+    run.advance(0.4)
+    unset = pendulum(position_target=0.7, position_priority="none").build()
+    assert started(unset)[0]["hinge/q"] == 0.0
 
 
 def test_files_copies_and_differences_keep_frame_lines() -> None:

@@ -9,6 +9,7 @@ from casadi import SX, vertcat
 
 from armblocks.diagram import Block, Parameter, ParameterKind, Port, Signals, parameter
 from armblocks.diagram.parameter import Value
+from armblocks.multibody.joint_states import structure_of
 from armblocks.multibody.mechanism import ACCELERATION_SIZE, KINEMATICS_SIZE
 from armblocks.multibody.parts import ForceLaw, ForcePart, FrameMotion
 from armblocks.spatial.vectors import ZERO, Vector
@@ -33,6 +34,8 @@ class ElementLoads(Block):
         return self.element.inputs_of_the_run()
 
     def parameter_value(self, name: str) -> Value:
+        if name == "element":  # tunable parameters do not change the equations
+            return structure_of(self.element)
         own = {rule.name for rule in self.parameters()}
         return getattr(self, name) if name in own else self.element.parameter_value(name)
 

@@ -23,7 +23,7 @@ from armblocks.multibody.element_states import ElementLoads
 from armblocks.multibody.frames import frames_of_parts, networks
 from armblocks.multibody.joint_states import JointStates
 from armblocks.multibody.mechanism import Mechanism, port_of
-from armblocks.multibody.parts import Part
+from armblocks.multibody.parts import JointPart, Part, Targets
 from armblocks.multibody.start import Start, drawn_start, start_of
 from armblocks.robot.tree import KinematicTree
 
@@ -65,7 +65,9 @@ class _Gathered:
         """Add the blocks of a mechanism. Raises ``DiagramError``."""
         self._check_inertia(drawn)
         start = start_of(self.net, drawn)
-        plant = Mechanism(mechanism=drawn, robot=drawn.robot, near=tuple(start.q.tolist()))
+        closed = bool(drawn.robot.closures)
+        near = tuple(start.q.tolist()) if closed else ()
+        plant = Mechanism(mechanism=_without_targets(drawn), robot=drawn.robot, near=near)
         self.blocks[world] = plant
         for joint in drawn.joints:
             self._add_joint(world, drawn, joint.path, start)
@@ -84,7 +86,7 @@ class _Gathered:
         q, qd = drawn_start(joint, start)
         states = JointStates(
             joint=self.net.blocks[path],
-            place=joint.part,
+            place=joint.part if closed else _with_tunable_targets(joint.part),
             closed=closed,
             start_q=q if closed else (),
             start_qd=qd if closed else (),
@@ -132,6 +134,22 @@ class _Gathered:
                 allowed="mass, and for a rotation inertia, beyond every joint",
                 fix="add a solid to a frame beyond the joint, or replace the joint by a Weld Joint",
             ) from error
+
+
+def _without_targets(drawn: DrawnMechanism) -> DrawnMechanism:
+    """The mechanism without the targets of its joints, on which its equations do not depend."""
+    none = Targets(q=(), qd=())
+    joints = (
+        dataclasses.replace(joint, part=dataclasses.replace(joint.part, targets=none))
+        for joint in drawn.joints
+    )
+    return dataclasses.replace(drawn, joints=tuple(joints))
+
+
+def _with_tunable_targets(part: JointPart) -> JointPart:
+    """The part of a joint outside of loops: its targets are parameters, except the coordinates of balls."""
+    q = part.targets.q if part.nq != part.nv else (0.0,) * part.nq
+    return dataclasses.replace(part, targets=dataclasses.replace(part.targets, q=q, qd=(0.0,) * part.nv))
 
 
 def _check_always_active(net: Netlist, path: str) -> None:

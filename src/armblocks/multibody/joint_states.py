@@ -111,6 +111,8 @@ class JointStates(Block):
         return tuple(rule for rule in self.joint.inputs_of_the_run() if rule.name not in without)
 
     def parameter_value(self, name: str) -> Value:
+        if name == "joint":  # tunable parameters do not change the equations
+            return structure_of(self.joint)
         own = {rule.name for rule in self.parameters()}
         return getattr(self, name) if name in own else self.joint.parameter_value(name)
 
@@ -228,6 +230,12 @@ class JointStates(Block):
             parts += entries if isinstance(motion, AxisMotion) else list(rotation_vector(entries))
             first += count
         return SX(vertcat(*parts))
+
+
+def structure_of(block: Block) -> Value:
+    """The type of a drawn block, and the values of its parameters that are not tunable."""
+    rules = block.structure_of_the_run()
+    return (block.type_name(), *(block.parameter_value(rule.name) for rule in rules))
 
 
 def _wide(value: SX, size: int) -> SX:

@@ -234,9 +234,14 @@ class JointBlock(Block):
         part = self._part_without_targets()
         q = np.asarray(self.position_target, dtype=float)
         neutral = np.array([value for motion in part.motions for value in motion.neutral])
+        qd = np.broadcast_to(np.asarray(self.velocity_target, dtype=float), (part.nv,))
+        if self.position_priority == "none":
+            q = np.zeros(())
+        if self.velocity_priority == "none":
+            qd = np.zeros(part.nv)
         targets = Targets(
             q=tuple((neutral + q if q.shape == () else q).tolist()),
-            qd=tuple(np.broadcast_to(np.asarray(self.velocity_target, dtype=float), (part.nv,)).tolist()),
+            qd=tuple(qd.tolist()),
             position_priority=self.position_priority,
             velocity_priority=self.velocity_priority,
         )
