@@ -37,15 +37,15 @@ PICTURED = """() => new Promise((done) => {
     pane.dispatchEvent(new WheelEvent('wheel', { deltaX: 8, bubbles: true, cancelable: true }))
     const canvas = document.querySelector('.motion-picture canvas')
     const [box, panel] = [canvas, pane].map((element) => element.getBoundingClientRect())
-    const numbers = (text) => text.match(/-?[\\d.]+(e-?\\d+)?/g).map(Number)
-    const view = numbers(document.querySelector('.react-flow__viewport').style.transform)
+    const matrix = (element) => new DOMMatrix(element.style.transform)
+    const { a: zoom, e, f } = matrix(document.querySelector('.react-flow__viewport'))
     const scale = canvas.width / box.width
     const missing = []
     let count = 0
     for (const node of document.querySelectorAll('.react-flow__node')) {
-        const [x, y] = numbers(node.style.transform)
+        const { e: x, f: y } = matrix(node)
         const [width, height] = [parseFloat(node.style.width), parseFloat(node.style.height)]
-        const at = [x + width / 2, y + height / 2].map((value, k) => view[2] * value + view[k])
+        const at = [e + zoom * (x + width / 2), f + zoom * (y + height / 2)]
         if (at[0] < 0 || at[1] < 0 || at[0] > panel.width || at[1] > panel.height) continue
         count++
         const spot = [at[0] + panel.x - box.x, at[1] + panel.y - box.y].map((value) => scale * value)
@@ -223,4 +223,4 @@ def test_the_map_shows_and_moves_the_view(large: Page) -> None:
     sheet_map.click(position={"x": box["width"] / 2, "y": box["height"] / 2})
     rest(large)
     centre = middle(frame)
-    assert centre == pytest.approx(middle(sheet_map), abs=2)
+    assert centre == pytest.approx(middle(sheet_map), abs=2.5)
