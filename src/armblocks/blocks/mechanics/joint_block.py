@@ -232,16 +232,19 @@ class JointBlock(Block):
 
     def part(self) -> JointPart:
         part = self._part_without_targets()
-        q = np.asarray(self.position_target, dtype=float)
         neutral = np.array([value for motion in part.motions for value in motion.neutral])
-        qd = np.broadcast_to(np.asarray(self.velocity_target, dtype=float), (part.nv,))
-        if self.position_priority == "none":
-            q = np.zeros(())
-        if self.velocity_priority == "none":
-            qd = np.zeros(part.nv)
+        given = np.asarray(self.position_target, dtype=float)
+        start = given if given.shape and self.position_priority != "none" else neutral
+        if not given.shape and self.position_priority != "none":
+            start = neutral + given
+        qd = np.zeros(part.nv)
+        if self.velocity_priority != "none":
+            qd = qd + np.asarray(self.velocity_target, dtype=float)
+        q_entries: list[float] = start.tolist()
+        qd_entries: list[float] = qd.tolist()
         targets = Targets(
-            q=tuple((neutral + q if q.shape == () else q).tolist()),
-            qd=tuple(qd.tolist()),
+            q=tuple(q_entries),
+            qd=tuple(qd_entries),
             position_priority=self.position_priority,
             velocity_priority=self.velocity_priority,
         )
