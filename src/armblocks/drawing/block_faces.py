@@ -128,10 +128,11 @@ def face(block: Block, area: FaceArea, trend: Trend | None, *, flipped: bool = F
             return display(area, block.inputs, trend)
         case kinds.StopSimulation():
             return stop_marks(area)
-        case (
-            kinds.RobotPlot() | kinds.Fkine() | kinds.ForwardDynamics() | kinds.ArmPlant()
-            | kinds.PositionDrivenArm() | kinds.AccelerationDrivenArm()
-        ):  # fmt: skip
+        case kinds.PositionDrivenArm():
+            return _robot(area, block.robot, "given q")
+        case kinds.AccelerationDrivenArm():
+            return _robot(area, block.robot, "given qdd")
+        case kinds.RobotPlot() | kinds.Fkine() | kinds.ForwardDynamics() | kinds.ArmPlant():
             caption = "" if isinstance(block, kinds.RobotPlot) else block.title
             return _robot(area, block.robot, caption)
         case _:

@@ -197,7 +197,7 @@ class AccelerationDrivenArm(DrivenArm):
     ``joints``. Use PositionDrivenArm for given positions.
     """
 
-    title: ClassVar[str] = "Arm with Prescribed Accelerations"
+    title: ClassVar[str] = "Acceleration-Driven Arm"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The first joint of a double pendulum is shaken; the second joint swings freely.",
         parameters={"joints": "link1", "q0": (0.0, 0.0)},
@@ -237,7 +237,7 @@ class PositionDrivenArm(DrivenArm):
     constraint and the gap. See AccelerationDrivenArm for the prescribed joints.
     """
 
-    title: ClassVar[str] = "Arm with Prescribed Positions"
+    title: ClassVar[str] = "Position-Driven Arm"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The first joint of a double pendulum follows a sine; the second joint swings freely.",
         parameters={"joints": "link1"},
