@@ -667,6 +667,7 @@ export interface IgnoreFileChange {
  */
 export interface AskMotion {
   document: string;
+  poses?: string[] | null;
   course: "joint" | "line" | "spline";
   duration?: number | null;
   kind: "motion";
@@ -676,6 +677,7 @@ export interface AskMotion {
  */
 export interface AskMotionRows {
   document: string;
+  poses?: string[] | null;
   course: "joint" | "line" | "spline";
   duration?: number | null;
   kind: "motion_rows";
@@ -918,6 +920,7 @@ export interface Save {
  */
 export interface SaveMotion {
   document: string;
+  poses?: string[] | null;
   course: "joint" | "line" | "spline";
   duration?: number | null;
   kind: "save_motion";

@@ -44,9 +44,9 @@ def test_the_tool_is_dragged_four_poses_are_recorded_and_the_motion_runs(page: P
     editor.get_by_text("Teach", exact=True).click()
     tool, poses, motion = (editor.get_by_role("region", name=name) for name in ("Tool", "Poses", "Motion"))
     record = poses.get_by_role("button", name="Record")
-    for name in ("qz", "qr", "qs", "qn"):  # the named configurations of the robot
-        poses.get_by_role("button", name=f"Delete {name}").click()
-    expect(poses.get_by_role("listitem")).to_have_count(0)
+    # The motion omits the named configurations of the robot.
+    expect(poses.get_by_role("listitem")).to_have_count(4)
+    expect(motion.get_by_role("button", name="Run")).to_be_disabled()
     for joint, angle in ((2, 60), (3, -165), (5, 45)):
         editor.get_by_role("textbox", name=f"q of link{joint} as a number").fill(str(angle))
     x, z = (tool.get_by_role("textbox", name=f"{axis} of the tool", exact=True) for axis in "xz")
@@ -71,7 +71,7 @@ def test_the_tool_is_dragged_four_poses_are_recorded_and_the_motion_runs(page: P
     x.press("Enter")
     expect(x).to_have_value("0.4500")
     record.click()
-    expect(poses.get_by_role("listitem")).to_have_count(4)
+    expect(poses.get_by_role("listitem")).to_have_count(8)
     z.fill("9")
     z.press("Enter")
     expect(tool.get_by_role("list", name="Limits of the tool")).to_contain_text(
@@ -84,9 +84,9 @@ def test_the_tool_is_dragged_four_poses_are_recorded_and_the_motion_runs(page: P
     name.press("Enter")
     expect(poses.get_by_role("button", name="Go to place")).to_be_visible()
     poses.get_by_role("button", name="Delete P2").click()
-    expect(poses.get_by_role("listitem")).to_have_count(3)
+    expect(poses.get_by_role("listitem")).to_have_count(7)
     page.keyboard.press("Control+z")
-    expect(poses.get_by_role("listitem")).to_have_count(4)
+    expect(poses.get_by_role("listitem")).to_have_count(8)
     poses.get_by_role("button", name="Go to place").click()
     expect(x).to_have_value("0.4500")
 
@@ -104,6 +104,10 @@ def test_the_tool_is_dragged_four_poses_are_recorded_and_the_motion_runs(page: P
     )
     assert heads == numbers  # the robot has no limits, so there are no shares beside the numbers
     assert len(heads) == 3
+    poses.get_by_role("checkbox", name="Motion passes P3").uncheck()
+    expect(peaks).to_have_count(0)  # the motion no longer passes the selected poses
+    motion.get_by_role("button", name="Run").click()
+    expect(peaks).to_be_visible()
     time = motion.get_by_role("slider", name="Time of the motion")
     time.press("Home")
     expect(editor.get_by_role("textbox", name="q of link2 as a number")).to_have_value("60")

@@ -108,7 +108,7 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
     to_block = {"document": document, "inside": [], "block": "PID"}
     q = {"q": [0.0] * 6, "qd": [0.0] * 6, "qdd": [0.0] * 6}
     content = base64.b64encode(write_robot(load_robot("kr180"))).decode()
-    motion = {"document": robot, "course": "joint", "duration": 1.0}
+    motion = {"document": robot, "poses": ["P1", "P2"], "course": "joint", "duration": 1.0}
     cell = {"kind": "cell", "link": "link1", "column": "a", "text": "1", "angles": "deg"}
     return [
         {"kind": "open", "path": "arm.json"},

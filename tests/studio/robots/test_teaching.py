@@ -361,10 +361,10 @@ def test_poses_are_taught_and_the_motion_is_saved_and_inserted(tmp_path: Path) -
             await client.ask("change", document=key, key=str(q), edit={"kind": "record_pose", "q": q})
         shown = client.shown()
         assert [pose["name"] for pose in shown["poses"]] == ["qz", "qr", "qs", "qn", "P1", "P2"]
-        for name in ("qz", "qr", "qs", "qn"):
-            await client.ask("change", document=key, key=name, edit={"kind": "remove_pose", "name": name})
         assert shown["undo"] == "record a pose"
-        choice = {"document": key, "course": "line", "duration": 2.0}
+        choice = {"document": key, "poses": ["P2", "P1"], "course": "line", "duration": 2.0}
+        refused = await client.refused("motion", **{**choice, "poses": ["P1", "P3"]})
+        assert "there is no recorded pose named 'P3'" in refused
         motion = await client.ask("motion", **choice)
         assert motion["via"] == [0.0, 2.0]
         rows = await client.ask("motion_rows", **choice)
@@ -390,7 +390,7 @@ def test_poses_are_taught_and_the_motion_is_saved_and_inserted(tmp_path: Path) -
 
     run_scenario(tmp_path, scenario)
     again = KIND.from_file((tmp_path / "taught.json").read_bytes(), tmp_path / "taught.json")
-    assert list(again.configurations) == ["P1", "P2"]
+    assert list(again.configurations) == ["qz", "qr", "qs", "qn", "P1", "P2"]
 
 
 def test_a_motion_that_waits_for_another_request_is_that_of_the_present_robot(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import {
   playMotion,
   runMotion,
   showTime,
+  usePassedPoses,
   useTeaching,
   type Course,
   type ShownMotion,
@@ -22,9 +23,9 @@ const COURSES = [
   { value: 'spline', label: 'Spline' },
 ]
 
-/** The motion through the recorded poses: its kind and duration, playback, peaks, file and block. */
+/** The motion through the selected poses: its kind and duration, playback, peaks, file and block. */
 export function MotionSection() {
-  const count = useRobotEditor((s) => (s.current ? (s.robots[s.current]?.poses.length ?? 0) : 0))
+  const count = usePassedPoses().length
   const { course, duration, fault, motion } = useTeaching()
   return (
     <section aria-label="Motion">
@@ -51,7 +52,9 @@ export function MotionSection() {
           Run
         </Button>
       </div>
-      {count < 2 && <p className="hint">A motion needs two recorded poses.</p>}
+      {count < 2 && (
+        <p className="hint">A motion needs two poses: record them, or select them in the list.</p>
+      )}
       {fault && (
         <p className="warnings" role="alert">
           <IconAlertTriangle size={14} aria-hidden /> {fault}

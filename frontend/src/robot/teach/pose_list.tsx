@@ -1,4 +1,4 @@
-import { Button, Tooltip } from '@mantine/core'
+import { Button, Checkbox, Tooltip } from '@mantine/core'
 import {
   IconArrowDown,
   IconArrowUp,
@@ -8,11 +8,12 @@ import {
 } from '@tabler/icons-react'
 import { useRef, useState } from 'react'
 import { edit, useRobotEditor, type OpenRobot } from '../editor/state'
-import { goTo, recordPose, updatePose } from './state'
+import { goTo, passPose, recordPose, renamePose, updatePose, usePassedPoses } from './state'
 
 /** The recorded poses in the order of the motion. */
 export function PoseList() {
   const robot = useRobotEditor((s) => (s.current ? s.robots[s.current] : undefined))
+  const passed = usePassedPoses()
   if (!robot) return null
   const { poses } = robot
   return (
@@ -26,7 +27,13 @@ export function PoseList() {
       {poses.length === 0 && <p className="hint">Move the arm, and record its poses in their order.</p>}
       <ol className="poses" aria-label="Recorded poses">
         {poses.map((pose, k) => (
-          <PoseRow key={pose.name} pose={pose} place={k} count={poses.length} />
+          <PoseRow
+            key={pose.name}
+            pose={pose}
+            isPassed={passed.includes(pose.name)}
+            place={k}
+            count={poses.length}
+          />
         ))}
       </ol>
     </section>
@@ -35,11 +42,12 @@ export function PoseList() {
 
 interface PoseRowProps {
   pose: OpenRobot['poses'][number]
+  isPassed: boolean
   place: number
   count: number
 }
 
-function PoseRow({ pose: { name, q }, place, count }: PoseRowProps) {
+function PoseRow({ pose: { name, q }, isPassed, place, count }: PoseRowProps) {
   const move = (by: number) => void edit({ kind: 'move_pose', name, by })
   const onKeyDown = (event: React.KeyboardEvent) => {
     if (!event.altKey || (event.key !== 'ArrowUp' && event.key !== 'ArrowDown')) return
@@ -49,6 +57,13 @@ function PoseRow({ pose: { name, q }, place, count }: PoseRowProps) {
   }
   return (
     <li onKeyDown={onKeyDown}>
+      <Checkbox
+        size="xs"
+        aria-label={`Motion passes ${name}`}
+        title={`Motion passes ${name}`}
+        checked={isPassed}
+        onChange={(event) => passPose(name, event.currentTarget.checked)}
+      />
       <PoseName name={name} />
       <RowButton label={`Go to ${name}`} icon={IconPlayerSkipForward} onClick={() => goTo(q)} />
       <RowButton label={`Update ${name}`} icon={IconRefresh} onClick={() => updatePose(name)} />
@@ -80,7 +95,7 @@ function PoseName({ name }: { name: string }) {
       setTyped(null)
       return
     }
-    const fault = await edit({ kind: 'rename_pose', name, to })
+    const fault = await renamePose(name, to)
     setRefusal(fault?.what ?? '')
     if (!fault) setTyped(null)
   }

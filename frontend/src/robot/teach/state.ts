@@ -6,7 +6,7 @@ import { unpackedFloats } from '../../model/packed'
 import { moved, type Axes, type PoseMatrix } from '../../model/tool_pose'
 import type { PlannedMotion } from '../../protocol'
 import { ask, connection } from '../../store'
-import { edit, setJoints, setJointsWithPoses, useRobotEditor } from '../editor/state'
+import { edit, setJoints, setJointsWithPoses, useRobotEditor, type OpenRobot } from '../editor/state'
 
 export type Course = 'joint' | 'line' | 'spline'
 
@@ -29,6 +29,8 @@ interface Teaching {
   why: string
   /** The directions that the joints cannot follow. */
   missing: string[]
+  /** Names of poses that the motion omits, by the keys of the documents. */
+  omitted: Record<string, string[]>
   course: Course
   /** The typed duration, s; empty for the least duration. */
   duration: string
@@ -50,6 +52,7 @@ export const useTeaching = create<Teaching>(() => ({
   turn: Math.PI / 36,
   why: '',
   missing: [],
+  omitted: {},
   course: 'joint',
   duration: '',
   motion: null,
@@ -74,9 +77,21 @@ function isShown(document: string, version: number): boolean {
   return current === document && robots[document]?.state.version === version
 }
 
+/** The motion omits the named configurations with which a shipped robot is opened. */
+function omitPublishedPoses(): void {
+  const { robots, current } = useRobotEditor.getState()
+  const robot = current ? robots[current] : undefined
+  const { omitted } = useTeaching.getState()
+  if (!current || !robot || omitted[current]) return
+  const names = robot.state.path === null ? robot.poses.map(({ name }) => name) : []
+  useTeaching.setState({ omitted: { ...omitted, [current]: names } })
+}
+omitPublishedPoses() // the robot is shown before this part of the page is loaded
+
 /** A motion or a workspace belongs to one version of one robot. */
 useRobotEditor.subscribe(({ robots, current }, before) => {
   if (robots === before.robots && current === before.current) return
+  omitPublishedPoses()
   const version = current ? robots[current]?.state.version : undefined
   const isPresent = (one: { document: string; version: number } | null) =>
     one?.document === current && one?.version === version
@@ -151,6 +166,40 @@ export function goTo(q: number[]): void {
   setJoints({ q: [...q] })
 }
 
+/** Rename a pose; the motion passes or omits it as before. */
+export async function renamePose(name: string, to: string): Promise<Refusal | undefined> {
+  const document = shownRobot()?.document
+  const fault = await edit({ kind: 'rename_pose', name, to })
+  const { omitted } = useTeaching.getState()
+  const names = document && omitted[document]
+  if (!fault && names)
+    useTeaching.setState({
+      omitted: { ...omitted, [document]: names.map((one) => (one === name ? to : one)) },
+    })
+  return fault
+}
+
+/** Let the motion pass or omit a pose; the present motion no longer applies. */
+export function passPose(name: string, isPassed: boolean): void {
+  const document = shownRobot()?.document
+  if (!document) return
+  const { omitted } = useTeaching.getState()
+  const others = (omitted[document] ?? []).filter((one) => one !== name)
+  useTeaching.setState({ omitted: { ...omitted, [document]: isPassed ? others : [...others, name] } })
+  chooseMotion({})
+}
+
+/** Names of the poses that the motion passes, in their order. */
+export function usePassedPoses(): string[] {
+  const robot = useRobotEditor((s) => (s.current ? s.robots[s.current] : undefined))
+  const omitted = useTeaching((s) => robot && s.omitted[robot.state.document])
+  return robot ? passed(robot, omitted) : []
+}
+
+function passed(robot: OpenRobot, omitted: string[] = []): string[] {
+  return robot.poses.map(({ name }) => name).filter((name) => !omitted.includes(name))
+}
+
 // -- the motion --------------------------------------------------------------------------------------------
 
 /** The typed duration: null for the least one, undefined if it is not valid. */
@@ -169,7 +218,9 @@ function motionChoice() {
     useTeaching.setState({ fault: 'The duration is not a number of seconds from 0.001 to 3600.' })
     return undefined
   }
-  return { document: shown.document, course: useTeaching.getState().course, duration }
+  const { course, omitted } = useTeaching.getState()
+  const { document, robot } = shown
+  return { document, poses: passed(robot, omitted[document]), course, duration }
 }
 
 /** Choose the course or the duration; the present motion no longer applies. */
@@ -177,16 +228,17 @@ export function chooseMotion(choice: Partial<Pick<Teaching, 'course' | 'duration
   useTeaching.setState({ ...choice, motion: null, playing: false, fault: '', time: 0 })
 }
 
-/** Plan the motion through the recorded poses and play it. */
+/** Plan the motion through the chosen poses and play it. */
 export async function runMotion(): Promise<void> {
   const shown = shownRobot()
   const choice = motionChoice()
   if (!shown || !choice) return
   const { version } = shown.robot.state
-  const { course, duration } = useTeaching.getState()
+  const { course, duration, omitted } = useTeaching.getState()
   const isCurrent = () => {
-    const teaching = useTeaching.getState()
-    return isShown(shown.document, version) && teaching.course === course && teaching.duration === duration
+    const now = useTeaching.getState()
+    const isChosen = now.course === course && now.duration === duration && now.omitted === omitted
+    return isChosen && isShown(shown.document, version)
   }
   try {
     const motion = await connection.ask({ kind: 'motion', ...choice })

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from armblocks.errors import FormatError
+from armblocks.errors import FormatError, UnknownNameError
 from armblocks.face.arm import Arm
 from armblocks.robot import Configuration
 from armblocks.studio.documents.project_folder import ProjectFolder, check_file_name
 from armblocks.studio.protocol.answers import Answers
 from armblocks.studio.protocol.clients import StudioClient
 from armblocks.studio.protocol.messages import teaching as teaching_messages
-from armblocks.studio.robots.motions import plan, planned_motion, workspace
+from armblocks.studio.robots.motions import Plan, plan, planned_motion, workspace
 from armblocks.studio.robots.open_robots import OpenRobots
 from armblocks.studio.robots.reaching import reached
 
@@ -44,13 +44,13 @@ class TeachingRequests:
     ) -> teaching_messages.PlannedMotion:
         return await self._computed(
             request.document,
-            lambda arm, poses: planned_motion(arm, plan(arm, poses, request.course, request.duration)),
+            lambda arm, poses: planned_motion(arm, _plan(arm, poses, request)),
         )
 
     async def _rows(self, _: StudioClient, request: teaching_messages.AskMotionRows) -> list[list[float]]:
         return await self._computed(
             request.document,
-            lambda arm, poses: plan(arm, poses, request.course, request.duration).trajectory.rows().tolist(),
+            lambda arm, poses: _plan(arm, poses, request).trajectory.rows().tolist(),
         )
 
     async def _save(self, _: StudioClient, request: teaching_messages.SaveMotion) -> str:
@@ -65,7 +65,7 @@ class TeachingRequests:
             )
         await self._computed(
             request.document,
-            lambda arm, poses: plan(arm, poses, request.course, request.duration).trajectory.save(path),
+            lambda arm, poses: _plan(arm, poses, request).trajectory.save(path),
         )
         return request.path
 
@@ -79,3 +79,14 @@ class TeachingRequests:
         open_file = self._robots[document]
         async with open_file.reading:  # concurrent requests compile the arm only once
             return await asyncio.to_thread(compute, open_file.arm, open_file.robot.configurations.entries)
+
+
+def _plan(arm: Arm, poses: tuple[Configuration, ...], request: teaching_messages.MotionRequest[Any]) -> Plan:
+    """The requested motion. Raises UnknownNameError for the name of a pose that is not recorded."""
+    if request.poses is not None:
+        unknown = sorted({*request.poses} - {pose.name for pose in poses})
+        if unknown:
+            names = [pose.name for pose in poses]
+            raise UnknownNameError("recorded pose", unknown[0], names, where=f"robot '{arm.name}'")
+        poses = tuple(pose for pose in poses if pose.name in request.poses)
+    return plan(arm, poses, request.course, request.duration)

@@ -89,12 +89,14 @@ class AskReach(TeachingRequest[Reached]):
 
 
 class MotionRequest(TeachingRequest[ReplyT], Generic[ReplyT]):
-    """A request about a motion through all recorded poses of a robot.
+    """A request about a motion through recorded poses of a robot.
 
-    ``course``: joint motions or straight lines of the tool, with a stop at each pose, or a spline in joint
-    space without stops. ``duration`` s; ``None``: the least duration under the limits of speed and torque.
+    ``poses``: their names; the order is that of the robot, and ``None`` means all poses. ``course``: joint
+    motions or straight lines of the tool, with a stop at each pose, or a spline in joint space without stops.
+    ``duration`` s; ``None``: the least duration under the limits of speed and torque.
     """
 
+    poses: list[str] | None = Field(default=None, max_length=10_000)
     course: Literal["joint", "line", "spline"]
     duration: Duration | None = None
 
