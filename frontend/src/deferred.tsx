@@ -11,12 +11,15 @@ const loaders: (() => Promise<unknown>)[] = []
  * A part of the front end that is not in the first download. It is fetched when the front end has shown
  * its document and is idle, or earlier if it is needed. Until then, `placeholder` is displayed in its place.
  */
-export function deferred(load: () => Promise<ComponentType>, placeholder = ''): ComponentType {
+export function deferred<Props extends object>(
+  load: () => Promise<ComponentType<Props>>,
+  placeholder = '',
+): ComponentType<Props> {
   const Part = lazy(() => load().then((part) => ({ default: part })))
   loaders.push(load)
-  return memo(() => (
+  return memo((props: Props) => (
     <Suspense fallback={placeholder && <p className="empty">{placeholder}</p>}>
-      <Part />
+      <Part {...props} />
     </Suspense>
   ))
 }

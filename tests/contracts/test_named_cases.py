@@ -242,7 +242,7 @@ IMPLAUSIBLE_ROBOTS: list[tuple[dict[str, Any], str]] = [
     ({"joint": joint_with_limits(-180.0, 180.0)}, "link 'bar': the joint turns from -180 to 180 rad"),
     ({"length": 450.0}, "the reach is 450 m. Are its lengths in millimetres?"),
     ({"joint": joint_with_limits(0.0, 800.0, Prismatic)}, "Are its lengths in millimetres?"),
-    ({"inertia": (0.0, 1e5, 1e5)}, "that of 1 kg at a distance of 316.228 m, while the robot reaches 1 m"),
+    ({"inertia": (0.0, 1e5, 1e5)}, "belongs to 1 kg at a distance of 316.228 m, while the robot reaches 1 m"),
     (
         {"gravity": (0.0, 0.0, 9.81)},
         "so that bodies fall upwards. Does it have the sign of the Robotics Toolbox?",

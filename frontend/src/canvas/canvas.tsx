@@ -17,7 +17,6 @@ import { showDialog } from '../dialogs'
 import type { Edit } from '../messages'
 import type { Places } from '../model/wires'
 import type { OuterComment } from '../protocol'
-import { WireValues } from '../run/wire_values'
 import { alteration, ask, openSheet, useStudio } from '../store'
 import { sheetKey } from '../documents/document_views'
 import { selectedBlocks } from './arranging'
@@ -41,6 +40,7 @@ import { Welcome } from './welcome'
 import { WireEdge, type WireEdgeType } from './wire_edge'
 
 const ArrangeBar = deferred(async () => (await import('./arrange_bar')).ArrangeBar)
+const WireValues = deferred(async () => (await import('../run/wire_values')).WireValues)
 const LargeSheet = deferred(async () => (await import('./large_sheet')).LargeSheet)
 const nodeTypes = { block: BlockNode, note: NoteNode }
 const edgeTypes = { wire: WireEdge }

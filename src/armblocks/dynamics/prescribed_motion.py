@@ -31,7 +31,7 @@ from armblocks.dynamics.lockable_joints import GENERIC_PAYLOAD
 from armblocks.dynamics.lockable_mechanism import MechanismEquations, consistent_state
 from armblocks.dynamics.mechanism import RANK_TOLERANCE, Array, mechanism
 from armblocks.dynamics.reduction import generalised_forces, tree_speeds
-from armblocks.dynamics.robot_trace import robot_inputs
+from armblocks.dynamics.robot_trace import check_moves, robot_inputs
 from armblocks.equations import Signature, TracedFunction
 from armblocks.errors import RobotError, counted
 from armblocks.robot.constraints import PrescribedMotion
@@ -215,6 +215,7 @@ def trace_hybrid_dynamics_loaded(robot: Robot, near: Array | None = None) -> Tra
 
 
 def _hybrid_dynamics(robot: Robot, inputs: Sequence[str], near: Array | None) -> TracedFunction:
+    check_moves(robot, "hybrid_dynamics")
     check_prescribes(robot)
 
     def equations(q: SX, qd: SX, tau: SX, qdd: SX, *loads: SX) -> tuple[SX, SX]:

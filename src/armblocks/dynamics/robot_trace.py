@@ -30,6 +30,16 @@ def robot_trace(
 
     ``more``: inputs after the named ones, which do not depend on the choice of coordinates.
     """
+    check_moves(robot, name)
+    if robot.couplings and of_tree:
+        names = (*inputs, *(slot.name for slot in more))
+        equations = in_independent_coordinates(robot.coordinate_map, names, output[0], equations)
+    slots = Signature((*robot_inputs(robot, inputs), *more))
+    return TracedFunction.trace(name, slots, signature(output), equations)
+
+
+def check_moves(robot: Robot, name: str) -> None:
+    """Raise RobotError for a robot without moving joints, which has no function ``name``."""
     if robot.n == 0:
         raise RobotError(
             f"no joint moves, so there is no {name}",
@@ -37,11 +47,6 @@ def robot_trace(
             allowed="at least one joint that is not fixed",
             fix="give the robot a joint that moves",
         )
-    if robot.couplings and of_tree:
-        names = (*inputs, *(slot.name for slot in more))
-        equations = in_independent_coordinates(robot.coordinate_map, names, output[0], equations)
-    slots = Signature((*robot_inputs(robot, inputs), *more))
-    return TracedFunction.trace(name, slots, signature(output), equations)
 
 
 def robot_inputs(robot: Robot, names: Sequence[str]) -> Signature:
