@@ -25,6 +25,8 @@ interface Teaching {
   /** Steps of the keys and buttons, m and rad. */
   step: number
   turn: number
+  /** Whether the tool is on the way to a target. */
+  moving: boolean
   /** Why the tool did not reach its last target; empty if it did. */
   why: string
   /** The directions that the joints cannot follow. */
@@ -50,6 +52,7 @@ export const useTeaching = create<Teaching>(() => ({
   axes: 'world',
   step: 0.01,
   turn: Math.PI / 36,
+  moving: false,
   why: '',
   missing: [],
   omitted: {},
@@ -103,16 +106,19 @@ useRobotEditor.subscribe(({ robots, current }, before) => {
 
 // -- the tool ----------------------------------------------------------------------------------------------
 
+/** The next pose to be requested. */
 let target: PoseMatrix | null = null
-let busy = false
+/** The pose of the tool that was requested last, or reached with the coordinates `q`. */
+let latest: { pose: PoseMatrix; q: number[] | null } | null = null
 
 /** Move the tool toward a pose. While a request is pending, only the latest of the later poses is sent. */
 export function dragTo(pose: PoseMatrix): void {
   target = pose
+  latest = { pose, q: null }
   pausePlayback()
-  if (busy) return
-  busy = true
-  void follow()
+  if (useTeaching.getState().moving) return
+  useTeaching.setState({ moving: true })
+  void follow().finally(() => useTeaching.setState({ moving: false }))
 }
 
 async function follow(): Promise<void> {
@@ -130,19 +136,24 @@ async function follow(): Promise<void> {
       })
       if (useRobotEditor.getState().current !== shown.document) break
       setJointsWithPoses({ q: reply.q }, reply.poses)
+      if (!target) latest = { pose: reply.tool, q: reply.q }
       useTeaching.setState({ why: reply.why, missing: reply.missing })
     } catch (error) {
       if (!(error instanceof Refusal)) throw error
       useTeaching.setState({ why: error.what })
     }
   }
-  busy = false
 }
 
-/** Move or turn the tool by one step in a direction (see `moved`). */
+/**
+ * Move or turn the tool by one step in a direction (see `moved`). `tool`: its displayed pose, which may be older
+ * than the latest movement.
+ */
 export function jog(tool: PoseMatrix, direction: number, sign: number): void {
-  const { axes, step, turn } = useTeaching.getState()
-  dragTo(moved(target ?? tool, direction, sign * (direction < 3 ? step : turn), axes))
+  const { axes, step, turn, moving } = useTeaching.getState()
+  const isLatest = latest && (moving || latest.q === shownRobot()?.q)
+  const start = latest && isLatest ? latest.pose : tool
+  dragTo(moved(start, direction, sign * (direction < 3 ? step : turn), axes))
 }
 
 // -- poses -------------------------------------------------------------------------------------------------

@@ -23,11 +23,12 @@ const TURNS = [0.5, 1, 5, 15, 45].map((turn) => ({ value: String(turn), label: `
 /** The pose of the tool: typed, moved in steps, or dragged by the handle in the view of the arm. */
 export function ToolSection() {
   const tool = useRobotEditor((s) => s.readings?.pose)
-  const { handle, axes, step, turn } = useTeaching()
+  const reading = useRobotEditor((s) => s.reading)
+  const { handle, axes, step, turn, moving } = useTeaching()
   if (!tool) return <p className="empty">Compiling the arm …</p>
   const T = tool.flat()
   return (
-    <section aria-label="Tool">
+    <section aria-label="Tool" aria-busy={moving || reading}>
       <h3>Tool</h3>
       <div className="row">
         <SegmentedControl
