@@ -146,8 +146,8 @@ async function follow(): Promise<void> {
 }
 
 /**
- * Move or turn the tool by one step in a direction (see `moved`). `tool`: its displayed pose, which may be older
- * than the latest movement.
+ * Move or turn the tool by one step in a direction (see `moved`).
+ * `tool`: its displayed pose, which may be older than the latest movement.
  */
 export function jog(tool: PoseMatrix, direction: number, sign: number): void {
   const { axes, step, turn, moving } = useTeaching.getState()
