@@ -143,6 +143,8 @@ class Trigger(_ControlBlock):
         side, previous = self.arrays["x:side"][0], self.arrays["x:previous"][0]
         rises, falls = side == 1.0 and previous == 0.0, side == 0.0 and previous == 1.0
         fires = {"rising": rises, "falling": falls, "either": rises or falls}[self.block.edge]
+        # Signals that become consistent at the start have no edges.
+        fires = fires and self.arrays["t"][0] > 0.0
         outer_restarts = bool(self.u("outer_restart", 0.0))
         fires = fires and bool(self.u("outer")) and not outer_restarts and not self.was_restarted
         values = {

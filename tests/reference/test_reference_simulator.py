@@ -50,6 +50,21 @@ def test_a_relay_keeps_its_mode_within_the_hysteresis() -> None:
     np.testing.assert_allclose(result["b2/y"], hours, atol=1e-10)
 
 
+def test_a_signal_that_becomes_consistent_at_the_start_does_not_trigger() -> None:
+    """The integrator starts at its external initial value 1, not at the parameter -1: no edge rises."""
+    inside = DiagramBuilder("passing")
+    inside.add("y", bl.Outport(port=1, initial=0.5), inside.add("u", bl.Inport(port=1)))
+    builder = DiagramBuilder("start")
+    one = builder.add("one", bl.Constant(value=1.0))
+    integrator = bl.ResettableIntegrator(initial_condition_source="external", initial=-1.0)
+    edge = builder.add("integrator", integrator, one, one, one)
+    triggered = bl.TriggeredSubsystem(diagram=inside.build())
+    builder.add("triggered", triggered, builder.add("minus", bl.Constant(value=-1.0)), edge)
+    diagram = builder.build()
+    np.testing.assert_array_equal(run_reference(diagram, TIMES)["triggered/y/y"], 0.5)
+    np.testing.assert_array_equal(ab.simulate(diagram, stop_time=2.0)["triggered/y/y"], 0.5)
+
+
 def test_a_ball_bounces() -> None:
     """A fall from 1 m with e = 0.5: the intervals between bounces form a geometric series."""
     builder = DiagramBuilder("ball")
