@@ -39,12 +39,11 @@ export function MotionPicture({ motion, bounds }: { motion: SheetMotion; bounds:
       edges: flow.getEdges(),
       names: placedNames(),
     }))
-    const stop = motion.onView(() => motion.isMoving && picture.show(motion.view, motion.count))
-    const element = motion.sheet
-    element?.classList.add('pictured')
+    const stop = motion.onView(() => motion.isPictured && picture.show(motion.view, motion.count))
+    motion.hasPicture = true
     return () => {
       stop()
-      element?.classList.remove('pictured')
+      motion.hasPicture = false
     }
   }, [motion, flow, bounds, isUsed])
   return (

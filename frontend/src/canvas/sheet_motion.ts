@@ -49,6 +49,14 @@ function redirect(event: MouseEvent): void {
   target.dispatchEvent(new (event.constructor as typeof MouseEvent)(event.type, event))
 }
 
+/** Return the focus to an element; listeners do not treat this as a focus that the user has moved. */
+function refocus(element: HTMLOrSVGElement): void {
+  const stop = (event: FocusEvent) => event.stopImmediatePropagation()
+  addEventListener('focusin', stop, true)
+  element.focus({ preventScroll: true })
+  removeEventListener('focusin', stop, true)
+}
+
 /**
  * The view of a sheet. While a large sheet is panned or zoomed, the browser moves its picture as one layer,
  * and React Flow receives the view when the motion has ended: for every view that it receives, it computes
@@ -58,6 +66,8 @@ export class SheetMotion {
   /** The present view. Changes modify this object; React Flow treats the view as a controlled property. */
   readonly view: Viewport
   isLarge = false
+  /** Whether a picture replaces the sheet during a motion. */
+  hasPicture = false
   sheet: HTMLElement | null = null
   private layer: HTMLElement | null = null
   /** The timer of the end of the motion; 0: there is no motion. */
@@ -65,6 +75,8 @@ export class SheetMotion {
   /** The position of the pointer, and that at the start of the motion, px. */
   private pointer: readonly [number, number] = [0, 0]
   private pointerAtStart: readonly [number, number] = [0, 0]
+  /** The element of the sheet with the focus: it loses the focus while a picture replaces the sheet. */
+  private focused: (Element & HTMLOrSVGElement) | null = null
   /** The number of motions until now. */
   count = 0
   private readonly store
@@ -81,9 +93,9 @@ export class SheetMotion {
     return () => this.listeners.delete(listener)
   }
 
-  /** Whether the sheet is being panned or zoomed. */
-  get isMoving(): boolean {
-    return this.timer !== 0
+  /** Whether a picture replaces the sheet at present. */
+  get isPictured(): boolean {
+    return this.sheet?.classList.contains('pictured') ?? false
   }
 
   /** End the motion when the pointer is moved without a pressed button: it has to find what is below it. */
@@ -107,6 +119,7 @@ export class SheetMotion {
     if (!this.timer) {
       this.layer = this.sheet.querySelector<HTMLElement>('.react-flow__viewport')
       this.sheet.classList.add('moving')
+      this.focused = this.layer?.querySelector<HTMLElement>(':focus') ?? null
       this.pointerAtStart = this.pointer
       this.count++
     }
@@ -118,7 +131,7 @@ export class SheetMotion {
   readonly change = (view: Viewport): void => {
     Object.assign(this.view, view)
     if (this.timer || this.store.getState().paneDragging) this.begin()
-    if (this.timer) this.layer!.style.transform = `translate(${view.x}px,${view.y}px) scale(${view.zoom})`
+    if (this.timer) this.move()
     else this.commit()
     for (const listener of this.listeners) listener()
   }
@@ -128,8 +141,10 @@ export class SheetMotion {
     if (!this.timer) return
     clearTimeout(this.timer)
     this.timer = 0
-    this.sheet!.classList.remove('moving')
+    this.sheet!.classList.remove('moving', 'pictured')
     this.commit()
+    if (this.focused?.isConnected && document.activeElement === document.body) refocus(this.focused)
+    this.focused = null
   }
 
   /** End the motion if it does not continue after the next frames, which can take longer than the timer. */
@@ -137,6 +152,13 @@ export class SheetMotion {
     const { timer } = this
     const endIfUnchanged = () => setTimeout(() => this.timer === timer && this.end())
     requestAnimationFrame(() => requestAnimationFrame(endIfUnchanged))
+  }
+
+  /** Move the layer; a picture replaces the sheet, unless the user types a text on the sheet. */
+  private move(): void {
+    const { x, y, zoom } = this.view
+    this.layer!.style.transform = `translate(${x}px,${y}px) scale(${zoom})`
+    if (this.hasPicture && !this.focused?.matches('input, textarea')) this.sheet!.classList.add('pictured')
   }
 
   private commit(): void {

@@ -160,6 +160,28 @@ def test_a_picture_shows_all_blocks_at_their_places_during_a_motion(large: Page)
     rest(large)
 
 
+def test_a_motion_changes_neither_the_focus_nor_the_selection(large: Page) -> None:
+    focused = block(large, "b 3 4")
+    focused.focus()
+    large.keyboard.press("Control+a")
+    for down in (-6, 5):
+        wheel(large, 25, down)
+    rest(large)
+    expect(focused).to_be_focused()
+    expect(large.locator(".react-flow__node.selected")).to_have_count(CHAINS * PER_CHAIN)
+    large.keyboard.type('"')
+    note = large.get_by_role("textbox", name="Note", exact=True)
+    expect(note).to_be_focused()
+    for down in (-6, 5):
+        wheel(large, 25, down)
+    rest(large)
+    large.keyboard.type("a remark")
+    expect(note).to_have_value("a remark")
+    note.press("Escape")
+    large.keyboard.press("Control+z")
+    expect(large.locator(".react-flow__node")).to_have_count(CHAINS * PER_CHAIN)
+
+
 def test_a_press_during_a_motion_finds_the_block_below_the_picture(large: Page) -> None:
     name = block(large, "b 3 4")
     x, y = middle(name)
