@@ -1194,6 +1194,7 @@ export interface RobotContent {
   coordinates: Coordinate[];
   speeds: Speed[];
   poses: Pose[];
+  published_poses: string[];
   fields: {
     [k: string]: number | string | null;
   };

@@ -93,6 +93,15 @@ def test_the_tool_is_dragged_four_poses_are_recorded_and_the_motion_runs(page: P
     poses.get_by_role("button", name="Go to place").click()
     expect(x).to_have_value("0.4500")
 
+    # After a reload of the page, only the configurations of the shipped robot are not selected.
+    page.reload()
+    editor.get_by_text("Teach", exact=True).click()
+    for name_of_pose, is_selected in (("qz", False), ("P1", True), ("place", True)):
+        passes = poses.get_by_role("checkbox", name=f"Motion passes {name_of_pose}", exact=True)
+        expect(passes).to_be_checked(checked=is_selected)
+    poses.get_by_role("button", name="Go to place").click()
+    expect(x).to_have_value("0.4500")
+
     # The motion.
     motion.get_by_role("button", name="Run").click()
     expect(motion.get_by_role("alert")).to_contain_text("no limits of speed or torque")

@@ -170,6 +170,30 @@ def test_dropped_files_are_bounded_and_errors_name_the_file(tmp_path: Path) -> N
     run_scenario(tmp_path, scenario)
 
 
+def test_an_unsaved_copy_of_a_shipped_robot_has_the_names_of_its_published_poses(tmp_path: Path) -> None:
+    async def scenario(client: Client) -> None:
+        key = await client.ask("open_shipped", document_kind="robot", name="puma560")
+        published = list(load_robot("puma560").configurations)
+        record = {"kind": "record_pose", "q": [0.0] * 6}
+        await client.ask("change", document=key, key="1", edit=record)
+        shown = client.shown()
+        assert [pose["name"] for pose in shown["poses"]] == [*published, "P1"]
+        assert shown["published_poses"] == published
+        await client.ask("save", document=key, path="mine.json")
+        await client.ask("attach", document=key, document_kind="robot")
+        assert client.shown()["published_poses"] == []  # the file has all poses
+        dropped = packed((tmp_path / "mine.json").read_bytes())
+        await client.ask("drop", name="dropped.json", content=dropped)
+        shown = client.shown()
+        assert (shown["path"], len(shown["poses"]), shown["published_poses"]) == (
+            None,
+            len(published) + 1,
+            [],
+        )
+
+    run_scenario(tmp_path, scenario)
+
+
 def test_saving_a_robot_file_updates_the_diagrams_that_use_it(tmp_path: Path) -> None:
     (tmp_path / "arms").mkdir()
     ab.save_robot(load_robot("puma560"), tmp_path / "arms" / "mine.json")

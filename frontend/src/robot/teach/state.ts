@@ -80,14 +80,13 @@ function isShown(document: string, version: number): boolean {
   return current === document && robots[document]?.state.version === version
 }
 
-/** The motion omits the named configurations with which a shipped robot is opened. */
+/** At first, the motion omits the named configurations of a shipped robot. */
 function omitPublishedPoses(): void {
   const { robots, current } = useRobotEditor.getState()
   const robot = current ? robots[current] : undefined
   const { omitted } = useTeaching.getState()
   if (!current || !robot || omitted[current]) return
-  const names = robot.state.path === null ? robot.poses.map(({ name }) => name) : []
-  useTeaching.setState({ omitted: { ...omitted, [current]: names } })
+  useTeaching.setState({ omitted: { ...omitted, [current]: robot.published_poses } })
 }
 omitPublishedPoses() // the robot is shown before this part of the page is loaded
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import dataclasses
+import functools
 
+from armblocks import formats
 from armblocks.face.arm import Arm
 from armblocks.robot import Configurations, Robot
 from armblocks.studio.documents.open_files import OpenFile, OpenFiles
@@ -27,6 +29,12 @@ class OpenRobot(OpenFile[RobotDocument]):
     def robot(self) -> Robot:
         """The present robot."""
         return self.document.value
+
+    @functools.cached_property
+    def published(self) -> tuple[str, ...]:
+        """Names of the configurations of the shipped robot of which this robot is a copy."""
+        is_shipped = self.origin in formats.list_robots()
+        return tuple(formats.load_robot(self.origin).configurations) if is_shipped else ()
 
     @property
     def arm(self) -> Arm:

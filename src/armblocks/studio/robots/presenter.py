@@ -74,7 +74,7 @@ class RobotPresenter(Presenter[OpenRobot]):
 
 
 def _content(open_file: OpenRobot) -> RobotContent:
-    return robot_content(open_file.robot)
+    return robot_content(open_file.robot, open_file.published if open_file.path is None else ())
 
 
 def _read(data: bytes, name: str, context: FileContext) -> tuple[Mapping[str, Robot], tuple[str, ...]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import Literal
 
 from armblocks.robot import DhConvention, Link, Robot, inertia_findings, plausibility_findings, serial_chain
@@ -27,8 +28,11 @@ def robot_tables() -> robot_messages.RobotTables:
     )
 
 
-def robot_content(robot: Robot) -> robot_messages.RobotContent:
-    """Return the data of a robot that a client displays; its named configurations are the poses."""
+def robot_content(robot: Robot, published: Collection[str] = ()) -> robot_messages.RobotContent:
+    """Return the data of a robot that a client displays; its named configurations are the poses.
+
+    ``published`` are the names of the configurations of the shipped robot.
+    """
     return robot_messages.RobotContent(
         name=robot.name,
         convention=_convention(robot),
@@ -37,6 +41,7 @@ def robot_content(robot: Robot) -> robot_messages.RobotContent:
         coordinates=_coordinates(robot),
         speeds=_speeds(robot),
         poses=[robot_messages.Pose(name=name, q=list(q)) for name, q in robot.configurations.entries],
+        published_poses=list(published),
         fields={name: column.read(robot) for name, column in ROBOT_COLUMNS.items()},
         findings=[
             *_inertia_findings(robot),

@@ -103,6 +103,8 @@ class RobotContent(Content):
     coordinates: list[Coordinate]
     speeds: list[Speed]
     poses: list[Pose]
+    published_poses: list[str]
+    """Names of the configurations of the shipped robot, if this is a copy that has no file yet."""
     fields: dict[str, float | str | None]
     findings: list[RobotFinding]
 
