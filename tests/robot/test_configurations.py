@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 import warnings
-from dataclasses import replace
+from dataclasses import FrozenInstanceError, replace
 from typing import Any
 
 import numpy as np
@@ -64,6 +64,11 @@ def test_configurations_are_an_immutable_mapping_with_an_order() -> None:
     assert other.q["qz"][0] == 0.5 and other.robot != robot
     again = pickle.loads(pickle.dumps(other))
     assert again.q == other.q and hash(again.q) == hash(other.q)
+    with pytest.raises(FrozenInstanceError, match="cannot assign to field 'entries'"):
+        arm.q.entries = ()
+    with pytest.raises(FrozenInstanceError, match="cannot delete field 'entries'"):
+        delattr(arm.q, "entries")
+    assert len(arm.q) == 4
     first = Configurations({"a": (1.0,), "b": (2.0,)})
     assert first != Configurations({"b": (2.0,), "a": (1.0,)}), "the order is that of a motion"
     assert repr(first) == "Configurations({'a': [1.0], 'b': [2.0]})"

@@ -126,9 +126,12 @@ def consistent_fit(A: Array, y: Array, prior: Array, constraints: Constraints) -
 def _centred(z: Array, H: Array, g: Array, barrier: float, origin: Array, c: Constraints) -> Array:
     """The minimum of the objective with a barrier, by damped Newton steps."""
     for _ in range(_NEWTON_STEPS):
-        gradient, hessian = _barrier_derivatives(origin + z, barrier, c)
-        total = H @ z - g + gradient
-        step = -np.linalg.solve(H + hessian, total)
+        try:
+            gradient, hessian = _barrier_derivatives(origin + z, barrier, c)
+            total = H @ z - g + gradient
+            step = -np.linalg.solve(H + hessian, total)
+        except np.linalg.LinAlgError:
+            break  # a body at the border of the possible ones: singular within rounding errors
         decrease = float(-total @ step)
         value, length = _objective(z, H, g, barrier, origin, c), 1.0
         if decrease <= max(1e-2 * barrier, 1e-12 * abs(value)):

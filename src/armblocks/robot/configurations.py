@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import FrozenInstanceError
 from typing import NamedTuple, TypeVar, cast, overload
 
 import numpy as np
@@ -58,8 +59,8 @@ class Configurations(Mapping[str, Array], metaclass=ArgumentErrors):
         where: str = "configurations",
         layout: Layout | None = None,
     ) -> None:
-        self.where = where
-        self.layout = layout
+        object.__setattr__(self, "where", where)
+        object.__setattr__(self, "layout", layout)
         pairs = _pairs(entries, where)
         if len(pairs) > MAX_CONFIGURATIONS:
             raise RobotError(
@@ -72,7 +73,13 @@ class Configurations(Mapping[str, Array], metaclass=ArgumentErrors):
         for name, q in pairs:
             check_name(name, found, where)
             found[name] = Configuration(name, _finite(q, f"{where}, configuration '{name}'"))
-        self.entries = tuple(found.values())
+        object.__setattr__(self, "entries", tuple(found.values()))
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise FrozenInstanceError(f"cannot assign to field '{name}'")
+
+    def __delattr__(self, name: str) -> None:
+        raise FrozenInstanceError(f"cannot delete field '{name}'")
 
     def __getitem__(self, name: str) -> Array:
         for entry in self.entries:
