@@ -26,6 +26,7 @@ from armblocks.robot import (
     plausibility_findings,
     with_tip,
 )
+from armblocks.robot.configurations import MAX_NAME
 from armblocks.spatial import Transform, transl, trotx, trotz
 
 PI = np.pi
@@ -194,10 +195,14 @@ def test_key_frames_that_contradict_equality_constraints_are_reported() -> None:
     <body name="b"><joint name="b"/><geom size="0.1"/></body></worldbody>
     <equality><joint joint1="b" joint2="a" polycoef="0.1 2 0 0 0"/></equality>
     <keyframe><key name="right" qpos="0.5 1.1"/><key name="wrong" qpos="0.5 1.2"/></keyframe></mujoco>"""
+    text = text.replace("right", long := "a" * (MAX_NAME - 21) + " b")
     with pytest.warns(ArmblocksWarning, match="do not satisfy the equality constraints of joints") as caught:
         robot = read_robots(text.encode(), "g.xml")["g"]
     assert len(caught) == 1 and "wrong" in str(caught[0].message)
-    assert {name: q.tolist() for name, q in robot.configurations.items()} == {"right": [0.5], "wrong": [0.5]}
+    assert {name: q.tolist() for name, q in robot.configurations.items()} == {
+        long[:-2]: [0.5],
+        "wrong": [0.5],
+    }, "a long name ends before its space"
 
 
 def test_formats_without_configurations_warn() -> None:
@@ -214,6 +219,7 @@ def test_scripts_define_configurations_by_vectors() -> None:
     script = b"""
     deg = pi/180; L(1) = Link([0 0.1 1 0]); L(2) = Link([0 0 1 0]);
     qz = [0 0]; qn = [30; -30]*deg; qd = [1 2]; q = [5 6]; qlim = [-1 1]; q_deg = [30 40];
+    qd0 = [1 2]; qdd_0 = [1 2]; qdot = [1 2]; qddmax = [1 2]; quat = [1 0]; qdown = [1 2];
     q3 = [1 2 3]; Q = [7 8]; qpath = [0 0; 1 1];
     p2 = SerialLink(L, 'name', 'two');
     """
@@ -221,6 +227,7 @@ def test_scripts_define_configurations_by_vectors() -> None:
     assert {name: q.round(6).tolist() for name, q in robot.configurations.items()} == {
         "qz": [0.0, 0.0],
         "qn": [0.523599, -0.523599],
+        "qdown": [1.0, 2.0],
     }
 
 

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from armblocks.errors import warn
 from armblocks.robot import FrictionModel, Robot
 
-_CONFIGURATION = re.compile(r"q(?!d{1,2}$)(?!lim)(?!\w*deg)\w+")
+_CONFIGURATION = re.compile(r"q(?!d{1,2}(?![A-Za-z])|dd?(?:ot|max|min)|uat|lim|\w*deg)\w+")
+"""Names of configurations: not of speeds and accelerations such as ``qd0``, ``qdot`` and ``qdmax``, of
+quaternions such as ``quat``, of limits or of angles in degrees."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,7 +43,8 @@ def read_script(
     is reversed, because the toolbox's vector points up. Links are named ``link1``, ``link2`` …
 
     Vectors whose names begin with ``q``, such as ``qz`` and ``qn``, with one number for each joint of a robot
-    are its named configurations, except ``q``, ``qd``, ``qdd``, ``qlim`` and names with ``deg``.
+    are its named configurations. Exceptions are ``q``, names that begin with ``qlim`` or ``quat``, names with
+    ``deg``, and usual names of speeds and accelerations such as ``qd``, ``qdd``, ``qd0`` and ``qdot``.
 
     Raises ``FormatError`` with file, line and text at the first invalid or unsupported line. Issues a
     warning for lines that a printed page splits, which are joined.

@@ -47,7 +47,8 @@ def with_keyframes(robot: Robot, root: Element, context: FileContext) -> Robot:
             what = f"its qpos has {words} numbers, and the joints that are read have {count} coordinates"
             note(context, KEYFRAME, key, what)
             continue
-        name = free_name(key.attributes.get("name", "").strip()[: MAX_NAME - 20] or f"key {number}", used)
+        given = key.attributes.get("name", "").strip()[: MAX_NAME - 20].strip()
+        name = free_name(given or f"key {number}", used)
         found[name] = _coordinates(robot, key, key.numbers("qpos", (count,)), context)
     return replace(robot, configurations=found) if found else robot
 
