@@ -260,6 +260,12 @@ def test_unsuitable_arguments_are_refused() -> None:
         (InputError, "an integer number of evaluations", ("k", data), {"evaluations": 2.5}),
         (InputError, "there is no experiment", ("k", []), {}),
         (UnknownNameError, "no signal named 'z'", ("k", {"t": t, "z": t}), {}),
+        (
+            InputError,
+            "the columns 'x' and 'x/y' are the same signal",
+            ("k", {"t": t, "x": t, "x/y": 2 * t}),
+            {},
+        ),
         (InputError, "no column is a measured signal", ("k", {"t": t}), {}),
         (InputError, "every measured value is NaN", ("k", {"t": t, "x": np.nan * t}), {}),
         (InputError, "has infinite values", ("k", {"t": t, "x": np.where(t > 1.0, np.inf, t)}), {}),

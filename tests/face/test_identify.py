@@ -281,9 +281,21 @@ def test_logs_are_read_from_files_frames_and_runs(tmp_path: Path) -> None:
     twice = ab.identify(arm, [log, log])
     assert_allclose(twice.values, expected, rtol=1e-2, atol=1e-3)  # the weights differ slightly
     assert len(twice.time) == 400 and "log" not in twice.notes
-    path.write_text("t,q1 [furlong],q2,q3,tau1,tau2,tau3\n0,1,1,1,1,1,1\n1,1,1,1,1,1,1\n")
-    with pytest.raises(InputError, match="a column has the unit 'furlong'"):
-        ab.identify(arm, path)
+    for heads, words in (
+        ("q1 [furlong],q2,q3,tau1", "a column has the unit 'furlong'"),
+        ("q1 [mm],q2,q3,tau1", "a column has the unit 'mm'. Allowed: units of rad, deg, °, or"),
+        (
+            "q1,q2 [deg],q3,tau1",
+            "column 'q2 .deg.': a column has the unit 'deg'. Allowed: units of m, mm",
+        ),
+        ("q1 [rad/s],q2,q3,tau1", "the unit 'rad/s'"),
+        ("q1,q2,q3,tau1 [N]", "a column has the unit 'N'. Allowed: units of Nm"),
+        ("q1,q2,q3,qd1 [rad/min]", "the unit 'rad/min'. Allowed: units of rad, deg, °, divided by s, or"),
+        ("q1,q2,q3,q_1", "the columns 'q1' and 'q_1' are both q1"),
+    ):
+        path.write_text(f"t,{heads},tau2,tau3\n0,1,1,1,1,1,1\n1,1,1,1,1,1,1\n", encoding="utf-8")
+        with pytest.raises(InputError, match=words):
+            ab.identify(arm, path)
 
 
 def test_results_are_pickled_and_drawn(tmp_path: Path) -> None:

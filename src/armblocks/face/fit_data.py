@@ -75,11 +75,21 @@ def read_measurement(data: object, system: HybridSystem, where: str) -> Measurem
     signals: dict[str, Array] = {}
     ignored: list[str] = []
     parts: dict[str, dict[str, Array]] = {}
+    sources: dict[str, str] = {}
     for name, values in columns.items():
         plain = name[: name.rfind(header_unit(name)) - 1].strip() if header_unit(name) else name
         head = plain.rpartition("[")[0] if plain not in known else ""
+        path = known.get(plain) or (f"{known[head]}{plain[len(head) :]}" if head in known else "")
+        if path in sources and not np.array_equal(columns[sources[path]], values, equal_nan=True):
+            raise InputError(
+                f"the columns '{sources[path]}' and '{name}' are the same signal '{path}'",
+                where=where,
+                allowed="one column for each signal",
+                fix="remove one of them",
+            )
+        if path:
+            sources[path] = name
         if plain in known:
-            path = known[plain]
             slot = system.signals_layout[path]
             if values.size != len(time) * slot.size or len(values) != len(time):
                 raise InputError(
@@ -90,7 +100,7 @@ def read_measurement(data: object, system: HybridSystem, where: str) -> Measurem
                 )
             signals[path] = values.reshape(len(time), -1)
         elif head in known:
-            parts.setdefault(known[head], {})[f"{known[head]}{plain[len(head) :]}"] = values
+            parts.setdefault(known[head], {})[path] = values
         elif is_file:
             ignored.append(name)
         else:

@@ -27,18 +27,16 @@ LogSource: TypeAlias = Any
 _NAMES = ("q", "qd", "qdd", "tau")
 _COLUMN = re.compile(r"(qdd|qd|q|tau)(?:[_\[]?(\d+)\]?)?(?:\s*[\[(]([^\d\])][^\])]*)[\])])?")
 """The quantity, the number of the joint, and the unit of a column such as ``qd_2 [deg/s]``."""
-_ANGLES = {"": 1.0, "rad": 1.0, "m": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0, "mm": 1e-3}
-_TORQUES = {
-    "": 1.0,
-    "Nm": 1.0,
-    "N·m": 1.0,
-    "N m": 1.0,
-    "N*m": 1.0,
-    "N": 1.0,
-    "mNm": 1e-3,
-    "kNm": 1e3,
-    "kN": 1e3,
+_UNITS = {
+    "rad": {"rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0},
+    "m": {"m": 1.0, "mm": 1e-3},
+    "N m": {"Nm": 1.0, "N·m": 1.0, "N m": 1.0, "N*m": 1.0, "mNm": 1e-3, "kNm": 1e3},
+    "N": {"N": 1.0, "kN": 1e3},
+    "": {"": 1.0},
 }
+"""The units of angles, lengths, torques and forces, and of the entries of quaternions, with SI factors."""
+_PER = {"q": (), "qd": ("s",), "qdd": ("s2", "s²", "s^2", "s**2", "s/s"), "tau": ()}
+"""The divisors that may follow the unit of a quantity."""
 _FEWEST = 20
 """Segments with fewer samples are omitted, because they are too short for a filter."""
 
@@ -101,9 +99,9 @@ def _read(source: LogSource, robot: Robot, where: str) -> JointLog:
     if isinstance(source, str | PathLike):
         path = Path(fspath(cast("str | PathLike[str]", source)))
         where = str(path)
-        columns = _columns_of_file(load_columns(path), where)
+        columns = _columns_of_file(load_columns(path), robot, where)
     else:
-        columns = _columns_of_object(source, where)
+        columns = _columns_of_object(source, robot, where)
     time = columns.pop("t")
     n = robot.n
     widths = {"q": robot.nq, "qd": n, "qdd": n, "tau": n}
@@ -137,7 +135,7 @@ def _read(source: LogSource, robot: Robot, where: str) -> JointLog:
     )
 
 
-def _columns_of_object(source: object, where: str) -> dict[str, Array]:
+def _columns_of_object(source: object, robot: Robot, where: str) -> dict[str, Array]:
     """The arrays t, q, qd, qdd, tau of a mapping, a data frame or an object such as the result of fdyn."""
     members: dict[str, Any]
     if isinstance(source, Mapping):
@@ -158,9 +156,9 @@ def _columns_of_object(source: object, where: str) -> dict[str, Array]:
         )
     columns = {name: value[:, None] if value.ndim == 1 else value for name, value in columns.items()}
     if not columns:
-        factors = _factors(dict.fromkeys(members, ""), where)
-        numbered = {name: _array(name, members[name], where).ravel() for name in factors}
-        columns = _numbered(numbered, factors, where)
+        numbered = {name: members[name] for name in members if _COLUMN.fullmatch(name.strip())}
+        arrays = {name: _array(name, value, where).ravel() for name, value in numbered.items()}
+        columns = _numbered(arrays, {}, robot, where)
     columns["t"] = _array(key, members[key], where).ravel()
     return columns
 
@@ -180,60 +178,76 @@ def _array(name: str, value: object, where: str) -> Array:
     return array
 
 
-def _columns_of_file(file: ColumnFile, where: str) -> dict[str, Array]:
+def _columns_of_file(file: ColumnFile, robot: Robot, where: str) -> dict[str, Array]:
     key = time_column(file)
     values = {c.name: c.values for c in file.columns if c.values is not None}
-    units = {c.name: c.unit for c in file.columns}
-    factors = _factors({name: units[name] for name in values}, where)
-    columns = _numbered({name: values[name] for name in factors}, factors, where)
+    columns = _numbered(values, {c.name: c.unit for c in file.columns}, robot, where)
     columns["t"] = seconds_of(file.column(key, where), where)
     return columns
 
 
-def _factors(units: Mapping[str, str], where: str) -> dict[str, float]:
-    """The factors to SI units of the columns of joints, by their units or the units in their names."""
-    factors: dict[str, float] = {}
-    for name, unit in units.items():
-        match = _COLUMN.fullmatch(name.strip())
-        if match:
-            unit = unit or (match[3] or "").strip()
-            factors[name] = _factor(unit, torque=match[1] == "tau", where=where)
-    return factors
+def _numbered(
+    values: Mapping[str, Array], units: Mapping[str, str], robot: Robot, where: str
+) -> dict[str, Array]:
+    """The matrices of columns such as ``q1`` to ``q6``, in SI units.
+
+    ``units``: the units of columns that their names do not contain.
+    """
+    found: dict[str, dict[int, tuple[str, str]]] = {}
+    for name in values:
+        if match := _COLUMN.fullmatch(name.strip()):
+            numbers, number = found.setdefault(match[1], {}), int(match[2] or 1)
+            if number in numbers:
+                raise InputError(
+                    f"the columns '{numbers[number][0]}' and '{name}' are both {match[1]}{number}",
+                    where=where,
+                    allowed="one column for each quantity and joint",
+                    fix="remove or rename one of them",
+                )
+            numbers[number] = name, units.get(name) or (match[3] or "").strip()
+    matrices: dict[str, Array] = {}
+    for quantity, columns in found.items():
+        first = min(columns)
+        if first not in (0, 1) or sorted(columns) != list(range(first, first + len(columns))):
+            numbers = shortened_list([str(k) for k in sorted(columns)])
+            raise InputError(
+                f"the columns of {quantity} have the numbers {numbers}",
+                where=where,
+                allowed=f"{quantity}1, {quantity}2, … without gaps",
+                fix="rename the columns of the log",
+            )
+        kinds = _kinds(quantity, robot)
+        matrices[quantity] = np.column_stack(
+            [
+                values[name] * _factor(quantity, unit, kinds[k] if k < len(kinds) else "", name, where)
+                for k, (name, unit) in enumerate(columns[number] for number in sorted(columns))
+            ]
+        )
+    return matrices
 
 
-def _factor(unit: str, *, torque: bool, where: str) -> float:
-    known = _TORQUES if torque else _ANGLES
-    name = unit if torque else unit.split("/")[0].strip()
-    if name not in known:
+def _kinds(quantity: str, robot: Robot) -> list[str]:
+    """The SI units of the entries of a quantity: rad or m of a motion, N m or N; empty for quaternions."""
+    entries = [entry.unit for entry in (robot.positions if quantity == "q" else robot.speeds)]
+    return [{"rad": "N m", "m": "N"}.get(unit, "") for unit in entries] if quantity == "tau" else entries
+
+
+def _factor(quantity: str, unit: str, kind: str, column: str, where: str) -> float:
+    """The factor from a unit, or none, to the SI unit ``kind``."""
+    name, _, divisor = (part.strip() for part in unit.partition("/"))
+    known, divisors = _UNITS.get(kind, {}), _PER[quantity]
+    if not unit:
+        return 1.0
+    if name not in known or ("/" in unit and divisor not in divisors):
+        per = f", divided by {divisors[0]}" if divisors else ""
+        names = ", ".join(filter(None, known))
         raise InputError(
             f"a column has the unit '{unit}'",
-            where=where,
-            allowed=f"units of {', '.join(filter(None, known))}, per s or s2 for speeds, or no unit",
+            where=f"{where}, column '{column}'",
+            allowed=f"units of {names}{per}, or no unit" if names else "no unit",
             fix="convert the column, or correct its header",
         )
     return known[name]
-
-
-def _numbered(values: Mapping[str, Array], factors: Mapping[str, float], where: str) -> dict[str, Array]:
-    """The matrices of columns such as ``q1`` to ``q6``."""
-    found: dict[str, dict[int, Array]] = {}
-    for name, column in values.items():
-        match = _COLUMN.fullmatch(name.strip())
-        if match:
-            found.setdefault(match[1], {})[int(match[2] or 1)] = column * factors[name]
-    for name, columns in found.items():
-        first = min(columns)
-        if first not in (0, 1) or sorted(columns) != list(range(first, first + len(columns))):
-            raise InputError(
-                f"the columns of {name} have the numbers {shortened_list([str(k) for k in sorted(columns)])}",
-                where=where,
-                allowed=f"{name}1, {name}2, … without gaps",
-                fix="rename the columns of the log",
-            )
-    return {
-        name: np.column_stack([columns[number] for number in sorted(columns)])
-        for name, columns in found.items()
-    }
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
