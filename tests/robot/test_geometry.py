@@ -1,6 +1,7 @@
 """The geometry of robots: closed, correctly oriented surfaces that follow the kinematics."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,12 @@ from armblocks.errors import RobotError
 from armblocks.formats import load_robot
 from armblocks.robot import (
     Attachment,
+    Fixed,
     JointLimits,
     Link,
     Prismatic,
     Revolute,
+    RevoluteClosure,
     Robot,
     Rod,
     serial_chain,
@@ -51,6 +54,20 @@ def test_a_surface_encloses_its_volume_with_outward_faces(name: str) -> None:
     shape, expected = SHAPES[name]
     # Facets reduce the area of a circle by 1 % and the volume of a ball by 2 %.
     assert volume(triangles(shape)) == pytest.approx(expected, rel=0.025)
+
+
+def test_links_with_shapes_have_no_foot_on_the_base() -> None:
+    """Neither foot, beam nor pin; a fixed base link, such as that of a URDF file, is on a foot."""
+    pin = RevoluteClosure(name="pin", first=Attachment(), second=Attachment(link="coupler"))
+    robot = replace(four_bar(), constraints=(pin,))
+    shape = (Box(size=(0.1, 0.1, 0.1)),)
+    given = replace(robot, links=tuple(replace(link, geometry=shape) for link in robot.links))
+    ground = Link(name="ground", joint=Fixed(), geometry=shape)
+    on_ground = [replace(link, parent=link.parent or "ground") for link in given.links]
+    assert robot_shapes(robot)[0]
+    assert not robot_shapes(given)[0]
+    assert not robot_shapes(replace(given, links=(ground, *given.links)))[0]
+    assert robot_shapes(replace(given, links=(ground, *on_ground)))[0]
 
 
 @pytest.mark.parametrize("name", SHAPES)

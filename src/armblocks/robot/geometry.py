@@ -88,11 +88,12 @@ def _add_linkages(robot: Robot, rows: list[list[Shape]], plan: _Plan) -> None:
         frames = [link_frames(robot, q.tolist()) for q in configurations(robot)]
         rods = rod_points(robot, frames, plan.reach)
     thickest = max(plan.radius.values())
+    all_given = all(link.geometry is not None for link in robot.links)
     for row, link in enumerate((None, *robot.links)):
         name = link.name if link is not None else None
         r = plan.radius[link.name] if link is not None else 0.7 * thickest
         for points, part in ((loops, 0.6), (rods, 0.3)):
-            if points is loops and link is not None and link.geometry is not None:
+            if points is loops and (all_given if link is None else link.geometry is not None):
                 continue
             for point, axis in points.get(name, []):
                 rows[row] += _branch(link, point, axis, part * r)
@@ -370,10 +371,14 @@ def _tip(robot: Robot, link: Link, start: _Array, axis: _Array, r: float) -> lis
 
 
 def _base_shapes(robot: Robot, plan: _Plan) -> list[Shape]:
-    """A foot under each joint on the base, and a beam to joints beside the base frame."""
+    """A foot under each joint on the base, and a beam to joints beside the base frame.
+
+    Links with ``geometry`` have none, except a base link, such as that of a URDF file.
+    """
     shapes: list[Shape] = []
     for link in plan.children.get(None, []):
-        if link.joint.translations > 1:
+        is_given = link.geometry is not None and (link.joint.moves or not plan.children.get(link.name))
+        if is_given or link.joint.translations > 1:
             continue
         r = plan.radius[link.name]
         foot = np.array(link.before.translation)
