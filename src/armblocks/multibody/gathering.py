@@ -127,7 +127,8 @@ class _Gathered:
         try:
             check_accelerations_exist(regrouped(KinematicTree.of(drawn.robot)))
         except RobotError as error:
-            path = error.where.rpartition("link ")[2].strip("'")
+            paths = (joint.path for joint in drawn.joints)
+            path = next((path for path in paths if error.where.endswith(f", link '{path}'")), "")
             raise DiagramError(
                 "no body with mass moves with the joint, so that its acceleration is undefined",
                 where=self.net.label(path) if path in self.net.blocks else error.where,
