@@ -60,8 +60,8 @@ def wrong_mechanisms() -> Iterator[tuple[str, Callable[[], DiagramBuilder], str]
     )
     yield (
         "massless",
-        lambda: mutated(("elbow", RevoluteJoint()), lines=(("elbow/B", "rod/F"),)),
-        r"block 'elbow' \(Revolute Joint\): no body with mass moves with the joint",
+        lambda: mutated(("link of 2 m", RevoluteJoint()), lines=(("link of 2 m/B", "rod/F"),)),
+        r"block 'link of 2 m' \(Revolute Joint\): no body with mass moves with the joint",
     )
     yield (
         "rigid joint",
@@ -127,6 +127,24 @@ def test_a_body_that_is_commented_out_has_no_mass() -> None:
     _, rates = started(ab.with_comments(heavy, {"ball": "out"}))
     _, expected = started(pendulum(position_target=0.5).build())
     np.testing.assert_array_equal(rates["hinge/qd"], expected["hinge/qd"])
+
+
+def test_joints_at_a_body_that_is_commented_out_remain_connected() -> None:
+    """The lines of both joints end at the body; without it, they are still at one frame."""
+
+    def chain(*, ball: bool) -> Diagram:
+        builder = pendulum(position_target=0.5)
+        end = builder["rod"]["F"]
+        if ball:
+            end = builder.add("ball", BodyInertia(mass=5.0), R=end)
+        elbow = builder.add("elbow", RevoluteJoint(), B=end)
+        arm = builder.add("arm", RigidTransform(translation=(0.3, 0.0, 0.0)), B=elbow["F"])
+        builder.add("tip", BodyInertia(), R=arm["F"])
+        return builder.build()
+
+    _, rates = started(ab.with_comments(chain(ball=True), {"ball": "out"}))
+    _, expected = started(chain(ball=False))
+    np.testing.assert_array_equal(rates["elbow/qd"], expected["elbow/qd"])
 
 
 def test_conflicting_targets_name_the_joints() -> None:

@@ -28,7 +28,7 @@ from armblocks.diagram.diagram import (
 )
 from armblocks.diagram.difference import DiagramDifference, diagram_difference
 from armblocks.diagram.features import SlotKind
-from armblocks.diagram.frames import FrameLine, FramePort, frames_of
+from armblocks.diagram.frames import FrameLine, FramePort, frames_of, lines_without
 from armblocks.diagram.hierarchy import (
     FlatForm,
     diagram_views,
@@ -157,6 +157,7 @@ __all__ = [
     "integral_unit",
     "is_inside",
     "levels_of",
+    "lines_without",
     "mask_parameter",
     "open_inputs",
     "parameter",

@@ -8,7 +8,7 @@ direction of signals needs no exception for them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -91,3 +91,21 @@ def frames_of(lines: Iterable[FrameLine]) -> Iterator[tuple[PortRef, ...]]:
                     waiting.append(other)
         seen |= members
         yield tuple(sorted(members))
+
+
+def lines_without(lines: Iterable[FrameLine], is_removed: Callable[[PortRef], bool]) -> tuple[FrameLine, ...]:
+    """The lines after the removal of ports; the other ports of each frame remain one frame.
+
+    Lines state which ports are one frame, but not along which line: without a body between two joints, both
+    joints are still at the same frame.
+    """
+    given = tuple(lines)
+    kept = {line for line in given if not any(map(is_removed, line.ends))}
+    if len(kept) == len(given):
+        return given
+    for ports in frames_of(given):
+        others = [port for port in ports if not is_removed(port)]
+        if 1 < len(others) < len(ports):
+            kept = {line for line in kept if line.first not in others}
+            kept |= {FrameLine(others[0], port) for port in others[1:]}
+    return tuple(sorted(kept))

@@ -63,6 +63,9 @@ def test_edits_keep_the_frame_lines_of_other_blocks() -> None:
     assert lines(document) == left
     document.undo()
     assert len(lines(document)) == 4
+    # the lines of gravity and hinge end at the world; without it, both are still at one frame
+    document.edit(RemoveBlocks(blocks=["world"]))
+    assert "gravity/C -- revolute joint/B" in lines(document)
 
 
 def test_lines_are_drawn_and_removed_like_wires() -> None:
@@ -86,6 +89,9 @@ def test_copies_have_the_lines_between_the_copied_blocks() -> None:
     assert len(lines(document)) == 5
     alone = diagram_from_bytes(text.encode(), "copy", BLOCKS, load_robot, draft=True)
     assert alone.frame_lines == (FrameLine(PortRef("offset", "F"), PortRef("brick", "R")),)
+    text = clipped(document.diagram, ["gravity", "revolute joint"], [], load_robot)
+    alone = diagram_from_bytes(text.encode(), "copy", BLOCKS, load_robot, draft=True)
+    assert alone.frame_lines == (FrameLine(PortRef("gravity", "C"), PortRef("revolute joint", "B")),)
 
 
 def test_a_group_of_bodies_gets_connection_ports_and_moves_as_before() -> None:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from armblocks.diagram.block import Block
 from armblocks.diagram.bus import Bus, PortContent
 from armblocks.diagram.comments import is_inside, passed_ports
+from armblocks.diagram.frames import lines_without
 from armblocks.diagram.grounded import Bypass, Grounded
 from armblocks.diagram.passes.netlist import KnownSignals, Netlist, Replacement, Replacements
 from armblocks.diagram.port import Port, PortRef
@@ -41,9 +42,7 @@ def resolve_comments(net: Netlist) -> Netlist:
         levels={path: level for path, level in net.levels.items() if not is_inside(path, net.commented)},
         blocks=blocks,
         drivers={ref: source for ref, source in net.drivers.items() if _is_port(ref, blocks)},
-        frame_lines=tuple(
-            line for line in net.frame_lines if all(_is_frame(end, blocks) for end in line.ends)
-        ),
+        frame_lines=lines_without(net.frame_lines, lambda end: not _is_frame(end, blocks)),
         replaced={**net.replaced, **comments.replaced},
         origins={**net.origins, **comments.origins},
         commented={},

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from armblocks import formats
 from armblocks.blocks import BLOCKS
-from armblocks.diagram import Block, Connection, Diagram, PortRef
+from armblocks.diagram import Block, Connection, Diagram, PortRef, lines_without
 from armblocks.diagram.mask import formula_names
 from armblocks.diagram.names import FreeNames, folded
 from armblocks.drawing.block_boxes import box_at_placement
@@ -52,9 +52,7 @@ def clipped(
             for wire in diagram.connections
             if wire.source.block in copied_blocks and wire.target.block in copied_blocks
         ),
-        frame_lines=tuple(
-            line for line in diagram.frame_lines if all(end.block in copied_blocks for end in line.ends)
-        ),
+        frame_lines=lines_without(diagram.frame_lines, lambda end: end.block not in copied_blocks),
         layout={name: place for name, place in diagram.layout.items() if name in copied_blocks},
         bends=diagram.bends,
         notes={name: note for name, note in diagram.notes.items() if name in notes},

@@ -25,6 +25,7 @@ from armblocks.diagram import (
     Placement,
     PortRef,
     check_comment,
+    lines_without,
     with_parameter_set,
     with_parameters,
 )
@@ -74,7 +75,7 @@ from armblocks.studio.protocol.messages.sheet_edits import (
 )
 from armblocks.studio.sheet import bookmarks, parameter_sets, scope_triggers
 from armblocks.studio.sheet.clipping import ReadDiagram, leaves_horizontally, pasted, reader
-from armblocks.studio.sheet.frame_lines import split_wires, with_lines, without_blocks, without_lines
+from armblocks.studio.sheet.frame_lines import split_wires, with_lines, without_lines
 from armblocks.studio.sheet.grounding import grounded
 from armblocks.studio.sheet.mask_edits import with_mask
 from armblocks.studio.sheet.nesting import check_free, grouped, unlinked, with_block
@@ -205,7 +206,7 @@ def _without_removed(edit: RemoveBlocks, diagram: Diagram) -> Diagram:
             and wire.source.block not in removed
             and wire.target.block not in removed
         ),
-        frame_lines=without_blocks(diagram.frame_lines, removed),
+        frame_lines=lines_without(diagram.frame_lines, lambda end: end.block in removed),
         logged=tuple(ref for ref in diagram.logged if ref.block not in removed),
     )
 

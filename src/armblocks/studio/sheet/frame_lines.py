@@ -7,9 +7,9 @@ not be a line of the diagram: its removal takes its second port out of the frame
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
-from armblocks.diagram import Diagram, FrameLine, PortRef, frames_of
+from armblocks.diagram import Diagram, FrameLine, PortRef, lines_without
 from armblocks.drawing.diagram_layout import boxes
 from armblocks.drawing.frame_lines import drawn_frames
 from armblocks.studio.protocol.messages.sheet_edits import Wire
@@ -53,21 +53,11 @@ def without_lines(diagram: Diagram, lines: Sequence[FrameLine]) -> Diagram:
     frame.
     """
     for line in lines:
-        present = set(diagram.frame_lines)
-        members = next((refs for refs in frames_of(present) if line.first in refs), ())
         first = next((refs[0] for refs in drawn_frames(diagram, boxes(diagram)) if line.first in refs), None)
         removed = line.second if line.first == first else line.first
-        kept = [ref for ref in members if ref != removed]
-        if any(removed in other.ends for other in present):
-            present -= {other for other in present if removed in other.ends}
-            present |= {FrameLine(kept[0], ref) for ref in kept[1:]}
-        diagram = dataclasses.replace(diagram, frame_lines=tuple(present))
+        kept = lines_without(diagram.frame_lines, lambda end, removed=removed: end == removed)
+        diagram = dataclasses.replace(diagram, frame_lines=kept)
     return diagram
-
-
-def without_blocks(lines: Sequence[FrameLine], blocks: Collection[str]) -> tuple[FrameLine, ...]:
-    """Return the lines that do not end at one of the blocks."""
-    return tuple(line for line in lines if not any(end.block in blocks for end in line.ends))
 
 
 def _is_frame(ref: PortRef, diagram: Diagram) -> bool:

@@ -19,6 +19,7 @@ from armblocks.diagram import (
     PortRef,
     Subsystem,
     frames_of,
+    lines_without,
 )
 from armblocks.diagram.connection_port import FRAME, ConnectionPort
 from armblocks.diagram.names import FreeNames, check_block_name, folded
@@ -104,10 +105,8 @@ def with_block(diagram: Diagram, name: str, block: Block) -> Diagram:
             if (wire.source.block != name or wire.source.port in out)
             and (wire.target.block != name or wire.target.port in into)
         ),
-        frame_lines=tuple(
-            line
-            for line in diagram.frame_lines
-            if all(end.block != name or end.port in frames for end in line.ends)
+        frame_lines=lines_without(
+            diagram.frame_lines, lambda end: end.block == name and end.port not in frames
         ),
         logged=tuple(ref for ref in diagram.logged if ref.block != name or ref.port in out),
         signal_names={
