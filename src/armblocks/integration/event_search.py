@@ -273,6 +273,6 @@ class EventSearch:
         for row in range(1, method.tableau.rows):
             copy(f.r, method.K(0), method.K(row), f.n)
         self.records.extra_stages_done.value = 1
-        method.set_y((1.0,), h)
+        method.sums.set_y((1.0,), h)
         fired = self.events.mark_fired(minimum(new_time, f.clamp.value), self.y)
         f.leave_unless(fired != 0, Status.NON_FINITE)

@@ -182,13 +182,13 @@ class Instants(Schedule):
         end_row = method.K(method.tableau.end_row)
         if not self.search:
             trial(time, new_time)
-            f.leave_unless(method.all_finite(method.y, end_row), Status.NON_FINITE)
+            f.leave_unless(method.sums.all_finite(method.y, end_row), Status.NON_FINITE)
             return
         end = r.real(new_time)
         with r.part() as finite:
             with r.part() as attempt:
                 trial(time, end.value)
-                finite.leave_when(method.all_finite(method.y, end_row))
+                finite.leave_when(method.sums.all_finite(method.y, end_row))
                 h = 0.25 * (end.value - time)
                 end.value = time + h
                 attempt.again_when(h > self.search.negligible_step(time))

@@ -146,7 +146,7 @@ class _Loop:
         time = f.time.value
         method.evaluate(time, method.x, 0)
         self.records.samples(time, time, None)
-        f.leave_unless(method.all_finite(method.K(0)), Status.NON_FINITE_START)
+        f.leave_unless(method.sums.all_finite(method.K(0)), Status.NON_FINITE_START)
         if method.tableau.adaptive:
             self.schedule.first_step(time)
         f.count[Count.STAGE].value = Stage.RUNNING

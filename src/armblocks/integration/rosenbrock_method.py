@@ -14,8 +14,9 @@ from armblocks.integration.evaluation import Evaluation
 from armblocks.integration.explicit_method import CHECK_INTERVAL
 from armblocks.integration.frame import Frame, copy
 from armblocks.integration.linear_equations import LinearEquations, LinearEquationsLayout
-from armblocks.integration.method import Index, Method
+from armblocks.integration.method import Method
 from armblocks.integration.rosenbrock_tableau import RosenbrockTableau
+from armblocks.integration.step_sums import Index
 from armblocks.integration.workspace import Count
 from armblocks.routines.arithmetic import fma, maximum, select
 from armblocks.routines.memory import Reals
@@ -60,7 +61,7 @@ class RosenbrockMethod(Method):
             row = 1 + stage
             source = self.K(0)
             if stage:
-                self.set_y((0.0, *tableau.matrix[stage]), h)
+                self.sums.set_y((0.0, *tableau.matrix[stage]), h)
                 self.evaluate(fma(tableau.nodes[stage], h, time), self.y, row)
                 source = self.K(row)
             self._right_side(source, stage, h)
@@ -71,14 +72,14 @@ class RosenbrockMethod(Method):
                     r.call(self.equations.factor_dense, self.scratch, h)
                     r.call(self.equations.solve, self.scratch)
             copy(r, self.solution, self.K(row), self.n)
-        self.set_y((0.0, *tableau.weights), h)
+        self.sums.set_y((0.0, *tableau.weights), h)
         self.evaluate(new_time, self.y, tableau.end_row)
 
     def error_norm(self, h: Real, error: Row) -> Real:
         """The larger of two norms: the embedded estimate, and the defect in the middle of the step."""
         assert self._time is not None
         r, tableau = self.r, self.rosenbrock
-        ends = self.norm(h, error)
+        ends = self.sums.norm(h, error)
         state, derivative = self.K(tableau.middle_row), self.K(tableau.middle_row + 1)
         middle = fma(0.5, h, self._time)
         self.interpolate(middle, self._time, h, state)
@@ -88,14 +89,14 @@ class RosenbrockMethod(Method):
         def weighted(i: Index) -> Real:
             value = self.solution[i]
             before, after = abs(self.x[i]), abs(self.y[i])
-            return value / self.scale(maximum(before, after))
+            return value / self.sums.scale(maximum(before, after))
 
         for i in r.each(self.n):
-            self.right[i] = derivative[i] - self.combination(weights, i)
+            self.right[i] = derivative[i] - self.sums.combination(weights, i)
         for i in r.each(self.layout.size - self.n):
             self.right.after(self.n)[i] = 0.0
         r.call(self.equations.solve, self.scratch)
-        between = h * self.mean_square(weighted)
+        between = h * self.sums.mean_square(weighted)
         # If one of the norms is NaN, the result is NaN, and the step is repeated with a shorter length.
         return select(between < ends, ends, between + ends * 0.0)
 

@@ -33,7 +33,7 @@ class Segments(Schedule):
         """Take a fixed step; return from the loop if its result is not finite."""
         trial(time, new_time)
         method = self.method
-        finite = method.all_finite(method.y, method.K(method.tableau.end_row))
+        finite = method.sums.all_finite(method.y, method.K(method.tableau.end_row))
         self.frame.leave_unless(finite, Status.NON_FINITE)
 
     def handle_non_finite(self, time: Real, finite: Boolean, accepted: Part) -> None:

@@ -14,6 +14,7 @@ from armblocks.integration.records import Records
 from armblocks.integration.schedule import Schedule
 from armblocks.integration.workspace import Count, Scalar, Status
 from armblocks.routines.arithmetic import fma, inverse_root, maximum, minimum, select
+from armblocks.routines.routine import Routine
 from armblocks.routines.values import Real
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
@@ -81,7 +82,7 @@ class Steps:
                 ideal = SAFETY * inverse_root(bounded, method.tableau.error_order + 1)
                 # An infinite new state makes the tolerance infinite and the norm zero, so it is checked
                 # separately.
-                accepted.leave_when((norm < 1.0) & method.all_finite(method.y))
+                accepted.leave_when((norm < 1.0) & method.sums.all_finite(method.y))
                 f.increase(Count.REJECTED)
                 growth.value = 1.0
                 # A NaN norm compares false, so the step is reduced by SHRINK; likewise for an infinite new
@@ -110,11 +111,7 @@ class Steps:
         with r.when(f.count[Count.ACCEPTED].value & (SHORT_CHECK_INTERVAL - 1) == 0):
             new_time = f.new_time.value
             with r.when((new_time < f.end.value) & (h < f.max_step)):
-                # rtol^(2/(q+1) - 1), computed as rtol^(-1/(q+1)) to the power q - 1
-                root = inverse_root(f.reals[Scalar.RTOL], tableau.error_order + 1)
-                power = r.constant(RESOLVED)
-                for _ in range(tableau.error_order - 1):
-                    power = power * root
+                power = resolved_change(r, f.reals[Scalar.RTOL], tableau.error_order)
                 with r.when(method.derivative_change(h) < minimum(r.constant(SHORT_CHANGE), power)):
                     short.value = short.value + 1
                     far = f.last_end - new_time > MAX_FURTHER_STEPS * h
@@ -141,3 +138,13 @@ class Steps:
         self.records.checkpoint(new_time * SAME_ABOVE >= f.last_end)
         self.method.prepare(time)
         schedule.take_fixed_step(self.trial, time, new_time)
+
+
+def resolved_change(r: Routine, rtol: Real, order: int) -> Real:
+    """``RESOLVED rtol^(2/(q + 1) - 1)`` for an error estimate of order q."""
+    # rtol^(-1/(q+1)) to the power q - 1
+    root = inverse_root(rtol, order + 1)
+    power = r.constant(RESOLVED)
+    for _ in range(order - 1):
+        power = power * root
+    return power

@@ -8,7 +8,7 @@ from typing import Any, cast, overload
 from armblocks.routines.lanes import IntegerLanes, Lanes, Mask
 from armblocks.routines.memory import Address
 from armblocks.routines.tree import Constant, Operation
-from armblocks.routines.values import Boolean, Integer, NumberT, Real, Value
+from armblocks.routines.values import Boolean, Condition, Integer, NumberT, Real, Value
 
 
 def square_root(a: NumberT) -> NumberT:
@@ -56,16 +56,16 @@ def select(
 
 def minimum(a: NumberT, b: NumberT | float) -> NumberT:
     """The smaller value; ``b`` if either is NaN."""
-    return _selected(a < b, a, b)
+    return select_number(a < b, a, b)
 
 
 def maximum(a: NumberT, b: NumberT | float) -> NumberT:
     """The larger value; ``b`` if either is NaN."""
-    return _selected(a > b, a, b)
+    return select_number(a > b, a, b)
 
 
-def _selected(condition: Any, yes: Any, no: Any) -> Any:
-    """``select`` of doubles, or of one in each lane."""
+def select_number(condition: Condition, yes: NumberT | float, no: NumberT | float) -> NumberT:
+    """:func:`select` for functions of a double, or of one in each lane; at least one is no Python number."""
     return cast("Any", select)(condition, yes, no)
 
 

@@ -1,7 +1,7 @@
 """Values in lanes: the same operation on several doubles at a time, in one vector register.
 
-The program determines the number of lanes; with one lane, the values are single doubles. Integers, conditions
-and therefore the control flow are common to all lanes. A :class:`Mask` selects values per lane.
+The program determines the number of lanes; with one lane, the values are single doubles. Control flow is
+common to all lanes. A :class:`Mask` is a condition in each lane and selects values.
 """
 
 from __future__ import annotations
