@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -138,6 +139,32 @@ def test_the_robot_is_physically_consistent_and_stays_near_the_description() -> 
     # The mass of link 3 has no effect of its own.
     assert abs(result.robot.link("link3").mass / 4.8 - 1.0) < 0.3
     assert_allclose(result.validate(log), result.noise, rtol=0.1)
+
+
+def test_a_wrong_payload_gives_impossible_bodies_and_is_reported() -> None:
+    motor = ab.Motor(inertia=1e-3, gear_ratio=10.0, viscous_friction=0.01, coulomb_friction=(0.02, -0.03))
+    first = ab.Link(
+        name="a",
+        joint=ab.Revolute(axis=(0, 1, 0)),
+        mass=1.0,
+        centre_of_mass=(0.5, 0, 0.02),
+        inertia=((0.02, 0, 0), (0, 0.1, 0), (0, 0, 0.1)),
+        motor=motor,
+    )
+    second = replace(first, name="b", parent="a", before=ab.Transform(translation=(1, 0, 0)))
+    arm = ab.Arm(ab.Robot(name="two", links=(first, second)))
+    t, rates = np.arange(0.0, 4.0, 0.01), np.array([[2.0, 3.1], [1.3, 4.7]])
+    angles = rates * t[:, None, None]
+    q = 0.5 * np.sin(angles).sum(axis=2)
+    qd, qdd = 0.5 * (rates * np.cos(angles)).sum(axis=2), -0.5 * (rates**2 * np.sin(angles)).sum(axis=2)
+    noise = 0.05 * np.random.default_rng(1).normal(size=q.shape)
+    log = {"t": t, "q": q, "qd": qd, "qdd": qdd, "tau": arm.rne(q, qd, qdd) + noise}
+    for payload, is_possible in ((0.5, True), (2.0, False)):
+        result = ab.identify(arm, log, payload=payload)
+        assert is_possible is ("no possible bodies have the estimated parameters" not in str(result))
+        deviation = result.validate(log, payload=payload)
+        assert is_possible is bool((deviation < 1.1 * result.noise).all())
+        assert result.validate(log)[0] > 5.0 * result.noise[0], "without the payload"
 
 
 def test_descriptions_without_friction_or_masses_do_not_bias_the_robot() -> None:

@@ -49,7 +49,7 @@ def identify(
         str, typer.Option(help="asymmetric, coulomb, viscous or none (friction of the description).")
     ] = "asymmetric",
     rotor_inertia: Annotated[bool, typer.Option(help="Estimate the inertia of the rotors.")] = True,
-    payload: Annotated[float, typer.Option(help="Known mass at the tool, kg.")] = 0.0,
+    payload: Annotated[float, typer.Option(help="Known mass at the tool in all logs, kg.")] = 0.0,
     cutoff: Annotated[
         float | None, typer.Option(help="Cut-off frequency of the filter of the motion, Hz.")
     ] = None,
@@ -88,7 +88,8 @@ def identify(
         min_speed=min_speed,
         robust=robust,
     )
-    compared = None if validate is None else result.validate(str(validate), cutoff=cutoff)
+    known = payload or None
+    compared = None if validate is None else result.validate(str(validate), cutoff=cutoff, payload=known)
     console = results_console()
     print_identification(result, console, compared)
     if save is not None:

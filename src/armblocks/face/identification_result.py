@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from os import PathLike
 
@@ -22,6 +23,7 @@ from armblocks.face.estimates import (
     value_of,
 )
 from armblocks.face.joint_log import LogSource, prepared, read_logs
+from armblocks.face.payload import Payload
 from armblocks.face.text_table import text_table
 from armblocks.face.trajectory_report import save_picture
 from armblocks.pictures.numbers import table_number
@@ -34,6 +36,8 @@ Array = NDArray[np.float64]
 _UNITS = {"m": "kg", "Jm": "kg m2", "B": "N m s/rad", "Tc": "N m", "Tc+": "N m", "Tc-": "N m"}
 _CORRELATED = 0.2
 _GROUPING_WIDTH = 60
+_MISFIT_OF_NOISE, _MISFIT_OF_TORQUES = 0.3, 0.01
+"""Deviations of the torques of ``robot`` from the fit that are reported, relative to noise and torques."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -137,14 +141,22 @@ class IdentificationResult(metaclass=ArgumentErrors):
         """
         return confidence_intervals(self.values, self.covariance, self.degrees_of_freedom, level)
 
-    def validate(self, data: LogSource, *, cutoff: float | None = None) -> Array:
+    def validate(
+        self, data: LogSource, *, cutoff: float | None = None, payload: Payload | float | None = None
+    ) -> Array:
         """Root mean square (n,) of measured minus computed torques of ``robot`` for other logs, N m or N.
 
-        ``data`` and ``cutoff`` as for :func:`identify`. Use a motion that was not used for the estimate.
+        ``data`` and ``cutoff`` as for :func:`identify`. ``payload``: a known body at the tool during these
+        measurements. Use a motion that was not used for the estimate.
         """
         logs = prepared(read_logs(data, self.robot, "validate"), self.robot, cutoff, whole=False)
         arm = self.arm
-        differences = [s.tau - arm.rne(s.q, s.qd, s.qdd) for s in logs.segments if len(s.time)]
+        differences = [
+            s.tau
+            - (arm.rne(s.q, s.qd, s.qdd) if payload is None else arm.rne(s.q, s.qd, s.qdd, payload=payload))
+            for s in logs.segments
+            if len(s.time)
+        ]
         if not differences:
             raise InputError(
                 "no sample is complete",
@@ -237,7 +249,7 @@ class IdentificationResult(metaclass=ArgumentErrors):
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """Sentences on filters, missing samples, parameters that are not identified, correlated noise."""
+        """Sentences on filters, missing samples, unidentified and impossible parameters, correlated noise."""
         found = list(self.notes)
         if self.dropped:
             found.append(f"{counted(self.dropped, 'sample')} with missing values or at the ends omitted")
@@ -253,6 +265,11 @@ class IdentificationResult(metaclass=ArgumentErrors):
                 "standard error above the value: "
                 + shortened_list([self.parameters[k] for k in weak.tolist()])
             )
+        if misfit := self._misfit:
+            found.append(
+                "no possible bodies have the estimated parameters: the torques of the robot deviate from the "
+                f"fit by {100.0 * misfit:.3g} %; check the payload, and the units and signs of the log"
+            )
         correlated = np.flatnonzero(self.autocorrelation > _CORRELATED)
         if correlated.size:
             found.append(
@@ -261,6 +278,18 @@ class IdentificationResult(metaclass=ArgumentErrors):
                 "are too small; use decimate"
             )
         return tuple(found)
+
+    @property
+    def _misfit(self) -> float:
+        """Deviation of the torques of ``robot`` from ``fitted``, relative to ``tau``; 0 if negligible."""
+        used = np.flatnonzero(np.isfinite(self.values) & (self.standard_errors > 0.0))
+        noisy = self.noise > 0.0
+        size = float(np.sum((self.tau[:, noisy] / self.noise[noisy]) ** 2)) / max(self.tau.size, 1)
+        errors = ((self.consistent_values - self.values) / self.standard_errors)[used]
+        inverse = np.linalg.pinv(self.correlation[np.ix_(used, used)], hermitian=True)
+        square = float(errors @ inverse @ errors) / max(self.degrees_of_freedom, 1)
+        limit = max(_MISFIT_OF_NOISE**2, _MISFIT_OF_TORQUES**2 * size)
+        return math.sqrt(square / size) if limit < square < math.inf and size > 0.0 else 0.0
 
 
 def unit_of(parameter: str) -> str:
