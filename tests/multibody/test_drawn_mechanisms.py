@@ -98,6 +98,27 @@ def test_a_four_bar_has_the_accelerations_of_the_same_robot(cut: bool, name: str
         assert math.cos(difference) == pytest.approx(1.0, abs=1e-12)
 
 
+def test_the_sensitivity_of_a_closed_loop_is_the_difference_of_runs() -> None:
+    builder = pendulum(position_target=0.3, spring_stiffness=5.0)
+    far = builder.add("far", RigidTransform(translation=(0.4, 0.0, 0.0)), B=builder["world"])
+    other = builder.add("other", RevoluteJoint(position_target=0.3), B=far["F"])
+    rod = builder.add("other rod", RigidTransform(translation=(0.0, -0.5, 0.0)), B=other["F"])
+    near, end = (builder.add(name, RevoluteJoint()) for name in ("near", "end"))
+    builder.connect(builder["rod"]["F"], near["B"])
+    builder.connect(rod["F"], end["B"])
+    bar = RigidTransform(translation=(0.4, 0.0, 0.0))
+    builder.add("bar", bar, B=near["F"], F=end["F"])
+    builder.add("load", BodyInertia(mass=1.5), R=near["F"])
+    diagram, name = builder.build(), "hinge.spring_stiffness"
+    settings = {"stop_time": 0.4, "rtol": 1e-9, "atol": 1e-10}
+    found = ab.sensitivity(diagram, name, "hinge/q", **settings)["hinge/q", name]
+    low, high = (
+        ab.simulate(with_parameters(diagram, {name: value}), **settings)["hinge/q"]
+        for value in (4.999, 5.001)
+    )
+    np.testing.assert_allclose(found[-1], (high - low)[-1] / 0.002, rtol=1e-4)
+
+
 def test_a_pendulum_with_spring_damper_and_torque_follows_its_equation() -> None:
     builder = pendulum(
         position_target=0.7,

@@ -7,13 +7,15 @@ mode. The guards of the mode locate its changes. With consistent modes all signa
 
 Some comparisons are not replaced: comparisons of the time with constants and unchanged parameters, whose
 times do not shift; of the time with a breakpoint, which is an instant already; of the time with a stored
-instant, which are true at single times only; and comparisons that search an index of a table.
+instant, which are true at single times only; comparisons that search an index of a table; and conditions
+under which a value is NaN, because they end a run.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -124,7 +126,8 @@ class _Located:
                     if slot >= 0:
                         writers[slot] = k
         for k in range(len(nodes) - 1, -1, -1):
-            for source in sources[k] if reached[k] else ():
+            searched = sources[k][1:] if _is_refusal(nodes[k]) else sources[k]
+            for source in searched if reached[k] else ():
                 reached[source] = True
         return list(zip(nodes, reached))
 
@@ -164,6 +167,8 @@ class _Located:
 
     def _value(self, node: _Node, operands: list[SX]) -> SX:
         """The value of an operation on which a searched function depends."""
+        if _is_refusal(node):
+            return _plain(node, operands)
         conditions = {casadi.OP_IF_ELSE_ZERO: 1}.get(node.operation, 2 if node.operation in _LOGIC else 0)
         for k, operand in enumerate(node.operands[:conditions]):
             condition = _Node(casadi.OP_NE, (operand, _Node(casadi.OP_CONST)), varies=operand.varies)
@@ -284,6 +289,11 @@ def _combined(operation: int, operands: Sequence[_Node]) -> _Node:
         shifts=any(operand.shifts for operand in operands),
         momentary=any(operand.momentary for operand in operands) or _compares_instants(operation, operands),
     )
+
+
+def _is_refusal(node: _Node) -> bool:
+    """Whether an operation is NaN if its first operand, a condition, is true, and otherwise 0."""
+    return node.operation == casadi.OP_IF_ELSE_ZERO and math.isnan(node.operands[1].constant)
 
 
 def _changes(node: _Node) -> bool:
