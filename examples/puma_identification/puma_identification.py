@@ -7,7 +7,7 @@ folder OUT: the log (``log.csv``), the identified robot (``identified.json``), a
 torques (``torques.svg``). A second motion shows whether the identified robot has the torques of the arm.
 
 The arm of the measurement is the published one with links that are up to 20 % heavier and with twice the
-viscous friction. The identification knows the published numbers only.
+viscous friction. The identification uses only the published numbers.
 """
 
 from __future__ import annotations

@@ -273,7 +273,7 @@ def test_unsuitable_arguments_are_refused() -> None:
         (InputError, "a time occurs more than twice", ("k", {"t": [0.0, 1, 1, 1], "x": np.ones(4)}), {}),
         (InputError, "has values of the shape", ("k", {"t": t, "x": np.ones((7, 2))}), {}),
         (InputError, "a dictionary, a data frame or a file with the times", ("k", {"x": t}), {}),
-        (InputError, "or a column that is no array of numbers", ("k", {"t": t, "x": "fast"}), {}),
+        (InputError, "or a column that is not an array of numbers", ("k", {"t": t, "x": "fast"}), {}),
         (UnknownNameError, "no entry named", ("k", {"t": t, "x[4]": t}), {}),
         (InputError, "starts at 1, outside its bounds", ("k", data), {"bounds": {"k": (2.0, 3.0)}}),
         (InputError, "give the bounds in ascending order", ("k", data), {"bounds": {"k": (3.0, 2.0)}}),

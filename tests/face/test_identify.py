@@ -349,7 +349,7 @@ def test_unsuitable_arguments_are_refused() -> None:
     arm = small_arm()
     log = noisy_log(arm, 200)
     cases: list[tuple[str, dict[str, Any], dict[str, Any]]] = [
-        ("no parameter is to be estimated", {}, {"links": (), "friction": "none", "rotor_inertia": False}),
+        ("no parameter is selected for", {}, {"links": (), "friction": "none", "rotor_inertia": False}),
         ("no kind of friction named 'dry'", {}, {"friction": "dry"}),
         ("a frequency in Hz above 0", {}, {"cutoff": -1.0}),
         ("an integer, 1 or more", {}, {"decimate": 0}),

@@ -1,4 +1,4 @@
-"""Ctrl-C during an analysis: it always ends with KeyboardInterrupt, whatever is computed at that time."""
+"""Ctrl-C during an analysis: it ends with KeyboardInterrupt during every computation."""
 
 from __future__ import annotations
 

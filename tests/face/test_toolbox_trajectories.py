@@ -132,7 +132,7 @@ def test_mstraj_has_the_rows_of_the_toolbox(tacc: float, by_time: bool) -> None:
     assert_array_equal(motion.q[0], start)
     assert_allclose(motion.q[1:], expected, rtol=0, atol=1e-12)
     assert_allclose(motion.t, dt * np.arange(len(expected) + 1), rtol=1e-14)
-    if tacc:  # without blends the position jumps where a duration is no multiple of dt
+    if tacc:  # without blends the position jumps where a duration is not a multiple of dt
         assert_allclose(motion(motion.t).q, motion.q, atol=1e-14)
     assert_allclose(motion.q[-1], points[-1] if tacc else expected[-1], atol=1e-12)
     assert_array_equal(ab.mstraj([start, *points], *mode, None, dt, tacc, *ends).q, motion.q)

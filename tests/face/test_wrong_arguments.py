@@ -35,7 +35,7 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
         lambda: ab.SimulationOptions(stp=3),
         r"SimulationOptions: there is no argument named 'stp'",
     ),
-    "base": (lambda: robot(base=np.eye(3)), r"base of robot 'x': the pose is no Transform and no \(4, 4\)"),
+    "base": (lambda: robot(base=np.eye(3)), r"base of robot 'x': the pose is neither a Transform nor"),
     "tool": (lambda: robot(tool="up"), r"tool of robot 'x': the pose is a str"),
     "links": (
         lambda: ab.Robot(name="x", links=[1]),

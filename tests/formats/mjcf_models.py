@@ -1,4 +1,4 @@
-"""Random MJCF texts with every way to write poses, inertias, defaults and frames that the reader knows."""
+"""Random MJCF texts with every way to write poses, inertias, defaults and frames that the reader supports."""
 
 from __future__ import annotations
 

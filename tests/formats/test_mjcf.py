@@ -1,4 +1,4 @@
-"""MJCF files: random models compared with MuJoCo, and what the reader omits."""
+"""MJCF files: random models compared with MuJoCo, and elements that the reader omits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the elements of SDF mean, which files are included, and findings."""
+"""The meaning of the elements of SDF, included files, and findings."""
 
 from __future__ import annotations
 

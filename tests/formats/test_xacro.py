@@ -1,4 +1,4 @@
-"""Robots from xacro: macros, arguments and includes, and what is refused."""
+"""Robots from xacro: macros, arguments and includes, and refused expressions."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ def wrong_mechanisms() -> Iterator[tuple[str, Callable[[], DiagramBuilder], str]
     yield (
         "lonely body",
         lambda: mutated(("ball", BodyInertia())),
-        r"block 'ball' \(Inertia\): no frame line connects the block with anything.*6-DOF Joint",
+        r"block 'ball' \(Inertia\): the block has no frame line.*6-DOF Joint",
     )
     yield (
         "no world",
@@ -81,7 +81,7 @@ def wrong_mechanisms() -> Iterator[tuple[str, Callable[[], DiagramBuilder], str]
     yield (
         "second world",
         lambda: mutated(("zero", WorldFrame()), lines=(("zero/W", "rod/F"),)),
-        r"block 'zero' \(World Frame\): it is another frame than the World Frame 'world' of the",
+        r"block 'zero' \(World Frame\): the frame differs from the World Frame 'world' of the",
     )
 
 

@@ -1,4 +1,4 @@
-"""A joint, a solid and a force element of mechanics are each one class: no other file knows them."""
+"""A joint, a solid and a force element of mechanics are each one class: no other file names them."""
 
 from __future__ import annotations
 

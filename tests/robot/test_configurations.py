@@ -81,7 +81,7 @@ def test_configurations_are_an_immutable_mapping_with_an_order() -> None:
 @pytest.mark.parametrize(
     ("configurations", "words"),
     [
-        ({"a": [0.0]}, r"robot 'tree', configuration 'a': it has 1 coordinate\. Allowed: 7"),
+        ({"a": [0.0]}, r"robot 'tree', configuration 'a': the configuration has 1 coordinate\. Allowed: 7"),
         ({"a": [np.nan] * 7}, "configuration 'a': coordinate 1 is nan. Allowed: finite numbers"),
         ({"a": np.zeros((7, 1))}, r"the coordinates have the shape \(7, 1\)"),
         ({"a": np.zeros(7)}, "all entries of a quaternion are 0"),
@@ -134,7 +134,7 @@ def test_json_files_have_the_configurations_and_older_files_open() -> None:
     both = data.replace(b'  "constraints"', b'  "poses": [],\n  "constraints"')
     with pytest.raises(FormatError, match="both 'configurations' and 'poses'"):
         read_robots(both, "a.json")
-    for wrong, words in ((b'"q": [0.1]', "it has 1 coordinate"), (b'"q": ["1 m"]', "number")):
+    for wrong, words in ((b'"q": [0.1]', "the configuration has 1 coordinate"), (b'"q": ["1 m"]', "number")):
         broken = data[: data.index(b'"q": [')] + wrong + data[data.index(b"]", data.index(b'"q": [')) + 1 :]
         with pytest.raises(FormatError, match=words):
             read_robots(broken, "arm.json")

@@ -169,7 +169,7 @@ def test_shapes_with_lists_and_arrays_are_stored_as_tuples(pose: Any) -> None:
 
 
 def test_a_shape_with_an_invalid_pose_is_refused_by_name() -> None:
-    with pytest.raises(RobotError, match="pose of a Sphere: the pose is no Transform"):
+    with pytest.raises(RobotError, match="pose of a Sphere: the pose is neither a Transform"):
         Sphere(radius=1.0, pose=[[1.0]])  # pyright: ignore[reportArgumentType]
 
 

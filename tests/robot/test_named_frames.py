@@ -91,7 +91,7 @@ def test_unknown_frames_are_named_with_the_known_ones() -> None:
         ((NamedFrame(name="torso"),), "a frame and a link are named 'torso'"),
         ((NamedFrame(name="a", link="tors"),), "no link named 'tors'"),
         (("a",), "NamedFrame"),
-        ([NamedFrame(name=f"f{k}") for k in range(5001)], "it has 5001 named frames"),
+        ([NamedFrame(name=f"f{k}") for k in range(5001)], "the robot has 5001 named frames"),
     ],
 )
 def test_wrong_frames_are_refused(frames: tuple[NamedFrame, ...], message: str) -> None:

@@ -21,9 +21,9 @@ def refused(text: str):
 
 
 def test_links_must_form_a_tree():
-    with refused("robot 'arm': it has no links. Allowed: 1 link or more"):
+    with refused("robot 'arm': the robot has no links. Allowed: 1 link or more"):
         make()
-    with refused("robot 'arm': it has 1001 links. Allowed: at most 1000"):
+    with refused("robot 'arm': the robot has 1001 links. Allowed: at most 1000"):
         make(*(Link(name=str(i)) for i in range(1001)))
     with refused("robot 'arm': a link has no name"):
         make(Link(name=""))

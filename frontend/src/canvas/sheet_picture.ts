@@ -17,7 +17,7 @@ export interface PlacedName {
   propagated: boolean
 }
 
-/** What a sheet shows. */
+/** The displayed parts of a sheet. */
 export interface SheetContent {
   nodes: SheetNode[]
   edges: WireEdgeType[]

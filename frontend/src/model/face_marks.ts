@@ -40,7 +40,7 @@ const ATTRIBUTE = /([a-z-]+)="([^"]*)"/g
 const ENTITIES: Record<string, string> = { amp: '&', lt: '<', gt: '>', quot: '"', '#39': "'" }
 const ANCHORS = { middle: 'middle', end: 'end' } as const
 
-/** The marks of a face, from back to front. Images are left out. */
+/** The marks of a face, from back to front. Images are omitted. */
 export function faceMarks(face: string): FaceMark[] {
   return [...face.matchAll(ELEMENT)].map(([, kind, attributes, content = '']) => {
     const values = new Map([...attributes!.matchAll(ATTRIBUTE)].map(([, name, value]) => [name!, value!]))

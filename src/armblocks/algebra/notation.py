@@ -194,7 +194,7 @@ class Latex(Notation):
 
 
 def short_angle(atom: Atom) -> str | None:
-    """The digits of ``c12``, or None for angles that are no sum of joint angles."""
+    """The digits of ``c12``, or None for angles that are not sums of joint angles."""
     factors, constant = angle_of(atom)
     if constant or any(factor != 1.0 for _, factor in factors):
         return None

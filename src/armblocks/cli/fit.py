@@ -138,7 +138,7 @@ def _bound(text: str) -> tuple[str, tuple[float, float]]:
         raise InputError(
             f"'{text}' is not of the form block.parameter=low:high",
             where="--bounds",
-            allowed="two numbers with a colon between them; an empty one is no bound",
+            allowed="two numbers with a colon between them; without a number there is no bound",
             fix="write for example --bounds plant.mass=0:10",
         )
     low, high = (end.strip() for end in ends)

@@ -117,7 +117,7 @@ def _target(source: Path, output: Path | None, *, in_place: bool, force: bool) -
 
 
 def _write(robot: str, target: Path, corrected: CorrectedFile, console: Console) -> None:
-    """Write the corrected file, and print what was changed."""
+    """Write the corrected file, and print the corrections."""
     from armblocks.files import write_atomically
 
     for finding, what in corrected.changes:

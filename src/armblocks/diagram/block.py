@@ -245,7 +245,7 @@ class Block(ABC, metaclass=ArgumentErrors, methods=False):
         return ()
 
     def part(self) -> object:
-        """What a physical block contributes to its network, as data that the pass ``gathers`` reads."""
+        """The contribution of a physical block to its network, as data that the pass ``gathers`` reads."""
         return None
 
     def bus_inputs(self) -> tuple[str, ...]:

@@ -76,7 +76,7 @@ def check_accelerations_exist(tree: KinematicTree, speeds: Sequence[int] | None 
     raise RobotError(
         f"joint '{joint}' has no inertia to accelerate: the inertia matrix is singular at every position",
         where=f"robot '{tree.robot.name}', link '{joint}'",
-        allowed="mass or inertia beyond the joint that its motion moves, or motor inertia on the joint",
+        allowed="mass or inertia that moves with the joint, or motor inertia at the joint",
         fix="give the link a mass and an inertia, or the motor an inertia; or fix the joint",
     )
 

@@ -188,7 +188,7 @@ def _check_independent(
         raise RobotError(
             f"the constraints do not permit independent motions of the prescribed joints {names}",
             where=where,
-            allowed="joints that the constraints let move independently at the start",
+            allowed="joints that can move independently at the start",
             fix="prescribe other joints, or start from a configuration that is not singular",
         )
 

@@ -203,7 +203,7 @@ class Arm(NativeFunctions):
 
         The result has the reason if there is no solution: :class:`IkineResult`. Method: damped least squares
         with an active set of joint limits (Chan and Lawrence 1988; Sugihara, IEEE T-RO 27, 2011). For closed
-        loops, pose and constraints are solved together. Raises InputError for targets that are no poses.
+        loops, pose and constraints are solved together. Raises InputError for targets that are not poses.
         """
         return self._inverse.call(mask, limits, frame, axes, tolerance, restarts, seed)(T, q0, threads)
 

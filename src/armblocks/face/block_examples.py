@@ -45,7 +45,9 @@ _OPEN_SHAPES: tuple[Shape, ...] = ((), (3,), (2, 2), (3, 3), (4,), (4, 4))
 
 
 def block_example(kind: str | type[Block]) -> Diagram:
-    """The worked example of a block type (by class or type name), a small diagram.
+    """The worked example of a block type, a small diagram.
+
+    ``kind``: the class of the block or its name.
 
     Raises UnknownNameError for an unknown name.
     """

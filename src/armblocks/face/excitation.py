@@ -97,7 +97,7 @@ def excitation(
         raise InputError(
             "no motion within the torque limits was found",
             where=where,
-            allowed="limits that hold the arm in its range and accelerate it",
+            allowed="torque limits with which the arm can hold its weight and accelerate",
             fix="raise the torque limits, lower the speed and acceleration limits, or try more evaluations",
         )
     times = np.linspace(0.0, period, max(round(period / step), 1) + 1, dtype=np.float64)

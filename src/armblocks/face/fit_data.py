@@ -189,7 +189,7 @@ def _columns_of_object(data: object, where: str) -> tuple[Array, dict[str, Array
     time = arrays.pop(key).ravel()
     if len(time) < 2 or any(value.ndim == 0 for value in arrays.values()):
         raise InputError(
-            f"the measurement has {counted(len(time), 'time')} or a column that is no array of numbers",
+            f"the measurement has {counted(len(time), 'time')} or a column that is not an array of numbers",
             where=where,
             allowed="two or more times, and an array of numbers for each signal",
             fix="give one value for each time",

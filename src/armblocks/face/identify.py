@@ -85,7 +85,7 @@ def identify(
     model = TorqueModel(robot, chosen, friction, rotor_inertia=rotor_inertia)
     if not model.names:
         raise InputError(
-            "no parameter is to be estimated",
+            "no parameter is selected for estimation",
             where=where,
             allowed="links, friction or rotor inertia",
             fix="name a link, or choose a kind of friction",

@@ -237,7 +237,7 @@ def operating_points_at(
         raise InputError(
             f"the times to linearize at are {list(times)}",
             allowed="finite times >= 0 s",
-            fix="change them",
+            fix="give other times",
             where=f"diagram '{diagram.name}'",
         )
     compiled = compile_diagram(diagram)

@@ -24,7 +24,7 @@ from armblocks.sweeps.tables import Layout
 
 @dataclass(frozen=True)
 class ProgramRecipe:
-    """Everything but the model that the program of a sweep needs. ``lanes``: whether lanes are wanted."""
+    """The settings of the program of a sweep. ``lanes``: whether lanes are requested."""
 
     options: SimulationOptions
     measures: tuple[Measure, ...]

@@ -56,7 +56,7 @@ class SweepResult(metaclass=ArgumentErrors):
 
     ``complete``: whether all runs were computed; Ctrl-C ends a sweep early. ``planned``: the number of runs
     of the design. ``remark``: the number of runs that the native loop did not compute, the reason for this,
-    and the reason against lanes.
+    and the reason why lanes are not used.
     """
 
     name: str

@@ -183,7 +183,7 @@ def _bounds(
             raise InputError(
                 f"the bounds of '{name}' are {low:g} and {high:g}",
                 allowed="the lower number first",
-                fix="swap them",
+                fix="exchange the two numbers",
                 where=system.name,
             )
         scalar_bounds |= dict.fromkeys(layout[slot].elements, (float(low), float(high)))

@@ -122,7 +122,7 @@ class DiagramReader:
             return builder.draft() if self.draft else builder.build()
 
     def _add_parameter_sets(self, builder: DiagramBuilder, node: Node) -> None:
-        """The parameter sets of a diagram. Those of a draft may have parameters that do not exist."""
+        """The parameter sets of a diagram. The sets of a draft may have parameters that do not exist."""
         diagram = builder.draft()
         for name, entry in node.members().items():
             with located(entry):

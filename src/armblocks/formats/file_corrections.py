@@ -1,4 +1,4 @@
-"""Corrections of files: what was changed, and angles that are certainly in degrees."""
+"""Corrections of files: descriptions of the changes, and angles that are certainly in degrees."""
 
 from __future__ import annotations
 

@@ -384,7 +384,7 @@ def _transform_from_json(node: Node) -> Transform:
         _vector_from_json(members["translation"]) if "translation" in members else identity.translation
     )
     try:
-        with np.errstate(all="ignore"):  # numbers whose products overflow are no rotation
+        with np.errstate(all="ignore"):  # numbers whose products overflow are not a rotation
             return Transform(rotation=rotation, translation=translation)
     except ArmblocksError as error:
         raise node.error(error.what, allowed=error.allowed, fix=error.fix) from error

@@ -80,7 +80,7 @@ def limits_of(link: Link) -> JointLimits:
 
 
 def joint_friction(robot: Robot, link: Link, format: str) -> JointFriction:
-    """The friction of the link's motor at the joint, with warnings of what the format cannot describe."""
+    """The friction of the link's motor at the joint, with warnings of properties that the format lacks."""
     if link.motor is None:
         return JointFriction()
     viscous, coulomb = robot.friction_model.factors(link.motor.gear_ratio)

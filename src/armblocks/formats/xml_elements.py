@@ -232,7 +232,7 @@ def read_elements(data: bytes, file: str) -> Element:
             "the file has a document type or entities (<!DOCTYPE …>, <!ENTITY …>)",
             where=f"{file}:{handler.line}",
             allowed="XML without a document type",
-            fix="remove the declaration and write its texts out",
+            fix="remove the declaration, and replace each entity by its text",
         ) from None
     except (SAXException, ValueError, LookupError) as error:
         if isinstance(error, FormatError):

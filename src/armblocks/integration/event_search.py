@@ -148,9 +148,9 @@ class EventSearch:
     def _store_signs_before(self, instant: Real, time: Real) -> None:
         """Store the signs of all guards just before the event.
 
-        A guard may have crossed zero against its direction in this step. That crossing is no event, but the
-        guard needs its present sign for the comparison at the event. On the dense output of a step that was
-        taken to an unreliable location, guards may fire slightly earlier; these keep their signs.
+        A guard may have crossed zero against its direction in this step. That crossing is not an event, but
+        the guard needs its present sign for the comparison at the event. On the dense output of a step to an
+        unreliable location, guards may fire slightly earlier; these guards keep their signs.
         """
         f, r = self.frame, self.frame.r
         h = f.h.value

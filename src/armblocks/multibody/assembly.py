@@ -348,10 +348,10 @@ class _Assembly:
         is_world = self._group(frame) == self._group(self.world)
         if not is_world or self.groups.pose[frame] != self.groups.pose[self.world]:
             raise DiagramError(
-                f"it is another frame than the World Frame '{self.world_path}' of the same mechanism",
+                f"the frame differs from the World Frame '{self.world_path}' of the same mechanism",
                 where=self.net.label(path),
                 allowed="World Frame blocks of one mechanism that are one frame",
-                fix=f"draw a line from it to '{self.world_path}', or replace it by a Reference Frame",
+                fix=f"draw a line from the block to '{self.world_path}', or replace it by a Reference Frame",
             )
 
     def _check_all_connected(self) -> None:
@@ -364,8 +364,8 @@ class _Assembly:
                 "no chain of joints and rigid connections leads from the frame to the World Frame "
                 f"'{self.world_path}'",
                 where=self.net.label(path),
-                allowed="frames that joints connect with the World Frame; a force element is no connection",
-                fix="connect it by a joint: a 6-DOF Joint lets it move freely",
+                allowed="frames that joints connect with the World Frame; a force element does not connect",
+                fix="connect the frame by a joint; with a 6-DOF Joint it moves freely",
             )
 
     def _refuse_rigid_joint(self, path: str) -> None:
@@ -392,7 +392,7 @@ def _refuse_network_without_world(net: Netlist, parts: Mapping[str, Part]) -> No
     raise DiagramError(
         f"the mechanism of {blocks}{' …' if len(parts) > 5 else ''} has no World Frame"
         if joints or len(parts) > 1
-        else "no frame line connects the block with anything",
+        else "the block has no frame line",
         where=net.label(path),
         allowed="mechanisms that are connected with a World Frame",
         fix="add a World Frame and connect it, by a 6-DOF Joint for a body that moves freely",

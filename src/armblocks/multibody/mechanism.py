@@ -276,7 +276,7 @@ def _drawn_speeds(joint: PlacedJoint, tree_q: SX, qd: SX) -> SX:
 
 
 def _turned(part: JointPart, drawn_q: SX, values: SX, *, back: bool) -> list[SX]:
-    """The values of each motion, those of balls multiplied by ``-R``, or by ``-R'`` (``back``)."""
+    """The values of each motion; values of balls are multiplied by ``-R``, or by ``-R'`` (``back``)."""
     parts: list[SX] = []
     speeds, positions = _slices(part.motions, speeds=True), _slices(part.motions, speeds=False)
     for motion, at, where in zip(part.motions, speeds, positions):

@@ -1,4 +1,4 @@
-"""What blocks of mechanics contribute to a mechanism: the data that the pass ``gathering`` reads.
+"""The contributions of blocks of mechanics to a mechanism, which the pass ``gathering`` reads.
 
 A block of the family ``mechanics`` returns one of these parts. Frame ports are named here once.
 """
@@ -69,7 +69,7 @@ class BodyPart:
 
 @dataclass(frozen=True, kw_only=True)
 class Targets:
-    """The wished start of a joint: coordinates ``q`` (nq,) and speeds ``qd`` (nv,) with their priorities.
+    """The desired start of a joint: coordinates ``q`` (nq,) and speeds ``qd`` (nv,) with their priorities.
 
     ``high``: satisfied exactly, or an error. ``low``: the start is searched near the target. ``none``: the
     target is ignored.

@@ -57,7 +57,7 @@ def start_of(net: Netlist, drawn: DrawnMechanism) -> Start:
         raise DiagramError(
             f"the velocity targets of high priority, at {_listed(locked)}, disagree: {error.what}",
             where=net.label(locked[0]),
-            allowed="velocity targets of high priority that all joints of the loops can have together",
+            allowed="velocity targets of high priority that do not contradict each other",
             fix="give fewer joints a velocity target of high priority: one for each degree of freedom",
         ) from error
     return Start(q, qd)

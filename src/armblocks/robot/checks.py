@@ -43,10 +43,13 @@ def check_robot(name: str, links: Sequence[Link], frames: Mapping[str, Transform
 def _check_tree(robot: str, links: Sequence[Link]) -> None:
     """Check the number of links, their names and parents: every chain of parents ends at the base."""
     if not links:
-        raise RobotError("it has no links", where=robot, allowed="1 link or more", fix="add a link")
+        raise RobotError("the robot has no links", where=robot, allowed="1 link or more", fix="add a link")
     if len(links) > MAX_LINKS:
         raise RobotError(
-            f"it has {len(links)} links", where=robot, allowed=f"at most {MAX_LINKS}", fix="split the robot"
+            f"the robot has {len(links)} links",
+            where=robot,
+            allowed=f"at most {MAX_LINKS}",
+            fix="split the robot",
         )
     parents: dict[str, str | None] = {}
     for link in links:

@@ -38,8 +38,8 @@ class Configuration(NamedTuple):
 class Configurations(Mapping[str, Array], metaclass=ArgumentErrors):
     """The named configurations of a robot in their order: ``robot.configurations["ready"]`` is q (nq,).
 
-    Each access returns a new array, rad or m. It is an immutable value: equal and with the same hash as other
-    configurations with the same names, numbers and order. ``entries``: names and coordinates as tuples.
+    Each access returns a new array, rad or m. The mapping is immutable. Two of them are equal, with the same
+    hash, if names, numbers and order are the same. ``entries``: names and coordinates as tuples.
     ``layout``: the joints of the robot that the coordinates belong to, with their units; None: not known.
 
     Created from a mapping of names to coordinates, or from pairs of name and coordinates. Raises RobotError
@@ -129,10 +129,10 @@ class Configurations(Mapping[str, Array], metaclass=ArgumentErrors):
 def configurations_of(value: object, joints: Mapping[str, Joint], where: str) -> Configurations:
     """The configurations of a robot with these ``joints``, by name in the order of q.
 
-    ``value``: a mapping or pairs, or the configurations of a robot. Those of a robot with other joints, as
-    ``dataclasses.replace`` passes them for edited links, follow the joints: joints keep their coordinates by
-    name, and a renamed joint by its place; a new joint, or one of another type, has its neutral coordinates.
-    Errors name the robot, ``where``. Raises RobotError for another number of coordinates.
+    ``value``: a mapping or pairs, or the configurations of a robot. ``dataclasses.replace``
+    passes the configurations of a robot with other joints. Then each joint keeps its coordinates by name, or
+    by its place if it was renamed. A new joint and a joint of another type get neutral coordinates. Errors
+    name the robot, ``where``. Raises RobotError for another number of coordinates.
     """
     if isinstance(value, Configurations) and not value.entries:
         return value
@@ -238,7 +238,7 @@ def _check_lengths(configurations: Configurations, joints: Sequence[Joint]) -> N
         place = f"{configurations.where}, configuration '{name}'"
         if len(q) != count:
             raise RobotError(
-                f"it has {counted(len(q), 'coordinate')}",
+                f"the configuration has {counted(len(q), 'coordinate')}",
                 where=place,
                 allowed=f"{count}, one for each coordinate of the robot",
                 fix="record the configuration again, or remove it from configurations",

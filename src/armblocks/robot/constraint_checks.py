@@ -49,16 +49,14 @@ def _check_prescribed(
     others = [c for c in constraints if isinstance(c, PrescribedMotion) and c.joint == name]
     coupling = dependent_joints([c for c in constraints if isinstance(c, Coupling)]).get(name)
     if not next(link for link in links if link.name == name).joint.moves:
-        what, fix = f"joint '{name}' is fixed", "name a joint that moves, or leave the constraint out"
+        what, fix = f"joint '{name}' is fixed", "name a joint that moves, or remove the constraint"
     elif coupling is not None:
         sources = ", ".join(f"'{joint}'" for joint, _ in coupling.terms[1:])
         what = f"joint '{name}' already follows from coupling '{coupling.name}'"
-        fix = (
-            f"prescribe the joints on which it depends: {sources}" if sources else "leave the constraint out"
-        )
+        fix = f"prescribe the joints on which it depends: {sources}" if sources else "remove the constraint"
     elif others[0] is not constraint:
         what = f"constraint '{others[0].name}' already prescribes joint '{name}'"
-        fix = "leave one of them out"
+        fix = "remove one of them"
     else:
         return
     raise RobotError(

@@ -73,7 +73,7 @@ def _rows(robot: Robot) -> Sequence[DhRow]:
     rows = [link.dh for link in robot.links if link.dh is not None]
     if len(rows) < len(robot.links) or robot.links != serial_chain(robot.links):
         raise RobotError(
-            "it is not a single chain of D-H rows",
+            "the robot is not a single chain of D-H rows",
             where=where,
             allowed="robots in which every link has a row and the previous link as parent",
             fix="build its links with standard_dh or modified_dh",

@@ -39,7 +39,7 @@ def pose(value: object, *, where: str) -> Transform:
     try:
         return Transform.from_matrix(cast("ArrayLike", value))
     except InputError as error:
-        problem = f"the pose is no Transform and no (4, 4) matrix: {error.what}"
+        problem = f"the pose is neither a Transform nor a (4, 4) matrix: {error.what}"
         raise RobotError(problem, where=where, allowed=error.allowed, fix=error.fix) from None
     except (TypeError, ValueError):
         raise RobotError(
@@ -68,7 +68,7 @@ def check_parts(parts: Sequence[Named], kind: type, noun: str, most: int, *, whe
     ``noun``: the word for one part in messages. ``fix``: what to do if there are too many.
     """
     if len(parts) > most:
-        what = f"it has {len(parts)} {noun}s"
+        what = f"the robot has {len(parts)} {noun}s"
         raise RobotError(what, where=where, allowed=f"at most {most}", fix=fix)
     names: set[str] = set()
     for part in parts:

@@ -63,9 +63,9 @@ class Link(metaclass=ArgumentErrors):
 
     ``mass`` kg; ``centre_of_mass`` m in the link's frame; ``inertia`` kg m2 about the centre of mass in the
     link's axes: a (3, 3) array, or Ixx Iyy Izz, or Ixx Iyy Izz Ixy Iyz Ixz. These are the matrix entries, so
-    Ixy is minus the integral of x y dm. ``motor`` drives the link's joint; each speed of a joint with several
-    has such a motor. ``geometry`` are the shapes of the drawing; ``None``: they are derived from the
-    kinematics.
+    Ixy is minus the integral of x y dm. ``motor`` drives the link's joint; a joint with several degrees of
+    freedom has such a motor for each of them. ``geometry`` are the shapes of the drawing; ``None``: they are
+    derived from the kinematics.
 
     Raises RobotError for wrong shapes. :class:`armblocks.robot.Robot` checks the values, because its messages
     name the robot and the link.

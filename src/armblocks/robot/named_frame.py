@@ -40,7 +40,7 @@ def check_frames(robot: str, links: Sequence[Link], frames: Sequence[NamedFrame]
     where = f"robot '{robot}'"
     if len(frames) > MAX_FRAMES:
         raise RobotError(
-            f"it has {len(frames)} named frames",
+            f"the robot has {len(frames)} named frames",
             where=where,
             allowed=f"at most {MAX_FRAMES}",
             fix="omit frames that are not used",

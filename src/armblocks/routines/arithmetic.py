@@ -65,7 +65,7 @@ def maximum(a: NumberT, b: NumberT | float) -> NumberT:
 
 
 def select_number(condition: Condition, yes: NumberT | float, no: NumberT | float) -> NumberT:
-    """:func:`select` for functions of a double, or of one in each lane; at least one is no Python number."""
+    """:func:`select` for functions of doubles or lanes; at least one value is not a Python number."""
     return cast("Any", select)(condition, yes, no)
 
 

@@ -30,7 +30,7 @@ LENGTH_RANGE = 1.0
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ViewContent:
-    """What the front end shows: a JSON object, a binary frame of samples, the robot of the sliders."""
+    """The content of a view: a JSON object, a binary frame of samples, the robot of the sliders."""
 
     title: str
     shown: dict[str, Any]

@@ -52,7 +52,7 @@ def _bounds(kind: str, low: float, high: float) -> tuple[float, float]:
             f"{kind} has the bounds {low!r} and {high!r}",
             allowed="two finite numbers, the lower number first",
             where="sweep",
-            fix="exchange them, or vary a list with one value",
+            fix="exchange the bounds, or vary a list with one value",
         )
     return float(low), float(high)
 

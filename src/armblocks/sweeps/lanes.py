@@ -1,4 +1,4 @@
-"""Runs of one compiled system in the lanes of vector registers: memory, and the reason against lanes."""
+"""Runs of one compiled system in the lanes of vector registers: memory, and models without lanes."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class LaneRuns:
         arrays: Sequence[LaneArrays],
         max_steps: int,
     ) -> None:
-        """``arrays``: those of each lane. ``max_steps``: the maximum number of steps of a run."""
+        """``arrays``: the arrays of each lane. ``max_steps``: the maximum number of steps of a run."""
         tableau = plan.tableau
         assert isinstance(tableau, ButcherTableau)
         lanes, segments = len(arrays), compiled.breakpoint_count + 1

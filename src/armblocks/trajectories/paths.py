@@ -29,7 +29,7 @@ def turning_points(path: PiecewisePolynomial, joints: NDArray[np.bool_]) -> Arra
     with np.errstate(divide="ignore", invalid="ignore"):
         u = np.stack([larger / three, linear / larger])
     length = np.diff(path.times)[:, None]
-    # A double zero is no change of direction.
+    # At a double zero the direction does not change.
     inside = (root > 0.0) & (u > 1e-9 * length) & (u < (1.0 - 1e-9) * length)
     return np.unique((path.times[:-1, None] + u)[inside])
 

@@ -201,7 +201,10 @@ def test_poses_are_recorded_named_moved_updated_removed_and_undone() -> None:
 @pytest.mark.parametrize(
     ("edit", "words"),
     [
-        (pose_edits.RecordPose(q=[0.0]), "configuration 'P2': it has 1 coordinate. Allowed: 6"),
+        (
+            pose_edits.RecordPose(q=[0.0]),
+            "configuration 'P2': the configuration has 1 coordinate. Allowed: 6",
+        ),
         (pose_edits.RecordPose(q=[0.0] * 6, name="P1"), "two configurations are named 'P1'"),
         (pose_edits.RenamePose(name="P1", to=" "), "'' is not a name of a configuration"),
         (pose_edits.MovePose(name="P1", by=1), "there is no pose on that side"),

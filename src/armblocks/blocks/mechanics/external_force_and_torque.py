@@ -21,7 +21,7 @@ from armblocks.spatial.vectors import ZERO, Vector, add, scale
 class ExternalForceAndTorque(MechanicsBlock):
     """A force and a torque on the body at frame F, at its origin, given by signals.
 
-    ``resolution``: the axes of the signals, those of the World Frame or of F.
+    ``resolution``: the axes of the signals: the axes of the World Frame or of F.
     """
 
     title: ClassVar[str] = "External Force and Torque"

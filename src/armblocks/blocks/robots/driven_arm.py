@@ -63,7 +63,7 @@ class DrivenArm(Block):
     robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
     joints: str = parameter(
         "",
-        doc="joints whose motions are prescribed, separated by commas; empty: those of the robot's "
+        doc="joints whose motions are prescribed, separated by commas; empty: joints of the robot's "
         "description, or all joints",
     )
     q0: ArrayLike = parameter(

@@ -1,8 +1,8 @@
 """Exponentials and hyperbolic functions.
 
-``x = k ln 2 + r`` with ``|r| <= ln(2)/2`` in two parts. ``exp r - 1`` is computed as an unevaluated pair, so
-that small results are exact to their last place. The power of two is applied in two halves, so overflow and
-subnormal results need no separate case.
+The argument is reduced to ``x = k ln 2 + r`` with ``|r| <= ln(2)/2``, where r has two parts. ``exp r - 1`` is
+computed as an unevaluated pair, so that small results are exact to their last place. The power of two is
+applied in two halves, so overflow and subnormal results need no separate case.
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ def link_bodies(robot: Robot) -> list[Body | None]:
     """The bodies of the base, every link and the tool, in the frames of ``link_poses``; None without any."""
     rows = [[_of_shape(shape) for shape in row] for row in robot_shapes(robot)]
     if any(link.geometry is not None for link in robot.links):
-        rows[0] = []  # the drawn pedestal is no part of a robot whose links have shapes
+        rows[0] = []  # the drawn pedestal is not part of a robot whose links have shapes
     return [Body.of(row) if row else None for row in rows]
 
 

@@ -51,7 +51,7 @@ class WorkspaceSlice(metaclass=ArgumentErrors):
 
     ``normal``: the axis; ``at``: the coordinate (m) of the centres of the layer. ``axes``: the names of the
     two other axes; ``first`` (na,) and ``second`` (nb,) m: the centres of the cells along them. ``counts``
-    (na, nb); ``maps`` with arrays (na, nb).
+    (na, nb): numbers of samples in the cells. ``maps``: for each measure, its values in the cells (na, nb).
     """
 
     normal: str
@@ -65,7 +65,7 @@ class WorkspaceSlice(metaclass=ArgumentErrors):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WorkspaceCells(metaclass=ArgumentErrors):
-    """The fields of :class:`armblocks.Workspace`, and everything but its pictures and files."""
+    """The data and functions of :class:`armblocks.Workspace` without its pictures and files."""
 
     name: str
     frame: str

@@ -80,7 +80,9 @@ def coulomb_from(location: Location, value: Value) -> tuple[float, float]:
     plus, minus = numbers(location, array, "Tc", 2)
     if plus < minus:
         raise location.error(
-            f"Tc has {plus:g} before {minus:g}", allowed="[Tc+ Tc-] with Tc+ above Tc-", fix="swap the two"
+            f"Tc has {plus:g} before {minus:g}",
+            allowed="[Tc+ Tc-] with Tc+ above Tc-",
+            fix="exchange the two",
         )
     return plus, minus
 

@@ -61,7 +61,7 @@ class Connection(NamedTuple):
 
 @dataclass(kw_only=True)
 class Assembly:
-    """``parts`` by node. A node that is no part is a frame, such as the frame of a subassembly.
+    """``parts`` by node. A node that is not a part is a frame, such as the frame of a subassembly.
 
     ``loose``: the poses of nodes that may be unconnected; ``where``: the place of the assembly in the file.
     """

@@ -44,9 +44,7 @@ class Coupling(Constraint):
                 "a number is not finite", where=where, allowed="finite numbers", fix="correct the number"
             )
         if any(value == 0.0 for _, value in terms):
-            raise RobotError(
-                "a coefficient is 0", where=where, allowed="other numbers", fix="leave the joint out"
-            )
+            raise RobotError("a coefficient is 0", where=where, allowed="other numbers", fix="omit the joint")
 
     def with_renamed_link(self, old: str, new: str) -> Self:
         terms = tuple((new if joint == old else joint, factor) for joint, factor in self.terms)

@@ -110,7 +110,7 @@ def read_journal(path: Path) -> tuple[list[Record], int]:
         raise FormatError(
             f"the journal cannot be read ({error.strerror})",
             where=str(path),
-            fix="check the rights of the file, or open the document's own file",
+            fix="check the permissions of the file, or open the document's own file",
         ) from error
     records: list[Record] = []
     whole = 0

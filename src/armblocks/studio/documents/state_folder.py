@@ -1,4 +1,4 @@
-"""Private files of the studio, outside the project folder, with access rights for their user only.
+"""Private files of the studio, outside the project folder, with access permissions for their user only.
 
 There is one folder for each project folder. It contains the journals of unsaved documents, the list of recent
 files, and the session secret with which clients reconnect after a restart of the server.
