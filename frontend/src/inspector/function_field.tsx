@@ -153,8 +153,8 @@ function Trust({ source, onTrust, onReload }: TrustProps) {
   return (
     <Alert color="yellow" variant="light" p="xs" title="This code has not been trusted">
       <Text size="sm">
-        The code does not run yet. Once you trust the code, runs execute it and the modules that it
-        imports, with all your permissions on this computer. Trust the code only if you have read it.
+        The code does not run yet. Once you trust the code, runs execute it and the modules that it imports,
+        with all your permissions on this computer. Trust the code only if you have read it.
       </Text>
       {source.hidden > 0 && (
         <Text size="sm" c="red">

@@ -107,7 +107,7 @@ def consistent_fit(A: Array, y: Array, prior: Array, constraints: Constraints) -
     scale = constraints.scale
     start = constraints.interior(prior)
     matrix = A * scale
-    # Exact data have weights without bound; the pull to the start would be lost in rounding errors.
+    # Exact data have weights without bound; the weight of the start would be lost in rounding errors.
     weight = min(1.0, _LARGEST / max(float(np.linalg.norm(matrix, axis=0).max(initial=0.0)), 1e-300))
     matrix, y = weight * matrix, weight * (y - A @ start)
     H = matrix.T @ matrix + PULL**2 * np.eye(len(prior))

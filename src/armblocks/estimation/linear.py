@@ -121,7 +121,7 @@ def _own_deviation(rows: Rows, size: float) -> float:
 
 
 def _deviation(rows: Rows, fit: LinearFit, old: float, size: float) -> float:
-    """The standard deviation of a sensor, with the degrees of freedom that its rows have left."""
+    """The standard deviation of a sensor, with the remaining degrees of freedom of its rows."""
     X = rows.factor[:, :-1]
     covariance = fit.covariance[np.ix_(rows.columns, rows.columns)]
     used = float(np.einsum("ij,jk,ik->", X, covariance, X)) / old**2

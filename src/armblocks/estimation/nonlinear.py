@@ -162,7 +162,7 @@ def _minimise(
 
 
 def _deviations(found: tuple[list[Array], list[Array]], sigma: Array, scales: Array) -> Array:
-    """The standard deviation of each sensor, with the degrees of freedom that its residuals have left."""
+    """The standard deviation of each sensor, with the remaining degrees of freedom of its residuals."""
     residuals, derivatives = found
     J = np.vstack([part / s for part, s in zip(derivatives, sigma.tolist())])
     inverse = np.linalg.pinv(J.T @ J)

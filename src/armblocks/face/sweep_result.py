@@ -182,7 +182,7 @@ class SweepResult(metaclass=ArgumentErrors):
         return sobol_indices(name, tuple(self.source.design.columns), values)
 
     def morris(self, name: str) -> MorrisEffects:
-        """Elementary effects of Morris on a column, for the choice of the parameters that matter.
+        """Elementary effects of Morris on a column, which show the parameters that have an effect.
 
         For a sweep with ``design="morris"`` and ``runs`` a multiple of d + 1 for d parameters. Paths with a
         failed run are omitted. Raises ``InputError`` for other designs and incomplete sweeps.

@@ -96,7 +96,7 @@ def world_block(parts: Mapping[str, Part], network: Sequence[str]) -> str:
 
 @dataclass(frozen=True)
 class _Edge:
-    """A joint of the tree from a group that is reached already to the next one."""
+    """A joint of the tree, from a group that is in the tree already to another group."""
 
     path: str
     part: JointPart
@@ -192,7 +192,7 @@ class _Assembly:
         return _Edge(path, self.joints[path], near, far, reverse)
 
     def _chord(self, path: str, ends: tuple[int, int]) -> _Edge:
-        """A joint that closes a loop. One that must have coordinates is added to the cuts."""
+        """A joint that closes a loop. A joint that must have coordinates is added to the cuts."""
         part = self.joints[path]
         edge = self._edge(path, reverse=False)
         if not part.needs_coordinate and part.closure is not None:

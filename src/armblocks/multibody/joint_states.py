@@ -127,7 +127,7 @@ class JointStates(Block):
         return np.broadcast_to(value, (self.place.nv,))
 
     def _has_springs(self) -> bool:
-        """Whether the spring is in the equations; that of a ball joint is not tunable."""
+        """Whether the spring is in the equations; the spring of a ball joint is not tunable."""
         tunable = any(rule.name == "spring_stiffness" for rule in self.joint.inputs_of_the_run())
         return tunable or bool(np.any(self._numbers("spring_stiffness")))
 

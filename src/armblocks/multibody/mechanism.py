@@ -255,7 +255,7 @@ def _tree_speeds(joint: PlacedJoint, drawn_q: SX, qd: SX) -> SX:
 
 
 def _tree_forces(joint: PlacedJoint, tree_q: SX, force: SX) -> SX:
-    """The generalised forces of the tree, with the power of those of the drawn joint."""
+    """The generalised forces of the tree, with the same power as the forces of the drawn joint."""
     if not joint.reversed:
         return force
     drawn_q = _drawn_coordinates(joint, tree_q[_positions(joint)])

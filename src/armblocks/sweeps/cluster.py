@@ -89,7 +89,7 @@ class ClusterScheduler(Scheduler):
         most, checked = 0, float("-inf")
         try:
             while True:
-                if perf_counter() - checked > 1.0:  # workers come and go
+                if perf_counter() - checked > 1.0:  # the number of workers changes
                     most = TASKS_OF_A_THREAD * max(1, sum(self._client.nthreads().values()))
                     checked = perf_counter()
                 while len(pending) < most and (task := next(tasks, None)) is not None:

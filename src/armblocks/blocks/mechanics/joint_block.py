@@ -29,7 +29,7 @@ class JointBlock(Block):
     """Base class of joints between the frames B (base) and F (follower).
 
     A joint is a sequence of elementary motions from B to F: a subclass declares ``motions``, and ``closure``
-    if a type of constraint has the same relations. Coordinates are those of F relative to B.
+    if a type of constraint has the same relations. Coordinates describe F relative to B.
 
     ``q``, ``qd`` and ``qdd`` of a joint with coordinates are recorded in every run as signals of the block;
     the parameters ``sense_position`` … give it output ports for them.
@@ -46,7 +46,7 @@ class JointBlock(Block):
         0.0,
         kind=ParameterKind.ARRAY,
         dimensions=(0, 1),
-        doc="coordinates at the start, or 0 for the neutral ones",
+        doc="coordinates at the start, or 0 for neutral coordinates",
         unit="rad",
     )
     position_priority: str = parameter(

@@ -15,7 +15,7 @@ class MechanicsBlock(Block):
     """Base class of frames, bodies, force elements and sensors: :meth:`part` describes one.
 
     A subclass overrides ``frame_ports`` and ``part`` (:mod:`armblocks.multibody.parts`). The pass
-    :mod:`armblocks.multibody.gathering` makes equations of all of them.
+    :mod:`armblocks.multibody.gathering` converts all parts to equations.
     """
 
     virtual: ClassVar[bool] = True

@@ -33,7 +33,7 @@ class TransformSensor(MechanicsBlock):
 
     ``measurement_frame``: the axes of the vectors, and the motion that is subtracted. ``world``: axes of the
     World Frame, differences of the motions of both origins. ``nonrotating_base``: the same, in the present
-    axes of B. ``base``: the motion that an observer sees who rotates with B, in the axes of B.
+    axes of B. ``base``: the motion relative to axes that rotate with B, in the axes of B.
     """
 
     title: ClassVar[str] = "Transform Sensor"
