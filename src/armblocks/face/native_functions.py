@@ -137,9 +137,9 @@ class NativeFunctions(metaclass=ArgumentErrors):
         The joints of the robot's :class:`PrescribedMotion` constraints have the given accelerations
         ``qdd``, all other joints the given torques ``tau``; the other entries of the arguments are not read.
         The results are the accelerations of all joints, rad/s² or m/s², and the torques of all joints, N m or
-        N, among them those of the drives of the prescribed joints. In closed loops the state is the
-        consistent one nearest to ``q``, ``qd`` with the given motion of these joints; the results are NaN if
-        it is too far. ``wrench=`` and ``payload=`` as for ``rne``. Raises RobotError without prescribed
+        N, including the drives of the prescribed joints. In closed loops the state is the consistent state
+        nearest to ``q``, ``qd`` with the given motion of these joints; the results are NaN if this state is
+        too far away. ``wrench=`` and ``payload=`` as for ``rne``. Raises RobotError without prescribed
         joints, and if their motions depend on each other.
         """
         return cast("HybridFunction", self._code.loaded("hybrid_dynamics"))

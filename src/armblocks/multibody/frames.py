@@ -149,8 +149,8 @@ def _check_rigid_loop(net: Netlist, path: str, known: Transform, reached: Transf
 def spanning_joints(joints: Sequence[tuple[str, int, int, bool]]) -> set[str]:
     """The joints of a spanning tree of the groups; the others close loops.
 
-    ``joints``: path, groups of base and follower, and whether the joint must have coordinates. Such joints
-    come first into the tree; otherwise the order of the paths decides.
+    ``joints``: path, groups of base and follower, and whether the joint must have coordinates. The tree
+    takes such joints first, then the other joints, both in the order of their paths.
     """
     sets = DisjointSets()
     ordered = sorted(joints, key=lambda joint: (not joint[3], joint[0]))

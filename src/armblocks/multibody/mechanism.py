@@ -246,8 +246,8 @@ def _drawn_coordinates(joint: PlacedJoint, q: SX) -> SX:
 def _tree_speeds(joint: PlacedJoint, drawn_q: SX, qd: SX) -> SX:
     """The speeds of the tree from those of the drawn joint.
 
-    A ball joint with the rotation R of the follower in the base has the angular velocity w in follower axes;
-    that of the base relative to the follower, in base axes, is ``-R w``.
+    A ball joint with the rotation R of the follower in the base has the angular velocity w in follower axes.
+    The angular velocity of the base relative to the follower, in base axes, is ``-R w``.
     """
     if not joint.reversed:
         return qd

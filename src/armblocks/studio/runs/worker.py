@@ -335,7 +335,7 @@ class _Run:
     ) -> None:
         self.state = state
         self._progress(message, solver=solver, reason=reason)
-        # The end of the pipe must not overtake the messages in it.
+        # The pipe must remain open until its messages were sent.
         sleep(0.05)
 
     def _fail(self, error: ArmblocksError) -> None:

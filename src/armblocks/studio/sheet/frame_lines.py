@@ -27,7 +27,7 @@ def shown_lines(diagram: Diagram) -> list[Wire]:
 
 
 def split_wires(wires: Sequence[Wire], diagram: Diagram) -> tuple[list[Wire], list[FrameLine]]:
-    """Return the wires of signals, and the frame lines that the other wires mean."""
+    """Return the wires of signals, and the frame lines that the other wires represent."""
     signals: list[Wire] = []
     lines: list[FrameLine] = []
     for wire in wires:
