@@ -64,12 +64,12 @@ def excitation(
     """Find a motion of ``duration`` s along which the parameters of an arm can be identified.
 
     Each joint moves by a Fourier series with ``harmonics`` terms of the frequency 1 / ``duration``, at rest
-    (speed and acceleration 0) at start and end, within the position limits of the robot and the limits of
-    ``speed`` (rad/s or m/s), ``acceleration`` and ``torque``, by default the limits of the robot. A seeded
-    random search minimises the condition number of the regressor of the base parameters, friction included.
-    ``progress(evaluations, condition)`` is called at each improvement; Ctrl-C ends the search with the best
-    motion so far. ``dt`` (s): about the time between samples, a fraction of the duration. Collisions are not
-    checked: look at ``arm.animate`` first.
+    (speed and acceleration 0) at start and end. The motion is within the position limits of the robot and the
+    limits of ``speed`` (rad/s or m/s), ``acceleration`` and ``torque``, by default the limits of the robot. A
+    seeded random search minimises the condition number of the regressor of the base parameters, friction
+    included. ``progress(evaluations, condition)`` is called at each improvement; Ctrl-C ends the search with
+    the best motion so far. ``dt`` (s): about the time between samples, a fraction of the duration. Collisions
+    are not checked: look at ``arm.animate`` first.
 
     The motion has a limited spectrum, ``harmonics / duration`` Hz, so that it can be filtered exactly, and
     repeated, so that periods can be averaged. Source: Swevers et al., *Optimal robot excitation and

@@ -138,11 +138,12 @@ def size_drives(
 
     In a cycle of :func:`~armblocks.pick_and_place` the payload is at the tool only in the loaded phases.
 
-    The torque of a motor is the torque of gravity and of the rigid bodies with the ``payload`` (a
-    :class:`Payload`, or kg at the tool), converted by the ratio and efficiency of the gear, plus the torques
-    of inertia and friction of the drive itself. The motors of the robot's file are replaced by the
-    candidates. In the pause the motor holds the arm. With ``brakes_in_pause`` the brake holds it, and the
-    motor torque is 0. The brake must hold the largest gravity torque of the motion.
+    The torque of a motor is the sum of two parts. The first part is the torque of gravity and of the rigid
+    bodies with the ``payload`` (a :class:`Payload`, or kg at the tool), converted by the ratio and efficiency
+    of the gear. The second part is the torque of inertia and friction of the drive itself. The motors of the
+    robot's file are replaced by the candidates. In the pause the motor holds the arm. With
+    ``brakes_in_pause`` the brake holds it, and the motor torque is 0. The brake must hold the largest gravity
+    torque of the motion.
 
     Raises InputError without a drive for some joint or for an unknown joint of a drive; RobotError for robots
     with closed loops, ball joints, or motors at joints that depend on others.

@@ -157,7 +157,7 @@ def mstraj(
     blends, s. ``qd0``, ``qdf`` (n,): speeds at the ends.
 
     The motion passes near the inner points and ends at the last point. As in releases 9 and 10, the durations
-    of blends and, for given ``qdmax``, of segments are rounded up to multiples of ``dt``, a segment takes at
+    of blends and, for given ``qdmax``, of segments are rounded up to multiples of ``dt``. A segment takes at
     least two blends, and its speed is the distance between the points divided by its duration. The table
     includes the start, which the toolbox omits. A duration that is a multiple of ``dt`` up to rounding is not
     lengthened.

@@ -236,10 +236,10 @@ def trajectory_report(
 
     The limits are defined as for :func:`~armblocks.least_time`; torques are computed by ``arm.rne`` with the
     ``payload``. In a cycle of :func:`~armblocks.pick_and_place` the payload is at the tool only in the loaded
-    phases. With ``obstacles`` (``()`` for none) the report names the first contact of the links with each other
-    and with these bodies, as :func:`~armblocks.collisions` with this ``margin`` (m); ``collisions`` has all
-    distances. The body in the gripper is not included. Raises InputError for a trajectory with another number
-    of joints.
+    phases. With ``obstacles`` (``()`` for none) the report names the first contact of the links with each
+    other and with these bodies, as :func:`~armblocks.collisions` with this ``margin`` (m); ``collisions`` has
+    all distances. The body in the gripper is not included. Raises InputError for a trajectory with another
+    number of joints.
     """
     where = "trajectory_report"
     limits = motion_limits(arm, where, speed, acceleration, torque)

@@ -157,7 +157,7 @@ class DrivenArm(Block):
 
     @abstractmethod
     def state_of(self, x: Signals, u: Signals) -> tuple[SX, SX, SX]:
-        """``q`` (nq,), ``qd`` (n,) of all joints, and ``qdd`` (n,) with those of the prescribed joints."""
+        """``q`` (nq,), ``qd`` (n,) of all joints, and ``qdd`` (n,) of the prescribed joints."""
 
     @abstractmethod
     def _integrated(self) -> JointEntries:
@@ -187,8 +187,8 @@ class DrivenArm(Block):
 class AccelerationDrivenArm(DrivenArm):
     """The robot with joints whose accelerations are given: motion of all joints, torques of the drives.
 
-    The prescribed joints have exactly the accelerations of the input ``motion``, whatever the torques that
-    this needs; the output ``drive`` has these torques (N m or N), with rotor inertia and friction. The other
+    The prescribed joints have exactly the accelerations of the input ``motion``. The output ``drive`` has
+    the torques of this motion (N m or N), with rotor inertia and friction; they are not limited. The other
     joints move under the torques ``tau``; M(q) q'' + C q' + g + friction = tau holds for all joints. Joints
     of all types can be prescribed, such as the six degrees of freedom of a moving base. The robot may have
     couplings and closed loops; the start must satisfy them (``arm.assemble``).
@@ -225,8 +225,8 @@ class AccelerationDrivenArm(DrivenArm):
 class PositionDrivenArm(DrivenArm):
     """The robot with joints whose positions are given: motion of all joints, torques of the drives.
 
-    The prescribed joints have exactly the coordinates of the input ``motion``, whatever the torques that this
-    needs; the output ``drive`` has these torques (N m or N), with rotor inertia and friction. Speeds and
+    The prescribed joints have exactly the coordinates of the input ``motion``. The output ``drive`` has the
+    torques of this motion (N m or N), with rotor inertia and friction; they are not limited. Speeds and
     accelerations are the exact first and second derivatives of the input, which must be smooth: at a jump of
     its value or its rate the impulse of the drive is not modelled, and an input that is held between samples
     has the rate 0. The other joints move under the torques ``tau``. A quaternion may have any length.

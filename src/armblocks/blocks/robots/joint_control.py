@@ -223,7 +223,7 @@ class FeedForward(Block):
     """Feedforward and PD: tau = rne(qr, qdr, qddr) + Kp (qr - q) + Kd (qdr - qd).
 
     In robots with closed loops only the joints with a motor are controlled, and only they have torques. The
-    desired motion of the other joints follows from the constraints; their desired coordinates are its guess.
+    desired motion of the other joints follows from the constraints, with their inputs as the initial guess.
     """
 
     title: ClassVar[str] = "Feed-Forward Controller"

@@ -18,7 +18,7 @@ from armblocks.errors import InputError
 from armblocks.robot import Robot
 
 REFERENCE_STEPS = 4
-"""Number of Newton steps that make a reference consistent which is interpolated joint by joint."""
+"""Number of Newton steps that make a reference consistent after interpolation of each joint."""
 
 
 @lru_cache(maxsize=64)
@@ -52,8 +52,8 @@ def check_controlled(robot: Robot, where: str) -> None:
 def motor_torques(robot: Robot, q: SX, qd: SX, qdd: SX, *, newton_steps: int = 0) -> SX:
     """The torques (n, 1) of the motors; 0 at the other joints.
 
-    Of ``qdd`` (n, 1) only the entries of the motors are read. The state is the consistent one near ``q``,
-    ``qd`` with their coordinates and speeds of the motors.
+    Of ``qdd`` (n, 1) only the entries of the motors are read. The state is the consistent state near
+    ``q``, ``qd`` in which the motors have the coordinates and speeds of ``q``, ``qd``.
     """
     zero = SX.zeros(robot.n)
     motion = driven_motion(driven_by_motors(robot), q, qd, zero, qdd, newton_steps=newton_steps)

@@ -37,10 +37,10 @@ def payload_capacity(
 
     ``q`` (nq,) or (N, nq): one mass for each configuration, at rest or with ``qd`` and ``qdd``, (n,) or
     (N, n). Or a trajectory: one mass for the whole motion. ``torque`` (n,) N m or N: limits, by default the
-    limits of the robot. ``centre`` (3,) m: the centre of mass in the axes of the tool, or of ``frame``. The torques
-    are computed as by ``arm.rne``; they are linear in the mass. The result is 0 where the weight of the arm
-    alone exceeds a limit, and infinite where the payload loads no joint with a limit. Raises InputError
-    without any torque limit, RobotError for closed loops.
+    limits of the robot. ``centre`` (3,) m: the centre of mass in the axes of the tool, or of ``frame``. The
+    torques are computed as by ``arm.rne``; they are linear in the mass. The result is 0 where the weight of
+    the arm alone exceeds a limit, and infinite where the payload loads no joint with a limit. Raises
+    InputError without any torque limit, RobotError for closed loops.
     """
     where = f"payload_capacity of robot '{arm.name}'"
     check_robot(arm, where)
