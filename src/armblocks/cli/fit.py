@@ -55,7 +55,7 @@ def fit(
         ),
     ] = None,
     evaluations: Annotated[int, typer.Option(help="Maximum number of evaluations.")] = 200,
-    solver: Annotated[str | None, typer.Option(help="auto, or a solver of the documentation.")] = None,
+    solver: Annotated[str | None, typer.Option(help="auto, or a solver of 'armblocks list solvers'.")] = None,
     step: Annotated[float | None, typer.Option(help="Step of a fixed-step solver, s.")] = None,
     rtol: Annotated[float | None, typer.Option(help="Relative tolerance of an adaptive solver.")] = None,
     atol: Annotated[float | None, typer.Option(help="Absolute tolerance of an adaptive solver.")] = None,

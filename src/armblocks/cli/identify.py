@@ -69,7 +69,7 @@ def identify(
     """Estimate the parameters of a robot from logged positions and torques.
 
     Prints the base parameters with their standard errors beside the values of the description, and the noise
-    of each joint. Wide terminals also show the sum of parameters that each base parameter is.
+    of each joint. Wide terminals also show each base parameter as a sum of parameters.
 
     Exit code 0: done, 1: the motion does not determine some parameters, 2: invalid input.
     """

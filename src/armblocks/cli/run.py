@@ -53,7 +53,7 @@ def run(
     solver: Annotated[
         str | None,
         typer.Option(
-            help="auto, or a solver of the documentation: rk45, dop853, rk4 …; rodas5p for stiff systems."
+            help="auto, or a solver of 'armblocks list solvers', such as rk4; rodas5p for stiff systems."
         ),
     ] = None,
     step: Annotated[float | None, typer.Option(help="Step of a fixed-step solver, s.")] = None,

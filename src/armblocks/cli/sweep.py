@@ -54,7 +54,7 @@ def sweep(
     stop_time: Annotated[
         float | None, typer.Option(help="Simulated time, s.", show_default="the model's")
     ] = None,
-    solver: Annotated[str | None, typer.Option(help="auto, or a solver of the documentation.")] = None,
+    solver: Annotated[str | None, typer.Option(help="auto, or a solver of 'armblocks list solvers'.")] = None,
     step: Annotated[float | None, typer.Option(help="Step of a fixed-step solver, s.")] = None,
     sample_time: Annotated[float | None, typer.Option(help="Interval of the samples, s.")] = None,
     rtol: Annotated[float | None, typer.Option(help="Relative tolerance of an adaptive solver.")] = None,

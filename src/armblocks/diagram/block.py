@@ -79,7 +79,7 @@ class Block(ABC, metaclass=ArgumentErrors, methods=False):
     """Implicit outputs: ``outputs`` returns their residual. The solver finds the value
     that makes it zero. Newton's method starts from ``initial_guesses``."""
     gathers: ClassVar[Callable[[Any], Any] | None] = None
-    """The pass that makes equations of all physical blocks of a family, such as bodies and joints.
+    """The pass that converts all physical blocks of a family to equations, such as bodies and joints.
 
     The equations of a physical block follow from its network, and a family of such blocks is above the
     diagram layer: the blocks bring their pass, a function from a netlist to a netlist, which reads

@@ -176,7 +176,7 @@ def executed_when_fired(features: Features) -> Features:
 
 
 def restarted(features: Features, *, clocked: bool) -> Features:
-    """Reset states and modes at a restart, and silence the guards until the end of that instant.
+    """Reset states and modes at a restart, and suppress the guards until the end of that instant.
 
     Modes are reset as at the start of a run: to their consistent values, or to 0 while the control is off.
     ``clocked``: the block is active at the ticks of a clock. After a restart by a tick, discrete states keep
