@@ -76,7 +76,7 @@ def ise(r: Routine, t: Reals, y: Reals, n: Integer, options: Reals) -> Real:
 
 
 def _absolute(t0: Real, t1: Real, a: Real, b: Real) -> Real:
-    """The integral of ``|e|``: two triangles where the sign changes, else a trapezium."""
+    """The integral of ``|e|``: two triangles where the sign changes, else a trapezoid."""
     sizes = abs(a) + abs(b)
     triangles = (a * a + b * b) / select(sizes > 0.0, sizes, 1.0)
     return (t1 - t0) * (0.5 * select(a * b < 0.0, triangles, sizes))
