@@ -1,4 +1,4 @@
-"""Robots from URDF: laws over random trees against an oracle in NumPy, and what each element means."""
+"""Robots from URDF: laws over random trees against an oracle in NumPy, and the meaning of each element."""
 
 from __future__ import annotations
 

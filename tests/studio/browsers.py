@@ -69,7 +69,7 @@ Object.defineProperty(window, '__pw_bidiInsertText', {
     set: () => {},
 })
 """
-"""Inserts text by a command of Firefox: React does not notice text that Playwright inserts.
+"""Inserts text by a command of Firefox: React does not detect text that Playwright inserts.
 """
 LOST_CONNECTION = re.compile("ERR_CONNECTION_|ERR_CONTENT_LENGTH_MISMATCH|(connection to|server at) ws://")
 """Messages of Chromium and Firefox about a studio that has ended."""

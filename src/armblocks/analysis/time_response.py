@@ -28,9 +28,9 @@ MAX_SAMPLES = 20_000
 class StepMeasures:
     """Characteristics of a step response (all times in s; ``nan`` if undefined).
 
-    ``final``: the steady-state value. ``rise_time``: the time from 10 to 90 per cent of it.
-    ``settling_time``: the time after which the response stays within 2 per cent of it. ``overshoot`` and
-    ``undershoot``: per cent of it.
+    ``final``: the steady-state value. ``rise_time``: the time from 10 to 90 per cent of ``final``.
+    ``settling_time``: the time after which the response stays within 2 per cent of ``final``. ``overshoot``
+    and ``undershoot``: per cent of ``final``.
     ``peak``: the largest value in the direction of the final value, at ``peak_time``.
     """
 

@@ -14,7 +14,7 @@ from armblocks.errors import compose_message, warn
 class Rule:
     """A rule that a finding refers to.
 
-    ``code``: the stable identifier; ``allowed``: what a file should contain; ``remedy``: what to do.
+    ``code``: the stable identifier; ``allowed``: what a file should contain; ``remedy``: the correction.
     """
 
     code: str

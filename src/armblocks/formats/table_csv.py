@@ -165,7 +165,7 @@ def _header(
     """The names, the units below them, and the number of the first row of values.
 
     The first row is a header if its fields are names. A row with numbers and text is a row of values, unless
-    its first field is a name: otherwise a row of values would be dropped without notice.
+    its first field is a name: otherwise a row of values would be omitted without a message.
     """
     first = rows[0].fields
     has_other_values = any(_is_value(field) for field in first[1:])

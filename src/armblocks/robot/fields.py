@@ -65,7 +65,7 @@ class Named(Protocol):
 def check_parts(parts: Sequence[Named], kind: type, noun: str, most: int, *, where: str, fix: str) -> None:
     """Raise ``RobotError`` unless these are at most ``most`` parts of this class with different names.
 
-    ``noun``: the word for one part in messages. ``fix``: what to do if there are too many.
+    ``noun``: the word for one part in messages. ``fix``: the remedy if there are too many.
     """
     if len(parts) > most:
         what = f"the robot has {len(parts)} {noun}s"

@@ -65,7 +65,7 @@ def test_the_tool_is_dragged_four_poses_are_recorded_and_the_motion_runs(page: P
     height = value(z)
     stage.focus()
     for _ in range(3):
-        stage.press("Shift+PageDown")  # no step is lost, although the arm is still on the way
+        stage.press("Shift+PageDown")  # no step is lost, although the arm is still moving
     stage.press("Shift+PageUp")
     expect(z).to_have_value(f"{height - 0.02:.4f}")
     tool.get_by_role("button", name="Increase x").click()

@@ -26,7 +26,7 @@ from armblocks.studio.runs.workers import Worker
 NotifyRun = Callable[[run_messages.Message | bytes], Awaitable[None]]
 _EVENTS: TypeAdapter[run_messages.RunEvent] = TypeAdapter(Annotated[run_messages.RunEvent, AnyOf()])
 STOP_SECONDS = 0.8
-"""Time after which a worker that has not obeyed ``stop`` is killed, s."""
+"""Time after which a worker that has not ended after ``stop`` is killed, s."""
 SILENT_SECONDS = 600.0
 """Time without a message after which a running worker counts as hung and is killed, s."""
 MAX_SECONDS = 24 * 3600.0
@@ -52,7 +52,7 @@ class RunProcess:
         self._commands: SimpleQueue[bytes | None] = SimpleQueue()
         self._deadline = monotonic() + MAX_SECONDS
         self._killed = False
-        """Whether the worker was killed because it did not obey ``stop``."""
+        """Whether the worker was killed because it did not end after ``stop``."""
         self._failure: str = ""
         """The reason for killing the worker, other than ``stop``."""
         self._forward_task: asyncio.Task[None] | None = None
@@ -90,7 +90,7 @@ class RunProcess:
     def _read(self, pipe: Connection, writer: Thread) -> None:
         """Receive all messages of the worker, in a separate thread; ``None`` marks the end of the process.
 
-        Then the pipe is closed. Before that its number may not be free for another file.
+        The pipe is closed last: until both threads have ended, no other file may get its file descriptor.
         """
         try:
             while True:
