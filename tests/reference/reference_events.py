@@ -96,7 +96,7 @@ def instant_order(order: EvaluationOrder) -> InstantOrder:
 
 
 def _graph(order: EvaluationOrder) -> dict[Node, set[Node]]:
-    """The nodes that each node reads: the events of a block, its outputs, the ticks of its outputs and its states."""
+    """The nodes that each node reads: events, outputs and states of blocks, and the ticks of outputs."""
     graph: dict[Node, set[Node]] = {}
     pending: list[Node] = [("events", name, "") for name in order.blocks]
     pending += [("update", name, "") for name, block in order.blocks.items() if block.clock is not None]

@@ -98,7 +98,7 @@ export class SheetMotion {
     return this.sheet?.classList.contains('pictured') ?? false
   }
 
-  /** End the motion when the pointer is moved without a pressed button: it has to find the element below it. */
+  /** End the motion when the pointer moves without a pressed button, so that elements below it get events. */
   readonly onPointer = ({ clientX, clientY, buttons }: PointerEvent): void => {
     this.pointer = [clientX, clientY]
     const [x, y] = this.pointerAtStart
