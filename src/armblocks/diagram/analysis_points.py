@@ -200,7 +200,7 @@ def _new_name(ref: PortRef, blocks: Mapping[str, Block]) -> str:
 
 
 def _rewired(wires: Sequence[Connection], ref: PortRef, point: str, source: PortRef) -> list[Connection]:
-    """The connections, with the point inserted into those that start or end at a port."""
+    """The connections, with the point inserted where they start or end at a port."""
     point_input, point_output = PortRef(point, "u"), PortRef(point, "y")
     if ref == source:
         changed = [

@@ -131,7 +131,7 @@ def _centred(z: Array, H: Array, g: Array, barrier: float, origin: Array, c: Con
             total = H @ z - g + gradient
             step = -np.linalg.solve(H + hessian, total)
         except np.linalg.LinAlgError:
-            break  # a body at the border of the possible ones: singular within rounding errors
+            break  # a body at the border of the possible bodies: singular within rounding errors
         decrease = float(-total @ step)
         value, length = _objective(z, H, g, barrier, origin, c), 1.0
         if decrease <= max(1e-2 * barrier, 1e-12 * abs(value)):

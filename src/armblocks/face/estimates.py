@@ -88,7 +88,7 @@ def comparison_chart(
 
 
 def with_gaps(time: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Times for a chart: later experiments follow the earlier ones; and where lines are interrupted."""
+    """Times for a chart: later experiments follow earlier experiments; and where lines are interrupted."""
     steps = np.diff(time)
     usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 1.0
     restart = np.flatnonzero(steps <= 0.0)

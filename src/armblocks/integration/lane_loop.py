@@ -31,7 +31,7 @@ def lane_code(
     sizes: LoopSizes, digest: str, tape: Callable[[], Tape], tableau: ButcherTableau, lanes: int
 ) -> NativeCode:
     """The loop of a system without ticks and events, as function ``runs`` of the arguments of
-    :func:`define_lane_loop`. ``digest`` and ``tape`` are those of the derivative."""
+    :func:`define_lane_loop`. ``digest`` and ``tape``: of the derivative."""
 
     def write() -> str:
         module = Module()

@@ -111,7 +111,7 @@ class StepSums(Generic[NumberT]):
     ) -> tuple[NumberT, Any]:
         """Length of the first step of a segment, chosen as in SciPy (Hairer, Norsett, Wanner I, II.4).
 
-        ``order``: that of the error estimate. Also returns whether the length of the interval limits it.
+        ``order``: the order of the error estimate. Also returns whether the length of the interval limits it.
         """
 
         def weighted(value: Callable[[Index], NumberT]) -> Callable[[Index], NumberT]:

@@ -155,7 +155,7 @@ class _Assembly:
     # -- the tree
 
     def _tree(self) -> tuple[list[_Edge], list[_Edge]]:
-        """The joints of the tree, depth first from the World Frame, and those that close loops."""
+        """The joints of the tree, depth first from the World Frame, and the joints that close loops."""
         ends = {path: (self._at(path, BASE), self._at(path, FOLLOWER)) for path in self.joints}
         for path, (base, follower) in ends.items():
             if base == follower:

@@ -53,7 +53,7 @@ def gather_mechanisms(net: Netlist) -> Netlist:
 
 
 class _Gathered:
-    """The blocks and connections in place of the drawn ones."""
+    """The blocks and connections in place of the drawn blocks."""
 
     def __init__(self, net: Netlist) -> None:
         self.net = net

@@ -100,7 +100,7 @@ class JointStates(Block):
     start_qd: tuple[float, ...] = parameter((), kind=ParameterKind.DIAGRAM, doc="assembled speeds")
     closed: bool = parameter(False, doc="whether the mechanism has closed loops")
 
-    # -- the parameters are those of the drawn joint
+    # -- the parameters of the drawn joint
 
     def inputs_of_the_run(self) -> tuple[Parameter, ...]:
         """The tunable parameters of the joint.

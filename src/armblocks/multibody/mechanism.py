@@ -151,7 +151,7 @@ class Mechanism(Block):
         return {"poses": SX(vertcat(*(frames.pose(place).matrix() for place in places)))}
 
     def _state(self, u: Signals) -> tuple[SX, SX]:
-        """The coordinates and speeds of the robot, from those of the drawn joints."""
+        """The coordinates and speeds of the robot, from the coordinates and speeds of the drawn joints."""
         q, qd = SX.zeros(self.robot.nq), SX.zeros(self.robot.nv)
         for joint in self.mechanism.joints:
             coordinates = u[port_of(joint.path, "state q")]
@@ -191,7 +191,7 @@ class Mechanism(Block):
 
 @lru_cache(maxsize=32)
 def drawn_motion(robot: Robot, near: tuple[float, ...]) -> DrawnMotion:
-    """The equations of a robot; those of the last 32 robots are cached."""
+    """The equations of a robot, cached for the last 32 robots."""
     return DrawnMotion(robot, np.array(near))
 
 
@@ -232,7 +232,7 @@ def _tree_coordinates(joint: PlacedJoint, q: SX) -> SX:
 
 
 def _drawn_coordinates(joint: PlacedJoint, q: SX) -> SX:
-    """The coordinates of the drawn joint from those of the tree; rates are converted likewise."""
+    """The coordinates of the drawn joint from the coordinates of the tree; rates in the same way."""
     if not joint.reversed:
         return q
     backwards = list(reversed(joint.part.motions))
@@ -244,7 +244,7 @@ def _drawn_coordinates(joint: PlacedJoint, q: SX) -> SX:
 
 
 def _tree_speeds(joint: PlacedJoint, drawn_q: SX, qd: SX) -> SX:
-    """The speeds of the tree from those of the drawn joint.
+    """The speeds of the tree from the speeds of the drawn joint.
 
     A ball joint with the rotation R of the follower in the base has the angular velocity w in follower axes.
     The angular velocity of the base relative to the follower, in base axes, is ``-R w``.
@@ -263,7 +263,7 @@ def _tree_forces(joint: PlacedJoint, tree_q: SX, force: SX) -> SX:
 
 
 def _drawn_speeds(joint: PlacedJoint, tree_q: SX, qd: SX) -> SX:
-    """The speeds of the drawn joint from those of the tree; accelerations are converted likewise.
+    """The speeds of the drawn joint from the speeds of the tree; accelerations in the same way.
 
     ``w = -R' w_tree`` has the derivative ``-R' dw_tree/dt``, because ``[w]x R' w_tree`` is zero.
     """

@@ -97,7 +97,7 @@ def _split(motions: Sequence[Motion], values: Sequence[float], *, speeds: bool) 
 
 
 def _of_tree(joint: PlacedJoint, q: Sequence[float]) -> list[float]:
-    """The coordinates of the tree from those of the drawn joint."""
+    """The coordinates of the tree from the coordinates of the drawn joint."""
     parts = _split(joint.part.motions, q, speeds=False)
     if not joint.reversed:
         return [value for part in parts for value in part]
@@ -108,7 +108,7 @@ def _of_tree(joint: PlacedJoint, q: Sequence[float]) -> list[float]:
 
 
 def drawn_start(joint: PlacedJoint, start: Start) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """The start of a drawn joint, coordinates and speeds, from those of the tree."""
+    """The start of a drawn joint, coordinates and speeds, from the start of the tree."""
     q = start.q[joint.position : joint.position + joint.part.nq].tolist()
     qd = start.qd[joint.speed : joint.speed + joint.part.nv].tolist()
     if not joint.reversed:

@@ -228,7 +228,7 @@ def _diagram(contents: ReportContents) -> str:
     )
     heading = "<h3>Inside the subsystems</h3>" if inner else ""
     kinds = (
-        "The model. Thin wires carry scalars, heavy ones vectors, double ones matrices, triple ones buses."
+        "The model. Thin wires carry scalars, heavy wires vectors, double wires matrices, triple wires buses."
     )
     return _drawing(contents.drawing, "fig-diagram", kinds) + heading + inner
 

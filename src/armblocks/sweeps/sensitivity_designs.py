@@ -1,7 +1,7 @@
 """Designs whose runs differ in single parameters, for the sensitivity indices of Sobol and of Morris.
 
 The rows of a design are groups of d + 2 or d + 1 runs for d parameters. The estimators are a few lines; SALib
-(Herman, Usher 2017) has the same ones, but needs three further packages and its own tables of runs.
+(Herman, Usher 2017) has the same estimators, but needs three further packages and its own tables of runs.
 """
 
 from __future__ import annotations

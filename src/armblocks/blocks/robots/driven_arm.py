@@ -1,6 +1,6 @@
 """The arm with joints whose motion is given.
 
-The equations are those of :mod:`armblocks.dynamics.prescribed_motion`, which names the sources.
+The equations are in :mod:`armblocks.dynamics.prescribed_motion`, which names the sources.
 """
 
 from __future__ import annotations
@@ -193,7 +193,7 @@ class AccelerationDrivenArm(DrivenArm):
     of all types can be prescribed, such as the six degrees of freedom of a moving base. The robot may have
     couplings and closed loops; the start must satisfy them (``arm.assemble``).
 
-    Prescribed joints are those of the constraints ``PrescribedMotion`` of the robot, or those named in
+    Prescribed joints are the joints of the constraints ``PrescribedMotion`` of the robot, or those named in
     ``joints``. Use PositionDrivenArm for given positions.
     """
 
