@@ -1137,6 +1137,7 @@ export interface SheetPort {
   y: number;
   dx: number;
   dy: number;
+  frame?: boolean;
 }
 /**
  * The declaration of one parameter of a block type, for its dialog.
@@ -1507,6 +1508,7 @@ export interface BlockType {
   inputs: string[];
   input_y: number[];
   outputs: string[];
+  frames: string[];
   parameters: ParameterRule[];
 }
 /**

@@ -2,6 +2,7 @@ import type { ReactFlowInstance } from '@xyflow/react'
 import { create } from 'zustand'
 import { nearestInput, nearestPointOn } from '../model/branching'
 import type { Point } from '../model/wire_lines'
+import { isFrame } from '../model/wires'
 import { change, useStudio } from '../store'
 import { connectAt } from './connecting'
 import { followPointer } from './pointer_drag'
@@ -42,8 +43,9 @@ export function drawBranch(
     const distance = Math.hypot(event.clientX - pressed.clientX, event.clientY - pressed.clientY)
     if (!useBranch.getState().branch && distance <= DRAG_PX) return
     const pointer = sheetPoint(event)
-    const blocks = Object.values(useStudio.getState().document?.blocks ?? {})
-    const input = nearestInput(blocks, pointer, SNAP_PX / flow.getZoom())
+    const { blocks = {} } = useStudio.getState().document ?? {}
+    const frame = isFrame(blocks, source)
+    const input = nearestInput(Object.values(blocks), pointer, SNAP_PX / flow.getZoom(), frame)
     useBranch.setState({ branch: { source, from, to: input?.at ?? pointer, target: input?.port ?? null } })
   }
   const drop = (event: PointerEvent) => {

@@ -21,7 +21,7 @@ import { alteration, ask, openSheet, useStudio } from '../store'
 import { sheetKey } from '../documents/document_views'
 import { selectedBlocks } from './arranging'
 import { BlockNode } from './block_node'
-import { connect, endConnection, startConnection } from './connecting'
+import { connect, endConnection, isConnectable, startConnection } from './connecting'
 import { DragPreview, useDraggedCopies } from './drag_preview'
 import { GRID } from './insert'
 import { NoteNode } from './note_node'
@@ -177,6 +177,7 @@ function Sheet({ sheetKey }: { sheetKey: string }) {
         zoomOnDoubleClick={false}
         connectionLineType={ConnectionLineType.Step}
         connectionRadius={24}
+        isValidConnection={isConnectable}
         deleteKeyCode={null}
         disableKeyboardA11y
         snapToGrid

@@ -2,7 +2,9 @@ import { Button, Group, Modal, Select, Stack } from '@mantine/core'
 import { useEffect, useMemo, useState } from 'react'
 import { showDialog, useDialogs } from '../dialogs'
 import { SCROLLED } from '../dropdown_scrolling'
-import { change, useStudio } from '../store'
+import { isFrame, mixedKinds, sameKind } from '../model/wires'
+import type { SheetBlock, Wire } from '../protocol'
+import { change, refuse, useStudio } from '../store'
 
 /**
  * Options of the port fields. Without `selectFirstOptionOnDropdownOpen`, Mantine resets the highlighted
@@ -15,6 +17,16 @@ const PORT_SELECT = {
   selectFirstOptionOnChange: true,
   selectFirstOptionOnDropdownOpen: true,
 } as const
+
+/** The ports at which a wire from a source may end: unconnected inputs, or frame ports. */
+function freeTargets(blocks: Record<string, SheetBlock>, wires: Wire[], source: string | null): string[] {
+  const driven = new Set(wires.map((wire) => wire.target))
+  return Object.values(blocks)
+    .flatMap(({ name, inputs }) => inputs.map((port) => ({ ref: `${name}/${port.name}`, frame: port.frame })))
+    .filter(({ ref, frame }) => frame || !driven.has(ref))
+    .filter(({ ref }) => !source || (ref !== source && sameKind(blocks, source, ref)))
+    .map(({ ref }) => ref)
+}
 
 /** Draws a wire by keyboard: type the names of two ports. The ports of the selected block are suggested. */
 export function ConnectDialog() {
@@ -33,12 +45,7 @@ export function ConnectDialog() {
       ),
     [blocks],
   )
-  const targets = useMemo(() => {
-    const driven = new Set(wires?.map((wire) => wire.target))
-    return Object.values(blocks ?? {})
-      .flatMap(({ name, inputs }) => inputs.map((port) => `${name}/${port.name}`))
-      .filter((port) => !driven.has(port))
-  }, [blocks, wires])
+  const targets = useMemo(() => freeTargets(blocks ?? {}, wires ?? [], source), [blocks, wires, source])
   useEffect(() => {
     if (!opened) return
     const portOfSelection = (ports: string[]) =>
@@ -52,7 +59,8 @@ export function ConnectDialog() {
   const connect = () => {
     if (!source || !target) return
     close()
-    void change({ kind: 'connect', wire: { source, target } })
+    if (sameKind(blocks ?? {}, source, target)) void change({ kind: 'connect', wire: { source, target } })
+    else refuse(mixedKinds(source, target))
   }
   return (
     <Modal opened={opened} onClose={close} title={<b>Draw a wire</b>} size="sm">
@@ -79,7 +87,9 @@ export function ConnectDialog() {
             value={target}
             onChange={setTarget}
             data-autofocus={source ? true : undefined}
-            nothingFoundMessage="no such free input"
+            nothingFoundMessage={
+              source && isFrame(blocks ?? {}, source) ? 'no such frame port' : 'no such free input'
+            }
           />
           <Group justify="flex-end" gap="xs">
             <Button variant="default" onClick={close}>

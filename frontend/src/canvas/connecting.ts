@@ -1,7 +1,8 @@
-import type { Connection, FinalConnectionState } from '@xyflow/react'
+import type { Connection, Edge, FinalConnectionState } from '@xyflow/react'
 import { showDialog } from '../dialogs'
 import { freePort } from '../model/free_port'
-import { change, useStudio } from '../store'
+import { blockOf, isFrame, mixedKinds, portOf, sameKind } from '../model/wires'
+import { change, refuse, useStudio } from '../store'
 import { onEscape } from './pointer_drag'
 
 /** Removes the listener for Escape, which cancels the drag from a port. */
@@ -20,6 +21,14 @@ export function startConnection(): void {
   }, escape.signal)
 }
 
+/** Whether a dragged wire may end at a port: frame lines and wires of signals do not mix. */
+export const isConnectable = (wire: Connection | Edge): boolean =>
+  sameKind(
+    useStudio.getState().document?.blocks ?? {},
+    `${wire.source}/${wire.sourceHandle}`,
+    `${wire.target}/${wire.targetHandle}`,
+  )
+
 /** Handle the end of a drag from a port at another port. */
 export function connect({ source, sourceHandle, target, targetHandle }: Connection): void {
   if (!cancelled && sourceHandle && targetHandle)
@@ -31,14 +40,22 @@ export function connect({ source, sourceHandle, target, targetHandle }: Connecti
 
 /** Handle the end of a drag from a port, unless it ends at another port. */
 export function endConnection(event: MouseEvent | TouchEvent, state: FinalConnectionState): void {
-  const { fromHandle, fromNode, toHandle, isValid } = state
+  const { fromHandle, fromNode, toHandle, toNode, isValid } = state
   escape.abort()
+  if (!cancelled && isValid === false && fromHandle && toHandle && fromHandle.nodeId !== toHandle.nodeId)
+    refuse(mixedKinds(`${fromNode?.id}/${fromHandle.id}`, `${toNode?.id}/${toHandle.id}`))
   if (cancelled || toHandle || isValid || !fromHandle?.id || !fromNode || !('clientX' in event)) return
   connectAt(
     { x: event.clientX, y: event.clientY },
     `${fromNode.id}/${fromHandle.id}`,
-    fromHandle.type === 'source',
+    fromHandle.type === 'source' && !isLeftFrame(`${fromNode.id}/${fromHandle.id}`),
   )
+}
+
+/** Whether a port is a frame port at the left side of its block: a new block is then left of it. */
+function isLeftFrame(port: string): boolean {
+  const found = useStudio.getState().document?.blocks[blockOf(port)]?.outputs
+  return Boolean(found?.some(({ name, frame, dx }) => frame && dx < 0 && name === portOf(port)))
 }
 
 /**
@@ -52,7 +69,9 @@ export function connectAt(at: { x: number; y: number }, port: string, isOutput: 
   const nodeName = element?.closest('.react-flow__node')?.getAttribute('data-id')
   if (nodeName) {
     const block = port.startsWith(`${nodeName}/`) ? undefined : document.blocks[nodeName]
-    const other = block && freePort(block, isOutput, document.wires)
+    const other = block && freePort(block, isOutput, document.wires, isFrame(document.blocks, port))
+    if (block && !other && freePort(block, isOutput, document.wires, !isFrame(document.blocks, port)))
+      refuse(mixedKinds(port, nodeName))
     if (other)
       void change({
         kind: 'connect',

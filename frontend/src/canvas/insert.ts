@@ -1,5 +1,6 @@
 import { freeBelow, freeInView, type Rectangle } from '../model/free_place'
 import type { BlockType, Place, Wire } from '../protocol'
+import { isFrame, newThroughPorts } from '../model/wires'
 import { change, freeName, namesInUse, selectIfUnchanged, useStudio } from '../store'
 import { sheetView } from './sheet_actions'
 
@@ -44,7 +45,8 @@ export async function insertBlock(
     x: GRID * Math.round((at.x - fraction * blockType.width) / GRID),
     y: inputY === undefined ? GRID * Math.round((at.y - blockType.height / 2) / GRID) : wireY! - inputY,
   }
-  const [input, output] = [blockType.inputs[0], blockType.outputs[0]]
+  const end = connectTo?.port ?? wire?.source
+  const [input, output] = newThroughPorts(blockType, Boolean(end && isFrame(document.blocks, end)))
   const splitsWire = wire && input && output
   awaitedNames.add(name)
   const version = await change({

@@ -1,9 +1,10 @@
-import type { ReactFlowInstance } from '@xyflow/react'
+import type { ReactFlowInstance, XYPosition } from '@xyflow/react'
 import { useEffect, useRef, useState } from 'react'
 import {
   isInsertable,
   alignedPosition,
   insertIntoWire,
+  insertionAt,
   wireDifference,
   disconnectBlocks,
   wireAt,
@@ -110,7 +111,7 @@ export function dragHandlers(
     useGuides.setState({ guides })
     if (dx || dy) setDrag((now) => ({ ...now, ...shifted(nodes, dx, dy) }))
     const block = node.id === effect.current.insertable ? blocks[node.id] : undefined
-    if (block) setTargetWire(keyOrNull(wireAt(centreOf(block, node.position), edges, wires)?.wire))
+    if (block) setTargetWire(keyOrNull(segmentBelow(block, node.position, edges, wires)?.wire))
   }
   const endDrag = (
     event: MouseEvent | TouchEvent | React.MouseEvent,
@@ -142,9 +143,9 @@ export function dragHandlers(
       ? disconnectBlocks(blocksByName(blocks, disconnected), wires)
       : wires
     const block = insertable === null ? undefined : blocks[insertable]
-    const target = block && wireAt(centreOf(block, node.position), edges, wires)
+    const target = block && segmentBelow(block, node.position, edges, wires)
     if (target) positions[block.name] = alignedPosition(block, node.position, target)
-    const wiresAfter = target ? insertIntoWire(block, target.wire, remainingWires) : remainingWires
+    const wiresAfter = target ? insertIntoWire(block, target, remainingWires) : remainingWires
     // The wires remain as drawn until the server has applied the edit.
     void moveNodes(
       positions,
@@ -210,6 +211,10 @@ export function dropHandlers(
   }
   return { onDragOver: hover, onDragLeave: () => setTargetWire(null), onDrop: drop }
 }
+
+/** The segment of a wire into which a block at a position would be inserted. */
+const segmentBelow = (block: SheetBlock, at: XYPosition, edges: WireEdgeType[], wires: Wire[]) =>
+  insertionAt(block, centreOf(block, at), edges, wires)
 
 const keyOrNull = (wire: Wire | undefined): string | null => (wire ? wireKey(wire) : null)
 

@@ -4,7 +4,7 @@ import type { BlockNodeType } from './block_node'
 import { completeRoute } from '../model/bends'
 import type { NoteNodeType } from './note_node'
 import { stretchedToPorts, endsOf, endsAtPorts, type Lines, type Point } from '../model/wire_lines'
-import { blockOf, portOf, wireKey, type Places } from '../model/wires'
+import { blockOf, isFrame, portOf, wireKey, type Places } from '../model/wires'
 import { PORT, portSide } from './sheet_layout'
 import type { WireEdgeType, WireTag } from './wire_edge'
 
@@ -140,11 +140,14 @@ export class SheetGraph {
       const { path, pending } = this.path(wire, net, drawn)
       const tags = path.length || !net ? NO_TAGS : tagsOf(wire, net.label, drawn, labelled)
       const rank = kind.bus ? 3 : Math.min(kind.shape.length, 2)
+      const frame = isFrame(drawn.blocks, wire.source)
       const valueType = [kind.shape.join(' × '), kind.unit].filter(Boolean)
-      const label = [`${wire.source} to ${wire.target}`, ...valueType].join(', ')
+      const ends = frame ? `frame of ${wire.source} and ${wire.target}` : `${wire.source} to ${wire.target}`
+      const label = [ends, ...valueType].join(', ')
       const selected = selectedWires.has(key)
       const tagPositions = tags.map(({ x, y }) => `${x} ${y}`).join(' ')
-      const inputs = [path, dots, net, rank, label, selected, wire, key === targetWire, pending, tagPositions]
+      const states = [selected, key === targetWire, pending, frame]
+      const inputs = [path, dots, net, rank, label, wire, tagPositions, ...states]
       return this.wires.get(key, inputs, () => ({
         id: key,
         type: 'wire',
@@ -154,11 +157,14 @@ export class SheetGraph {
         targetHandle: portOf(wire.target),
         selected,
         className: key === targetWire ? 'into' : '',
-        ariaLabel: `wire from ${wire.source} to ${wire.target}`,
+        ariaLabel: frame
+          ? `frame line between ${wire.source} and ${wire.target}`
+          : `wire from ${wire.source} to ${wire.target}`,
         data: {
           path,
           dots,
           rank,
+          frame,
           label,
           bent: Boolean(wire.bends?.length),
           pending,

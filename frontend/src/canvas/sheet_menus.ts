@@ -2,7 +2,7 @@ import { commands } from '../commands'
 import { openMenu, type Entries, type Entry } from '../context_menu_state'
 import { showDialog } from '../dialogs'
 import { showScope } from '../dock'
-import { blockOf, portOf, wireKey } from '../model/wires'
+import { blockOf, isFrame, portOf, wireKey } from '../model/wires'
 import type { SheetBlock, Wire } from '../protocol'
 import { useShownValues } from '../run/shown_values'
 import { change, openSheet, useStudio, type OpenDocument } from '../store'
@@ -34,7 +34,8 @@ export function openSheetMenu(point: Point, element: Element, selectWire: (key: 
     openMenu(block?.name ?? 'Note', point, block ? blockEntries(document, block) : noteEntries(node))
   } else if (wire) {
     selectWire(wireKey(wire))
-    openMenu(`Wire from ${wire.source}`, point, wireEntries(document, wire, point))
+    const title = `${isFrame(document.blocks, wire.source) ? 'Frame of' : 'Wire from'} ${wire.source}`
+    openMenu(title, point, wireEntries(document, wire, point))
   } else openMenu('Sheet', point, sheetEntries(document, point))
 }
 
@@ -182,11 +183,11 @@ function wireEntries(document: OpenDocument, wire: Wire, point: Point): Entries 
   const end = { port: wire.source, isOutput: true }
   return [
     { title: 'Branch to a new block …', run: () => showDialog('insert', '', point, end) },
-    ...signalEntries(document, wire.source),
+    ...(isFrame(document.blocks, wire.source) ? [] : signalEntries(document, wire.source)),
     null,
     {
       title: 'Reset the route',
-      enabled: Boolean(wire.bends?.length),
+      enabled: Boolean(wire.bends?.length), // never of a frame line
       run: () => void change({ kind: 'bend', wires: [{ source: wire.source, target: wire.target }] }),
     },
     {
@@ -198,11 +199,16 @@ function wireEntries(document: OpenDocument, wire: Wire, point: Point): Entries 
 }
 
 function portEntries(document: OpenDocument, port: string, isOutput: boolean, point: Point): Entries {
-  const wires = document.wires.filter((wire) => (isOutput ? wire.source : wire.target) === port)
+  const frame = isFrame(document.blocks, port)
+  const wires = document.wires.filter(({ source, target }) =>
+    frame ? source === port || target === port : (isOutput ? source : target) === port,
+  )
+  const enabled = isOutput || frame || !wires.length
+  const byName = frame ? 'a frame port' : isOutput ? 'an input' : 'an output'
   const connect: Entries = [
     {
       title: 'Connect to a new block …',
-      enabled: isOutput || !wires.length,
+      enabled,
       run: () =>
         showDialog(
           'insert',
@@ -212,9 +218,9 @@ function portEntries(document: OpenDocument, port: string, isOutput: boolean, po
         ),
     },
     {
-      title: isOutput ? 'Connect to an input by name …' : 'Connect to an output by name …',
+      title: `Connect to ${byName} by name …`,
       keys: '>',
-      enabled: isOutput || !wires.length,
+      enabled,
       run: () => showDialog('connect', '', null, { port, isOutput }),
     },
     {
@@ -224,7 +230,9 @@ function portEntries(document: OpenDocument, port: string, isOutput: boolean, po
     },
   ]
   const driven = isOutput ? port : wires[0]?.source
-  return driven && document.blocks[blockOf(driven)]?.outputs.some(({ name }) => name === portOf(driven))
+  return !frame &&
+    driven &&
+    document.blocks[blockOf(driven)]?.outputs.some(({ name }) => name === portOf(driven))
     ? [...connect, null, ...signalEntries(document, driven)]
     : connect
 }

@@ -34,6 +34,8 @@ const LETTER = 0.55
 /** Distance around a block within which its name, ports and marks are, px. */
 const AROUND_BLOCK = 190
 const LINE_WIDTHS = [1.2, 2.3, 3.8, 5.4]
+/** Width of a frame line, px. */
+const FRAME_LINE = 1.8
 /** Lines inside a line of rank 2 or 3: colour and width, px. */
 const CORES: [rank: number, colour: string, width: number][] = [
   [2, 'page', 1.5],
@@ -72,20 +74,21 @@ export class SheetPainter {
   }
 
   private wire(context: CanvasRenderingContext2D, { data, selected, className }: WireEdgeType, style: Style) {
-    const { path, dots, rank, pending } = data!
+    const { path, dots, rank, pending, frame } = data!
+    const colour = frame ? 'trace-2' : 'wire'
     let line = this.lines.get(path)
     if (!line) this.lines.set(path, (line = new Path2D(svgPath(path, dots))))
     const into = className === 'into'
-    context.strokeStyle = style(selected || into ? 'accent' : 'wire')
-    context.lineWidth = into ? 3 : rank === 0 && selected ? 2 : LINE_WIDTHS[rank]!
+    context.strokeStyle = style(selected || into ? 'accent' : colour)
+    context.lineWidth = into ? 3 : rank === 0 && selected ? 2 : frame ? FRAME_LINE : LINE_WIDTHS[rank]!
     if (pending) context.setLineDash([5, 4])
     context.stroke(line)
     context.setLineDash([])
-    context.fillStyle = style(selected ? 'accent' : 'wire')
-    arrowHead(context, path)
-    for (const [at, colour, width] of CORES)
+    context.fillStyle = style(selected ? 'accent' : colour)
+    if (!frame) arrowHead(context, path)
+    for (const [at, core, width] of CORES)
       if (at === rank) {
-        context.strokeStyle = style(colour)
+        context.strokeStyle = style(core)
         context.lineWidth = width
         context.stroke(line)
       }

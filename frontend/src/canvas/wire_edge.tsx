@@ -15,6 +15,8 @@ export type WireEdgeType = Edge<
     path: readonly Point[]
     dots: readonly Point[]
     rank: number
+    /** Whether it is a frame line. */
+    frame: boolean
     label: string
     bent: boolean
     /** Whether the server has not routed the wire yet. */
@@ -46,17 +48,19 @@ function endBending(wire: Required<Wire>): void {
 const SNAP_PX = 7
 
 /**
- * A wire on its route: thin for a scalar, thicker for a vector, double for a matrix, three lines for a bus.
- * Its segments can be dragged.
+ * A wire on its route: thin for a scalar, thicker for a vector, double for a matrix, three lines for a bus. A
+ * frame line has its own colour and no arrow head. Segments can be dragged.
  */
 export const WireEdge = memo(function WireEdge({ id, data, selected }: EdgeProps<WireEdgeType>) {
   if (!data) return null
-  const { path, rank } = data
+  const { path, rank, frame } = data
   const line = svgPath(path, data.dots)
-  const className = ['wire', selected && 'selected', data.pending && 'pending'].filter(Boolean).join(' ')
+  const states = ['wire', frame && 'frame', selected && 'selected', data.pending && 'pending']
+  const className = states.filter(Boolean).join(' ')
+  const name = () => frame || nameSignal(id.slice(0, id.indexOf(' -> ')))
   if (!path.length)
     return (
-      <g className={className} onDoubleClick={() => nameSignal(id.slice(0, id.indexOf(' -> ')))}>
+      <g className={className} onDoubleClick={name}>
         {data.tags.map((tag) => (
           <Tag key={`${tag.x} ${tag.y}`} tag={tag} selected={Boolean(selected)} />
         ))}
@@ -64,12 +68,12 @@ export const WireEdge = memo(function WireEdge({ id, data, selected }: EdgeProps
       </g>
     )
   return (
-    <g className={className} onDoubleClick={() => nameSignal(id.slice(0, id.indexOf(' -> ')))}>
+    <g className={className} onDoubleClick={name}>
       <BaseEdge
         id={id}
         path={line}
         className={`line rank${rank}`}
-        markerEnd={selected ? 'url(#selected-wire-head)' : 'url(#wire-head)'}
+        {...(frame ? {} : { markerEnd: selected ? 'url(#selected-wire-head)' : 'url(#wire-head)' })}
         interactionWidth={0}
       />
       {rank >= 2 && <path d={line} className={rank === 3 ? 'core wide' : 'core'} />}
@@ -78,7 +82,7 @@ export const WireEdge = memo(function WireEdge({ id, data, selected }: EdgeProps
         <circle key={`${x} ${y}`} cx={x} cy={y} r={2.6 + 0.3 * rank} className="dot" />
       ))}
       {path.slice(1).map((_, segment) => (
-        <Segment key={segment} id={id} path={path} segment={segment} route={data.route} />
+        <Segment key={segment} id={id} path={path} segment={segment} data={data} />
       ))}
       <title>{data.label}</title>
     </g>
@@ -113,19 +117,20 @@ function Segment({
   id,
   path,
   segment,
-  route,
+  data: { route, frame },
 }: {
   id: string
   path: readonly Point[]
   segment: number
-  route: () => Point[]
+  data: Pick<NonNullable<WireEdgeType['data']>, 'route' | 'frame'>
 }) {
   const flow = useReactFlow()
   const [[x1, y1], [x2, y2]] = [path[segment]!, path[segment + 1]!]
   const horizontal = isHorizontal(path, segment)
   const startDrag = (event: React.PointerEvent<SVGLineElement>) => {
     if (event.button !== 0) return
-    if (event.ctrlKey || event.metaKey) {
+    // The route of a frame line has no bends: a drag draws a branch.
+    if (event.ctrlKey || event.metaKey || frame) {
       drawBranch(flow, id.slice(0, id.indexOf(' -> ')), path, event)
       return
     }

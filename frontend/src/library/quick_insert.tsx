@@ -1,12 +1,15 @@
 import { useMemo } from 'react'
 import { addBlock, insertBlock, sheetPointAt } from '../canvas/insert'
 import { showDialog, useDialogs } from '../dialogs'
+import { isFrame } from '../model/wires'
 import { useStudio } from '../store'
 import { Face } from './palette'
 import { PickList } from './pick_list'
 import { matching } from './search'
 
 const MAX_SHOWN = 8
+/** The ports of a block that is connected to a port of the sheet. */
+const NEEDED = { frames: 'a frame port', inputs: 'an input', outputs: 'an output' }
 
 /** Adds a block by keyboard alone: type a few letters, press Enter. */
 export function QuickInsert() {
@@ -15,12 +18,18 @@ export function QuickInsert() {
   const at = useDialogs((s) => s.at)
   const library = useStudio((s) => s.welcome?.library)
   const connectTo = useDialogs((s) => s.connectTo)
+  const blocks = useStudio((s) => s.document?.blocks)
+  const needed = !connectTo
+    ? null
+    : isFrame(blocks ?? {}, connectTo.port)
+      ? 'frames'
+      : connectTo.isOutput
+        ? 'inputs'
+        : 'outputs'
   const matches = useMemo(() => {
-    const connectable = (library ?? []).filter(
-      ({ inputs, outputs }) => !connectTo || (connectTo.isOutput ? inputs : outputs).length > 0,
-    )
+    const connectable = (library ?? []).filter((blockType) => !needed || blockType[needed].length > 0)
     return matching(connectable, typed).slice(0, MAX_SHOWN)
-  }, [library, typed, connectTo])
+  }, [library, typed, needed])
   return (
     <PickList
       opened={opened}
@@ -30,7 +39,7 @@ export function QuickInsert() {
       list="Blocks"
       typed={typed}
       onTyped={(next) => useDialogs.setState({ typed: next })}
-      emptyText={`No block matches “${typed}”.`}
+      emptyText={`No block${needed ? ` with ${NEEDED[needed]}` : ''} matches “${typed}”.`}
       items={matches.map((blockType) => ({
         key: blockType.type,
         face: <Face blockType={blockType} />,

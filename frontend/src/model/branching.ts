@@ -24,16 +24,18 @@ export interface InputPosition {
   at: Point
 }
 
-/** The input within a distance (px) that is nearest to a point; undefined if there is none. */
+/** The input or frame port within a distance (px) that is nearest to a point; undefined if there is none. */
 export function nearestInput(
   blocks: Iterable<Pick<SheetBlock, 'name' | 'place' | 'inputs'>>,
   [x, y]: Point,
   maxDistance: number,
+  frame = false,
 ): InputPosition | undefined {
   let nearest: InputPosition | undefined
   let shortest = maxDistance
   for (const { name, place, inputs } of blocks)
     for (const port of inputs) {
+      if (Boolean(port.frame) !== frame) continue
       const position: Point = [place.x + port.x, place.y + port.y]
       const distance = Math.hypot(position[0] - x, position[1] - y)
       if (distance <= shortest)

@@ -1,5 +1,5 @@
 import type { SheetBlock, Wire } from '../protocol'
-import { blockOf, wireKey, type Places } from './wires'
+import { blockOf, throughPorts, wireKey, type Places } from './wires'
 import type { Point } from './wire_lines'
 
 /** Disconnecting blocks from wires and inserting them into wires: the resulting changes of the wires. */
@@ -9,13 +9,11 @@ const INSERT_DISTANCE = 12
 /** Length of wire on both sides of an inserted block; on shorter segments the block is centred, px. */
 const WIRE_MARGIN = 60
 
-/** Whether a block can be inserted into a wire. */
-const hasInputAndOutput = (block: SheetBlock): boolean => block.inputs.length > 0 && block.outputs.length > 0
-
 /** Whether a block has no wires, so that dropping it on a wire inserts it. */
 export function isInsertable(block: SheetBlock, wires: Wire[]): boolean {
   return (
-    hasInputAndOutput(block) &&
+    block.inputs.length > 0 &&
+    block.outputs.length > 0 &&
     !wires.some(({ source, target }) => blockOf(source) === block.name || blockOf(target) === block.name)
   )
 }
@@ -38,9 +36,9 @@ export function disconnectBlocks(blocks: SheetBlock[], wires: Wire[]): Wire[] {
   return [...remaining, ...driven.map(({ target }) => ({ source: driver.source, target }))]
 }
 
-/** The wires after inserting a block into one of them with its first input and first output. */
-export function insertIntoWire(block: SheetBlock, wire: Wire, wires: Wire[]): Wire[] {
-  const [input, output] = [block.inputs[0], block.outputs[0]]
+/** The wires after inserting a block into one of them, with its first input and output or its frame ports. */
+export function insertIntoWire(block: SheetBlock, { wire, frame }: InsertionPlace, wires: Wire[]): Wire[] {
+  const [input, output] = throughPorts(block, frame)
   if (!input || !output) return wires
   const others = wires.filter((other) => wireKey(other) !== wireKey(wire))
   return [
@@ -59,9 +57,14 @@ export function wireDifference(before: Wire[], after: Wire[]): { wires: Wire[]; 
   }
 }
 
-/** A horizontal segment of a wire: its height, its ends, and whether it runs to the left. */
-interface WireSegment {
+/** A wire, and whether it is a frame line. */
+export interface InsertionPlace {
   wire: Wire
+  frame: boolean
+}
+
+/** A horizontal segment of a wire: its height, its ends, and whether it runs to the left. */
+interface WireSegment extends InsertionPlace {
   y: number
   left: number
   right: number
@@ -75,7 +78,7 @@ interface DrawnWire {
   sourceHandle?: string | null
   target: string
   targetHandle?: string | null
-  data?: { path: readonly Point[] }
+  data?: { path: readonly Point[]; frame?: boolean }
 }
 
 /** The horizontal segment of an existing wire under a point. */
@@ -95,6 +98,7 @@ export function wireAt(
       if (ay === by && Math.abs(at.y - ay) < INSERT_DISTANCE && at.x > left && at.x < right)
         return {
           wire: { source: `${source}/${sourceHandle}`, target: `${target}/${targetHandle}` },
+          frame: Boolean(data?.frame),
           y: ay,
           left,
           right,
@@ -105,6 +109,17 @@ export function wireAt(
   return undefined
 }
 
+/** The segment at a point into which a block can be inserted: it has ports of the kind of the wire. */
+export function insertionAt(
+  block: SheetBlock,
+  at: { x: number; y: number },
+  edges: readonly DrawnWire[],
+  wires: Wire[],
+): WireSegment | undefined {
+  const segment = wireAt(at, edges, wires)
+  return segment && throughPorts(block, segment.frame).every(Boolean) ? segment : undefined
+}
+
 /**
  * The position of a block at which a wire runs straight into its first input, in the direction of the wire;
  * on a short segment the block is centred.
@@ -112,9 +127,9 @@ export function wireAt(
 export function alignedPosition(
   block: SheetBlock,
   at: { x: number; y: number },
-  { y, left, right, flipped }: WireSegment,
+  { y, left, right, flipped, frame }: WireSegment,
 ): Places[string] {
-  const input = block.inputs[0]
+  const [input] = throughPorts(block, frame)
   if (input?.dy !== 0) return at
   const narrow = right - left < block.width + WIRE_MARGIN
   return { x: narrow ? (left + right - block.width) / 2 : at.x, y: y - input.y, flipped }

@@ -35,7 +35,9 @@ function valueAtTime(path: string, time: number, digits: number): string {
 
 function outputs(blocks: Record<string, SheetBlock>): { ref: string; block: SheetBlock; port: SheetPort }[] {
   return Object.values(blocks).flatMap((block) =>
-    block.outputs.map((port) => ({ ref: `${block.name}/${port.name}`, block, port })),
+    block.outputs
+      .filter(({ frame }) => !frame)
+      .map((port) => ({ ref: `${block.name}/${port.name}`, block, port })),
   )
 }
 
@@ -111,7 +113,7 @@ export function WireValues({ selectedEdge }: { selectedEdge: WireEdgeType | unde
             <IconAntennaBars5 size={12} aria-label={`${ref} is logged`} />
           </span>
         ))}
-      {selectedEdge && (
+      {selectedEdge && !selectedEdge.data?.frame && (
         <WireTools edge={selectedEdge} pathPrefix={pathPrefix} logged={logged} pinned={pinned} />
       )}
     </div>,

@@ -5,9 +5,11 @@ import {
   insertIntoWire,
   wireDifference,
   disconnectBlocks,
+  insertionAt,
   wireAt,
 } from '../../src/model/rewiring'
-import { wireKey } from '../../src/model/wires'
+import { freePort } from '../../src/model/free_port'
+import { sameKind, wireKey } from '../../src/model/wires'
 import type { SheetPort, SheetBlock, Wire } from '../../src/protocol'
 
 const port = (name: string, x: number, y: number): SheetPort => ({
@@ -42,6 +44,7 @@ function block(name: string, inputs = ['u'], outputs = ['y']): SheetBlock {
 }
 
 const wire = (source: string, target: string): Wire => ({ source, target })
+const signal = (source: string, target: string) => ({ wire: wire(source, target), frame: false })
 const sorted = (wires: Wire[]) => wires.map(wireKey).sort()
 
 const gain = block('gain')
@@ -58,7 +61,7 @@ test('disconnecting a block connects its neighbours, and inserting it again rest
     sorted([wire('step/y', 'plant/u'), wire('step/y', 'scope/in1'), wire('clock/y', 'log/in1')]),
   )
   const single = [wire('step/y', 'gain/u'), wire('gain/y', 'plant/u')]
-  expect(sorted(insertIntoWire(gain, wire('step/y', 'plant/u'), disconnectBlocks([gain], single)))).toEqual(
+  expect(sorted(insertIntoWire(gain, signal('step/y', 'plant/u'), disconnectBlocks([gain], single)))).toEqual(
     sorted(single),
   )
 })
@@ -75,10 +78,49 @@ test('disconnecting a block with two inputs connects no neighbours; insertion us
   expect(
     disconnectBlocks([sum], [wire('a/y', 'sum/in1'), wire('b/y', 'sum/in2'), wire('sum/y', 'c/u')]),
   ).toEqual([])
-  expect(insertIntoWire(sum, wire('a/y', 'c/u'), [wire('a/y', 'c/u')])).toEqual([
+  expect(insertIntoWire(sum, signal('a/y', 'c/u'), [wire('a/y', 'c/u')])).toEqual([
     wire('a/y', 'sum/in1'),
     wire('sum/y', 'c/u'),
   ])
+})
+
+test('frame ports are connected with frame ports only, also in an insertion into a line', () => {
+  const frames = (name: string, ...ports: string[]): SheetBlock => {
+    const ends = ports.map((end) => ({ ...port(end, 0, 20), frame: true }))
+    const shown = block(name)
+    return { ...shown, inputs: [...ends, ...shown.inputs], outputs: [...ends, ...shown.outputs] }
+  }
+  const [joint, solid] = [frames('joint', 'B', 'F'), frames('solid', 'R')]
+  const blocks = { joint, solid, gain }
+  expect(sameKind(blocks, 'joint/F', 'solid/R')).toBe(true)
+  expect(sameKind(blocks, 'joint/F', 'joint/u')).toBe(false)
+  expect(sameKind(blocks, 'gain/y', 'joint/u')).toBe(true)
+  const line = { wire: wire('world/W', 'rod/B'), frame: true }
+  expect(insertIntoWire(joint, line, [line.wire])).toEqual([
+    wire('world/W', 'joint/B'),
+    wire('joint/F', 'rod/B'),
+  ])
+  expect(insertIntoWire(solid, line, [])).toEqual([wire('world/W', 'solid/R'), wire('solid/R', 'rod/B')])
+  expect(insertIntoWire(joint, signal('a/y', 'c/u'), [])).toEqual([
+    wire('a/y', 'joint/u'),
+    wire('joint/y', 'c/u'),
+  ])
+  expect(freePort(joint, true, [wire('world/W', 'joint/B')], true)).toBe('joint/F')
+  expect(freePort(joint, true, [], false)).toBe('joint/u')
+  const path: [number, number][] = [
+    [0, 50],
+    [100, 50],
+  ]
+  const edge = {
+    id: wireKey(line.wire),
+    source: 'world',
+    sourceHandle: 'W',
+    target: 'rod',
+    targetHandle: 'B',
+    data: { path, frame: true },
+  }
+  expect(insertionAt(joint, { x: 50, y: 50 }, [edge], [line.wire])?.frame).toBe(true)
+  expect(insertionAt(gain, { x: 50, y: 50 }, [edge], [line.wire]), 'no frame ports').toBeUndefined()
 })
 
 test('an edit contains exactly the added and removed wires', () => {

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 import armblocks as ab
 from armblocks.blocks import BLOCKS, ConnectionPort
 from armblocks.diagram import Diagram, DiagramBlock, FrameLine, PortRef
+from armblocks.errors import DiagramError
 from armblocks.formats import diagram_from_bytes, load_robot
 from armblocks.studio.protocol.messages.sheet_edits import (
     Connect,
@@ -45,7 +47,7 @@ def test_a_sheet_shows_ports_and_lines_of_frames() -> None:
     assert all(shown.lines["world/W"].paths[wire.target] for wire in frame_wires)
     joint = shown.blocks["revolute joint"]
     for ports in (joint.inputs, joint.outputs):
-        assert {"B", "F"} <= {port.name for port in ports}
+        assert {"B", "F"} <= {port.name for port in ports if port.frame}
 
 
 def test_edits_keep_the_frame_lines_of_other_blocks() -> None:
@@ -79,6 +81,13 @@ def test_lines_are_drawn_and_removed_like_wires() -> None:
     assert {("world/W", "gravity/C"), ("world/W", "revolute joint/B")} <= shown
     document.edit(RemoveBlocks(wires=[Wire(source="world/W", target="revolute joint/B", bends=())]))
     assert lines(document) == {"gravity/C -- world/W", "brick/R -- offset/F", "offset/B -- revolute joint/F"}
+
+
+def test_frame_ports_and_signals_are_not_connected() -> None:
+    document = pendulum()
+    for source, target in (("revolute joint/q", "brick/R"), ("world/W", "scope/u1")):
+        with pytest.raises(DiagramError, match="cannot be connected with an input or output of signals"):
+            document.edit(Connect(wire=Wire(source=source, target=target, bends=())))
 
 
 def test_copies_have_the_lines_between_the_copied_blocks() -> None:

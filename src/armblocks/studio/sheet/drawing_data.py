@@ -117,6 +117,7 @@ def _block_type(kind: type[Block]) -> BlockType:
         inputs=[port.name for port in block.input_ports()],
         input_y=[port.y for port in box.inputs],
         outputs=[port.name for port in block.output_ports()],
+        frames=[port.name for port in block.frame_ports()],
         parameters=[
             _rule(rule, block) for rule in kind.parameters() if rule.kind is not ParameterKind.DIAGRAM
         ],
@@ -224,6 +225,7 @@ def _sheet_ports(box: Box, labels: tuple[str, ...], *, inputs: bool) -> list[She
             y=place.y,
             dx=-place.dx if inputs else place.dx,
             dy=-place.dy if inputs else place.dy,
+            frame=True,
         )
         for port, place, label in zip(box.block.frame_ports(), box.frames, frame_labels(box.block))
     ]

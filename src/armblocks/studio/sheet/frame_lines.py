@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from armblocks.diagram import Diagram, FrameLine, PortRef, lines_without
 from armblocks.drawing.diagram_layout import boxes
 from armblocks.drawing.frame_lines import drawn_frames
+from armblocks.errors import DiagramError
 from armblocks.studio.protocol.messages.sheet_edits import Wire
 
 
@@ -27,15 +28,26 @@ def shown_lines(diagram: Diagram) -> list[Wire]:
 
 
 def split_wires(wires: Sequence[Wire], diagram: Diagram) -> tuple[list[Wire], list[FrameLine]]:
-    """Return the wires of signals, and the frame lines that the other wires represent."""
+    """Return the wires of signals, and the frame lines that the other wires represent.
+
+    Raises ``DiagramError`` for a wire between a frame port and a port of signals.
+    """
     signals: list[Wire] = []
     lines: list[FrameLine] = []
     for wire in wires:
         ends = [PortRef(*end.rpartition("/")[::2]) for end in (wire.source, wire.target)]
-        if all(_is_frame(end, diagram) for end in ends):
+        frames = [end for end in ends if _is_frame(end, diagram)]
+        if len(frames) == 2:
             lines.append(FrameLine(*ends))
-        else:
-            signals.append(wire)
+            continue
+        if frames:
+            raise DiagramError(
+                f"the frame port '{frames[0]}' cannot be connected with an input or output of signals",
+                where=f"diagram '{diagram.name}'",
+                allowed="lines between two frame ports, and wires from an output to an input",
+                fix="choose a frame port at both ends; joints and sensors have inputs and outputs on request",
+            )
+        signals.append(wire)
     return signals, lines
 
 

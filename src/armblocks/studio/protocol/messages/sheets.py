@@ -30,6 +30,8 @@ class SheetPort(Message):
     y: float
     dx: int
     dy: int
+    frame: bool = False
+    """Whether it is a frame port, which is among the inputs and the outputs. Its lines have no direction."""
 
 
 class Outline(Message):
@@ -179,7 +181,8 @@ class BlockType(Message):
     input_y: list[float]
     """Positions of the inputs below the upper edge, px."""
     outputs: list[str]
-    """Ports with default parameters."""
+    frames: list[str]
+    """Inputs, outputs and frame ports with default parameters."""
     parameters: list[ParameterRule]
 
 
