@@ -52,6 +52,8 @@ if TYPE_CHECKING:
     from armblocks.face.linearizing import frequency_response, linearize
     from armblocks.face.model import CompiledDiagram, begin, compile_diagram, simulate
     from armblocks.face.motor_catalogue import load_drives
+    from armblocks.face.optimise import optimise
+    from armblocks.face.optimise_result import LocalSolution, OptimisationResult, OptimisedConstraint
     from armblocks.face.parametric import ParametricArm
     from armblocks.face.payload import Payload
     from armblocks.face.pick_and_place import CyclePhase, PickAndPlaceCycle, pick_and_place
@@ -159,12 +161,15 @@ else:
             "LineSpring": "armblocks.robot",
             "LinearSystem": "armblocks.analysis.linear_system",
             "Link": "armblocks.robot",
+            "LocalSolution": "armblocks.face.optimise_result",
             "Measure": "armblocks.sweeps.measures",
             "MeasureMap": "armblocks.face.workspace.cells",
             "MorrisEffects": "armblocks.face.sweep_sensitivity",
             "Motor": "armblocks.robot",
             "NamedFrame": "armblocks.robot",
             "OperatingPoint": "armblocks.analysis.operating_point",
+            "OptimisationResult": "armblocks.face.optimise_result",
+            "OptimisedConstraint": "armblocks.face.optimise_result",
             "ParametricArm": "armblocks.face.parametric",
             "Payload": "armblocks.face.payload",
             "PickAndPlaceCycle": "armblocks.face.pick_and_place",
@@ -235,6 +240,7 @@ else:
             "mstraj": "armblocks.face.toolbox_trajectories",
             "mtraj": "armblocks.face.toolbox_trajectories",
             "normal": "armblocks.sweeps.designs",
+            "optimise": "armblocks.face.optimise",
             "payload_capacity": "armblocks.face.workspace.capacity",
             "pick_and_place": "armblocks.face.pick_and_place",
             "point_to_point": "armblocks.face.planned_trajectories",
@@ -304,12 +310,15 @@ __all__ = [
     "LineSpring",
     "LinearSystem",
     "Link",
+    "LocalSolution",
     "Measure",
     "MeasureMap",
     "MorrisEffects",
     "Motor",
     "NamedFrame",
     "OperatingPoint",
+    "OptimisationResult",
+    "OptimisedConstraint",
     "ParametricArm",
     "Payload",
     "PickAndPlaceCycle",
@@ -380,6 +389,7 @@ __all__ = [
     "mstraj",
     "mtraj",
     "normal",
+    "optimise",
     "payload_capacity",
     "pick_and_place",
     "point_to_point",

@@ -122,7 +122,7 @@ def sensitivity(
     options = with_settings(resolved.settings, settings)
     compiled = compile_system(augmented)
     run = run_system(compiled, options)
-    _check_coinciding_events(compiled, run)
+    check_coinciding_events(compiled, run)
     slots = Signature(tuple(dict.fromkeys(chosen)))
     return SensitivityResult(run=run, outputs=output_names, parameters=names, slots=slots)
 
@@ -141,7 +141,7 @@ def _parameter(system: HybridSystem, diagram: Diagram, name: str) -> Slot:
         raise InputError(error.what, allowed=error.allowed, fix=error.fix, where=system.name) from None
 
 
-def _check_coinciding_events(compiled: CompiledSystem, run: SimulationResult) -> None:
+def check_coinciding_events(compiled: CompiledSystem, run: SimulationResult) -> None:
     """Raise ``SimulationError`` for coinciding events that a parameter change would separate."""
     entry = compiled.discrete.ranges.get(MIXED)
     if entry is None or run.final_state is None:

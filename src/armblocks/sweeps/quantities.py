@@ -75,6 +75,7 @@ class Expressions:
 
     def __init__(self, traced: TracedFunction) -> None:
         """``traced``: inputs ``t`` and ``y (ny,)``, one output with a number for each expression."""
+        self.traced = traced
         self._tape = tape_of(traced)
         self.count = traced.outputs.size
 

@@ -1,0 +1,1 @@
+"""Minimisation of functions with bounds and constraints: with derivatives, or with values alone."""
