@@ -69,6 +69,7 @@ def examples() -> Mapping[str, Any]:
     report = ab.trajectory_report(arm, ab.jtraj([0, 0], [1, 1], 5), speed=1.0)
     sizing = ab.size_drives(arm, ab.jtraj([0, 0], [1, 1], 5), [drive])
     fitted = ab.fit(diagram, "k", {"t": [0.0, 0.5, 1.0], "gain": [0.0, 1.0, 1.5]})
+    best = ab.optimise(diagram, {"k": (0.0, 9.0)}, "(final(gain) - 2)^2", "final(gain) <= 1.5", stop_time=1.0)
     phase = ab.CyclePhase(name="grip", start=0.0, end=1.0, loaded=True)
     cycle = ab.PickAndPlaceCycle(trajectory=ab.jtraj([0, 0], [1, 1], 5), phases=(phase,))
     region = ab.workspace(arm, 50)
@@ -125,6 +126,7 @@ def examples() -> Mapping[str, Any]:
         ab.sensitivity(diagram, "gain.gain", "integrator", stop_time=1.0),
         ab.identify(arm, random_log(arm)),
         ab.excitation(arm, evaluations=2),
+        *(best, best.constraints[0], best.solutions[0]),
         *(fitted, fitted.signals[0], ab.Experiment(data={"t": [0.0, 1.0]})),
         ab.trim("van_der_pol_pid"),
         FromFile(data=[[0.0, 1.0], [1.0, 2.0]]),

@@ -16,7 +16,7 @@ from armblocks.extras import require
 from armblocks.face.model import CompiledDiagram, compile_diagram
 from armblocks.face.optimise_formulas import Formulas, PythonFunction, Target, conditions
 from armblocks.face.optimise_result import OptimisationResult
-from armblocks.face.optimise_runs import Runs, lanes_pay, scenario_groups
+from armblocks.face.optimise_runs import Runs, scenario_groups
 from armblocks.face.optimise_search import GRADIENT, SEARCH, Optimisation, optimised
 from armblocks.face.optimise_statistics import MEAN, Statistics
 from armblocks.face.optimise_summary import summarised
@@ -94,32 +94,20 @@ def optimise(
     where = f"optimisation of '{model.diagram.name}'"
     _check(method, starts, evaluations, where)
     varied = Variables(model, variables, start or {}, where)
-    limits = conditions(constraints, where)
-    targets: list[Target] = [_target(objective, where), *(limit.target for limit in limits)]
-    formulas = Formulas(targets, varied.names, where)
     statistics = Statistics.checked(statistic, share, where)
     groups, made = scenario_groups(model, over, runs, design, seed)
     _check_clash(varied, made.columns if made is not None else {}, where)
     options = with_settings(model.diagram.settings, settings)
-    count = sum(group.places.size for group in groups)
-    many = 500 if evaluations is None else evaluations
-    computed = Runs(
-        groups,
-        varied.names,
-        formulas.measures,
-        formulas.functions,
-        options,
-        allow_stops=allow_stops,
-        lanes=lanes_pay(many, count),
-        threads=threads,
-        where=where,
-    )
+    limits = conditions(constraints, where)
+    targets: list[Target] = [_target(objective, where), *(limit.target for limit in limits)]
+    formulas = Formulas(targets, varied.names, where)
+    many = (500 if evaluations is None else evaluations) * sum(group.places.size for group in groups)
     problem = Optimisation(
         variables=varied,
         formulas=formulas,
         conditions=limits,
         statistics=statistics,
-        runs=computed,
+        runs=Runs(groups, varied.names, formulas, options, stops=allow_stops, many=many, threads=threads),
         seed=seed,
         progress=progress,
         where=where,

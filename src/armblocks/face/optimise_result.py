@@ -29,6 +29,10 @@ ACTIVE = 1e-4
 """A constraint is active if its value is nearer to the limit than this fraction of the limit."""
 
 
+def _nothing() -> Array:
+    return np.empty(0)
+
+
 @dataclass(frozen=True, kw_only=True)
 class OptimisedConstraint(metaclass=ArgumentErrors):
     """A constraint at the end of an optimisation: ``low <= value <= high``.
@@ -91,28 +95,28 @@ class OptimisationResult(metaclass=ArgumentErrors):
 
     diagram: Diagram = field(repr=False)
     variables: tuple[str, ...]
-    units: tuple[str, ...]
+    units: tuple[str, ...] = ()
     values: Array
     start: Array
     bounds: Array
     objective_name: str
     objective: float
     start_objective: float
-    constraints: tuple[OptimisedConstraint, ...]
+    constraints: tuple[OptimisedConstraint, ...] = ()
     bound_multipliers: Array
     method: str
-    reason: str
-    message: str
-    converged: bool
-    feasible: bool
-    evaluations: int
-    runs: int
-    history: Array
-    solutions: tuple[LocalSolution, ...]
-    statistic: str
-    scenarios: tuple[Mapping[str, Any], ...]
-    scenario_objectives: Array
-    start_scenario_objectives: Array
+    reason: str = ""
+    message: str = ""
+    converged: bool = False
+    feasible: bool = False
+    evaluations: int = 0
+    runs: int = 0
+    history: Array = field(default_factory=_nothing)
+    solutions: tuple[LocalSolution, ...] = ()
+    statistic: str = "the mean"
+    scenarios: tuple[Mapping[str, Any], ...] = ({},)
+    scenario_objectives: Array = field(default_factory=_nothing)
+    start_scenario_objectives: Array = field(default_factory=_nothing)
     options: SimulationOptions = field(repr=False)
 
     def __getitem__(self, variable: str) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,16 +12,18 @@ from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError
 from armblocks.face.measured_run import Chain
 from armblocks.face.model import CompiledDiagram
+from armblocks.face.optimise_formulas import Formulas
 from armblocks.face.sweep_parameters import RunParameters
 from armblocks.face.sweep_programs import ProgramRecipe
-from armblocks.simulation import SimulationResult
 from armblocks.sweeps.batch import COMPLETED, STATUSES, STOPPED, RunProgram
 from armblocks.sweeps.designs import PAIRED, Column, Design, make_design
 from armblocks.sweeps.lanes import lanes_of_host
-from armblocks.sweeps.measures import Measure
 from armblocks.sweeps.scheduling import RunGroup, Scheduler, default_threads
 
 Array = NDArray[np.float64]
+
+LANE_RUNS = 500
+"""Number of runs from which on they are computed in lanes."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -69,22 +71,22 @@ class Runs:
         self,
         groups: Sequence[ScenarioGroup],
         variables: Sequence[str],
-        measures: Sequence[Measure],
-        functions: Sequence[Callable[[SimulationResult], float]],
+        formulas: Formulas,
         options: SimulationOptions,
         *,
-        allow_stops: bool,
-        lanes: bool,
+        stops: bool,
+        many: int,
         threads: int | None,
-        where: str,
     ) -> None:
+        """``stops``: whether runs that a block ends have measures. ``many``: about how many runs follow."""
         self.groups, self.variables, self.options = list(groups), list(variables), options
-        self.measures = tuple(measures)
+        self.measures, functions = formulas.measures, formulas.functions
         self.scenarios = sum(group.places.size for group in groups)
-        self.columns = len(measures) + len(functions)
-        self._where = where
-        self._valid = [COMPLETED, STOPPED] if allow_stops else [COMPLETED]
-        recipe = ProgramRecipe(options, self.measures, tuple(functions), (), None, lanes and not functions)
+        self.columns = len(self.measures) + len(functions)
+        self._where = where = f"optimisation of '{groups[0].model.diagram.name}'"
+        self._valid = [COMPLETED, STOPPED] if stops else [COMPLETED]
+        lanes = lanes_of_host() > 1 and many >= LANE_RUNS and not functions
+        recipe = ProgramRecipe(options, self.measures, functions, (), None, lanes)
         self._programs = [recipe.program(group.model) for group in groups]
         called = any(program.calls for program in self._programs)
         self._threads = 1 if functions or called else threads or default_threads()
@@ -141,8 +143,3 @@ class Runs:
                 k = int(invalid[0])
                 message = f"{names[k]}: {rows.messages[k]}"
         return values, message
-
-
-def lanes_pay(points: int, scenarios: int) -> bool:
-    """Whether the runs are enough for the compilation of code for lanes."""
-    return lanes_of_host() > 1 and points * scenarios >= 500

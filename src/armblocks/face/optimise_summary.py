@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -93,7 +94,7 @@ def _constraint(
         [[sign * (value - limit) for sign, value, limit in zip(signs, row, limits)] for row in rows]
     )
     nearest = np.argmax(np.nan_to_num(excess, nan=np.inf), axis=1)
-    return OptimisedConstraint(
+    found = OptimisedConstraint(
         name=condition.name,
         value=float(rows[1, nearest[1]]),
         start=float(rows[0, nearest[0]]),
@@ -101,3 +102,6 @@ def _constraint(
         high=condition.high,
         multiplier=multiplier,
     )
+    # The interior-point method leaves small multipliers at limits that are not active.
+    inactive = not np.isnan(multiplier) and not found.active
+    return replace(found, multiplier=0.0) if inactive else found
