@@ -101,10 +101,10 @@ class OptimisationResult(metaclass=ArgumentErrors):
     bounds: Array
     objective_name: str
     objective: float
-    start_objective: float
+    start_objective: float = np.nan
     constraints: tuple[OptimisedConstraint, ...] = ()
-    bound_multipliers: Array
-    method: str
+    bound_multipliers: Array = field(default_factory=_nothing)
+    method: str = "gradient"
     reason: str = ""
     message: str = ""
     converged: bool = False
