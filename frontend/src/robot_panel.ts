@@ -11,13 +11,16 @@ const TUNE = 'tune'
 /** Initial width of the robot view, px. */
 export const robotWidth = (): number => Math.min(640, 0.28 * innerWidth)
 
-/** Whether the robot view is shown: for a sheet with a robot, and in subsystems if it was shown before. */
+/** Whether the robot view is shown: for a robot or mechanism, and in subsystems if it was shown before. */
 export function needsRobotView(
   blocks: Record<string, SheetBlock>,
   isTop: boolean,
   previously: boolean,
 ): boolean {
-  return Object.values(blocks).some(({ parameters }) => parameters['robot']) || (!isTop && previously)
+  return (
+    Object.values(blocks).some(({ type, parameters }) => type === 'WorldFrame' || parameters['robot']) ||
+    (!isTop && previously)
+  )
 }
 
 /** Show the robot view only for a model with a robot: without a robot, diagram and scopes use its space. */

@@ -17,12 +17,14 @@ interface RunArmProps {
   drawing: () => Promise<string | undefined>
   /** Additional entries at the start of the context menu. */
   entries?: () => Entries
+  /** Whether an arm that reaches below its foot stands on a column. */
+  pedestal?: boolean
   /** Additional buttons before the usual buttons. */
   children?: React.ReactNode
 }
 
 /** The arm in the pose of the run at the time cursor. */
-export function RunArm({ path, scene, rest, drawing, children, entries }: RunArmProps) {
+export function RunArm({ path, scene, rest, drawing, pedestal = true, children, entries }: RunArmProps) {
   const extentKey = useStudio((s) => (s.run?.state === 'done' ? s.run.run : ''))
   const hasPoses = useStudio((s) =>
     Boolean(s.run?.views.some((view) => view.kind === 'robot' && view.block === path)),
@@ -71,6 +73,7 @@ export function RunArm({ path, scene, rest, drawing, children, entries }: RunArm
       extent={extent}
       extentKey={extentKey}
       drawing={drawing}
+      pedestal={pedestal}
       {...(hasPoses ? { playForVideo: playFromStart } : {})}
       {...(entries ? { entries } : {})}
     >

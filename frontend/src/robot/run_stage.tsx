@@ -9,6 +9,8 @@ export interface RunStageProps {
   document: string
   inside: string[]
   block: string
+  /** Whether the robot is drawn from bodies and joints on the sheet, and is edited there. */
+  drawn: boolean
   scene: RobotScene
   /** Poses of the arm at rest, and its joint positions. */
   rest: number[][][]
@@ -16,7 +18,7 @@ export interface RunStageProps {
 }
 
 /** The arm of a block as moved by the run. */
-export default function RunStage({ document, inside, block, scene, rest, q }: RunStageProps) {
+export default function RunStage({ document, inside, block, drawn, scene, rest, q }: RunStageProps) {
   const poses = useMemo(() => posesFromRows(rest), [rest])
   const drawing = useCallback(
     () =>
@@ -32,7 +34,7 @@ export default function RunStage({ document, inside, block, scene, rest, q }: Ru
     [document, inside, block, q],
   )
   const edit = () => void ask({ kind: 'robot_of_block', document, inside, block })
-  const entries = () => [{ title: 'Edit this robot', run: edit }, null]
+  const entries = () => (drawn ? [] : [{ title: 'Edit this robot', run: edit }, null])
   return (
     <RunArm
       path={[...inside, block].join('/')}
@@ -40,8 +42,9 @@ export default function RunStage({ document, inside, block, scene, rest, q }: Ru
       rest={poses}
       drawing={drawing}
       entries={entries}
+      pedestal={!drawn}
     >
-      <Button label="Edit this robot" icon={IconEdit} onClick={edit} />
+      {!drawn && <Button label="Edit this robot" icon={IconEdit} onClick={edit} />}
     </RunArm>
   )
 }

@@ -70,6 +70,8 @@ interface StageProps {
   contents?: React.ReactNode
   /** A handler of keys, called before the handlers of the view; returns whether it has handled the key. */
   onKey?: (event: React.KeyboardEvent) => boolean
+  /** Whether an arm that reaches below its foot stands on a column; the default is true. */
+  pedestal?: boolean
   /** Additional buttons before the usual buttons. */
   children?: React.ReactNode
 }
@@ -181,6 +183,7 @@ function StageContents({
   extent,
   extentKey,
   contents,
+  pedestal = true,
   scheme,
   camera,
   rendering,
@@ -238,7 +241,7 @@ function StageContents({
       {options.limits && <Limits {...overlay} />}
       {options.path && path && <ToolPath path={path} dark={dark} background={colours.background} />}
       {contents}
-      <Pedestal from={floor} to={footHeight} reach={reach} poses={poses} />
+      {pedestal && <Pedestal from={floor} to={footHeight} reach={reach} poses={poses} />}
       <Ground height={floor} reach={reach} colours={colours} />
       <ViewCamera
         scene={scene}

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 
 from armblocks import formats
+from armblocks.blocks import BLOCKS
+from armblocks.diagram import Diagram
 from armblocks.errors import InputError
+from armblocks.multibody.drawn_robots import drawn_robots
 from armblocks.rendering.arm_drawing import arm_picture_svg
 from armblocks.robot import Robot
 from armblocks.studio.documents.project_folder import ProjectFolder
@@ -69,7 +73,13 @@ class RobotRequests:
         return robot_tables()
 
     async def _scene(self, _: StudioClient, request: robot_messages.AskScene) -> RobotScene:
-        return scene_of(self._robot(request.document, request.inside, request.block))
+        scene = scene_of(self._robot(request.document, request.inside, request.block))
+        if request.document not in self._robots:
+            diagram = self._diagrams[request.document].document.diagram
+            if _is_world(diagram, request.inside, request.block):
+                start = drawn_robots(diagram)["/".join([*request.inside, request.block])][1]
+                return dataclasses.replace(scene, rest=list(start))
+        return scene
 
     async def _pose(self, _: StudioClient, request: robot_messages.AskPose) -> list[list[list[float]]]:
         return link_frames_of(self._robot(request.document, request.inside, request.block), request.q)
@@ -93,7 +103,12 @@ class RobotRequests:
         return self._block_robot(document, path, block)
 
     def _block_robot(self, document: str, path: Sequence[str], block: str) -> Robot:
-        level = inside(self._diagrams[document].document.diagram, path)
+        diagram = self._diagrams[document].document.diagram
+        if _is_world(diagram, path, block):
+            mechanism = drawn_robots(diagram).get("/".join([*path, block]))
+            if mechanism is not None:
+                return mechanism[0]
+        level = inside(diagram, path)
         robot = getattr(level.block(block), "robot", None)
         if not isinstance(robot, Robot):
             raise InputError(
@@ -103,3 +118,8 @@ class RobotRequests:
                 fix="choose a block with a robot",
             )
         return robot
+
+
+def _is_world(diagram: Diagram, path: Sequence[str], block: str) -> bool:
+    """Whether a block is a World Frame; its robot is the drawn mechanism that is connected with it."""
+    return isinstance(inside(diagram, path).blocks.get(block), BLOCKS["WorldFrame"])
