@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -13,6 +13,14 @@ from armblocks.cli.assignments import chosen_parameters, parse_value
 from armblocks.cli.completion import ModelName, ParameterSetName
 from armblocks.cli.identify import print_notes
 from armblocks.cli.progress import FitProgress
+from armblocks.cli.run_options import (
+    AbsoluteTolerance,
+    RelativeTolerance,
+    Solver,
+    Step,
+    Trust,
+    given_settings,
+)
 from armblocks.cli.terminal import STRONG, messages_console, results_console, table
 from armblocks.errors import InputError, counted
 from armblocks.pictures.numbers import table_number
@@ -55,10 +63,10 @@ def fit(
         ),
     ] = None,
     evaluations: Annotated[int, typer.Option(help="Maximum number of evaluations.")] = 200,
-    solver: Annotated[str | None, typer.Option(help="auto, or a solver of 'armblocks list solvers'.")] = None,
-    step: Annotated[float | None, typer.Option(help="Step of a fixed-step solver, s.")] = None,
-    rtol: Annotated[float | None, typer.Option(help="Relative tolerance of an adaptive solver.")] = None,
-    atol: Annotated[float | None, typer.Option(help="Absolute tolerance of an adaptive solver.")] = None,
+    solver: Solver = None,
+    step: Step = None,
+    rtol: RelativeTolerance = None,
+    atol: AbsoluteTolerance = None,
     assignments: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="BLOCK.PARAMETER=VALUE", help="Change a parameter that is not fitted."),
@@ -68,9 +76,7 @@ def fit(
     plot: Annotated[
         Path | None, typer.Option(help="Write measured signals, fitted signals and residuals, .svg or .png.")
     ] = None,
-    trust: Annotated[
-        bool, typer.Option("--trust", help="Run the Python files that the diagram names.")
-    ] = False,
+    trust: Trust = False,
 ) -> None:
     """Fit parameters of a diagram to measured signals.
 
@@ -84,8 +90,7 @@ def fit(
 
     diagram = ab.load_diagram(model, trust=trust)
     names, start = _parameters(parameter)
-    settings = {"solver": solver, "step": step, "rtol": rtol, "atol": atol}
-    given: dict[str, Any] = {name: value for name, value in settings.items() if value is not None}
+    given = given_settings(solver=solver, step=step, rtol=rtol, atol=atol)
     with FitProgress(diagram.name, messages_console(), evaluations) as progress:
         result = ab.fit(
             diagram,

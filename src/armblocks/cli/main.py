@@ -2,8 +2,8 @@
 
 Exit codes: 0 done, 1 a defect of armblocks (with a traceback), 2 invalid input (a message, no traceback), 130
 interrupted with Ctrl-C. ``diff`` also exits with 1 if its diagrams differ, ``lint`` if it has findings,
-``size`` if a joint has no candidate drive within all limits, and ``identify`` and ``fit`` if the data do not
-determine some parameters.
+``size`` if a joint has no candidate drive within all limits, ``identify`` and ``fit`` if the data do not
+determine some parameters, and ``optimise`` if it does not find a minimum.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from armblocks.cli import (
     linearize,
     lint,
     listing,
+    optimise,
     run,
     show,
     size,
@@ -85,6 +86,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "size": size.size,
     "identify": identify.identify,
     "fit": fit.fit,
+    "optimise": optimise.optimise,
     "workspace": workspace.workspace,
     "list": listing.list_names,
     "blocks": blocks.describe_blocks,

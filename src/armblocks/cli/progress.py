@@ -100,6 +100,15 @@ class FitProgress(RunProgress):
         self._show(where, min(evaluations / max(self._most, 1), 1.0))
 
 
+class SearchProgress(RunProgress):
+    """Displays the progress of an optimisation: called with the number of evaluated points and the least
+    objective so far, NaN before a point satisfies the constraints."""
+
+    def __call__(self, evaluations: float, objective: float, _: float = 0.0) -> None:
+        value = f"least objective {objective:.6g}" if objective == objective else "no valid point"
+        self._show(f"evaluation {evaluations:.0f}, {value}", 0.0)
+
+
 def _duration(seconds: float) -> str:
     """A rounded duration: ``40 s``, ``3 min``, ``1.5 h``."""
     if seconds < 100.0:

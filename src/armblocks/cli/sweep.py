@@ -13,6 +13,17 @@ from rich.console import Console
 from armblocks.cli.assignments import chosen_parameters, parse_value
 from armblocks.cli.completion import ModelName, ParameterSetName
 from armblocks.cli.progress import SweepProgress
+from armblocks.cli.run_options import (
+    AbsoluteTolerance,
+    RelativeTolerance,
+    SampleTime,
+    Solver,
+    Step,
+    StopTime,
+    Threads,
+    Trust,
+    given_settings,
+)
 from armblocks.cli.terminal import STRONG, messages_console, results_console, table
 from armblocks.errors import InputError, counted
 
@@ -51,16 +62,14 @@ def sweep(
     runs: Annotated[int | None, typer.Option(help="Number of runs, with random parameters.")] = None,
     design: Annotated[str | None, typer.Option(help="grid, paired, random, sobol, halton or latin.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the design.")] = 0,
-    stop_time: Annotated[
-        float | None, typer.Option(help="Simulated time, s.", show_default="the model's")
-    ] = None,
-    solver: Annotated[str | None, typer.Option(help="auto, or a solver of 'armblocks list solvers'.")] = None,
-    step: Annotated[float | None, typer.Option(help="Step of a fixed-step solver, s.")] = None,
-    sample_time: Annotated[float | None, typer.Option(help="Interval of the samples, s.")] = None,
-    rtol: Annotated[float | None, typer.Option(help="Relative tolerance of an adaptive solver.")] = None,
-    atol: Annotated[float | None, typer.Option(help="Absolute tolerance of an adaptive solver.")] = None,
+    stop_time: StopTime = None,
+    solver: Solver = None,
+    step: Step = None,
+    sample_time: SampleTime = None,
+    rtol: RelativeTolerance = None,
+    atol: AbsoluteTolerance = None,
     max_steps: Annotated[int | None, typer.Option(help="Maximum number of steps of a run.")] = None,
-    threads: Annotated[int | None, typer.Option(help="Number of threads.", show_default="all cores")] = None,
+    threads: Threads = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Compute on the cluster of this Dask scheduler.")
     ] = None,
@@ -73,22 +82,20 @@ def sweep(
         Path | None,
         typer.Option(help="Write the table to this .parquet or .csv file; continues an interrupted sweep."),
     ] = None,
-    trust: Annotated[
-        bool, typer.Option("--trust", help="Run the Python files that the diagram names.")
-    ] = False,
+    trust: Trust = False,
 ) -> None:
     """Run a diagram with many combinations of parameters, and print the measures of the runs."""
     import armblocks as ab
 
     diagram = ab.load_diagram(model, trust=trust)
-    settings = {"stop_time": stop_time, "solver": solver, "step": step, "sample_time": sample_time}
-    settings |= {"rtol": rtol, "atol": atol}
-    given: dict[str, Any] = {name: value for name, value in settings.items() if value is not None}
+    given = given_settings(
+        stop_time=stop_time, solver=solver, step=step, sample_time=sample_time, rtol=rtol, atol=atol
+    )
     with SweepProgress(diagram.name, messages_console()) as progress:
         result = ab.sweep(
             diagram,
-            _unique((_varied(text) for text in vary), "--vary"),
-            measures=_unique((_named(text) for text in measure or ()), "--measure"),
+            unique((varied(text) for text in vary), "--vary"),
+            measures=unique((_named(text) for text in measure or ()), "--measure"),
             keep=keep or (),
             runs=runs,
             design=design,
@@ -106,7 +113,7 @@ def sweep(
         raise KeyboardInterrupt
 
 
-def _unique(pairs: Iterable[tuple[str, Any]], option: str) -> dict[str, Any]:
+def unique(pairs: Iterable[tuple[str, Any]], option: str) -> dict[str, Any]:
     """The values by name; raises ``InputError`` for a name that occurs twice."""
     named: dict[str, Any] = {}
     for name, value in pairs:
@@ -121,17 +128,17 @@ def _unique(pairs: Iterable[tuple[str, Any]], option: str) -> dict[str, Any]:
     return named
 
 
-def _varied(text: str) -> tuple[str, Any]:
-    """The parameter and the values of one ``--vary``."""
+def varied(text: str, option: str = "--vary") -> tuple[str, Any]:
+    """The parameter and the values of one ``--vary``, or of another option."""
     path, equals, values = (part.strip() for part in text.partition("="))
     if not (equals and path and values):
         raise InputError(
             f"'{text}' is not of the form block.parameter=values",
-            where="--vary",
+            where=option,
             allowed=_ALLOWED,
-            fix="write for example --vary load.mass=0:180:1000",
+            fix=f"write for example {option} load.mass=0:180:1000",
         )
-    return path, _values(values, f"--vary {path}")
+    return path, _values(values, f"{option} {path}")
 
 
 def _values(text: str, where: str) -> Any:

@@ -135,9 +135,9 @@ def morris_values(values: Array, points: Array) -> MorrisValues:
         return MorrisValues(nothing, nothing, nothing, groups)
     steps = np.diff(path, axis=1)
     number = np.abs(steps).argmax(axis=2)
-    slope = np.diff(table, axis=1) / np.take_along_axis(steps, number[..., None], axis=2)[..., 0]
+    elementary_effect = np.diff(table, axis=1) / np.take_along_axis(steps, number[..., None], axis=2)[..., 0]
     effects = np.empty((groups, dimensions))
-    np.put_along_axis(effects, number, slope, axis=1)
+    np.put_along_axis(effects, number, elementary_effect, axis=1)
     return MorrisValues(
         effects.mean(axis=0), np.abs(effects).mean(axis=0), effects.std(axis=0, ddof=1), groups
     )
