@@ -21,9 +21,8 @@ _noted: list[int] = []
 def kept() -> Generator[None]:
     """Context that raises ``KeyboardInterrupt`` at its end if an interrupt inside was discarded.
 
-    The context has an
-    effect only in the main thread, where Python raises interrupts, and only with Python's own handler of
-    SIGINT.
+    The context has an effect only in the main thread, where Python raises interrupts, and only with Python's
+    own handler of SIGINT.
     """
     in_main_thread = threading.current_thread() is threading.main_thread()
     if not in_main_thread or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:

@@ -6,10 +6,13 @@ import contextlib
 import signal
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+import armblocks as ab
 from armblocks import interrupts
+from armblocks.simulation import Simulation
 from interruptible import start_interruptible
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
@@ -100,5 +103,22 @@ def test_another_error_does_not_replace_an_interrupt() -> None:
                 raise ValueError("as a library does") from None
         with pytest.raises(KeyboardInterrupt), interrupts.kept(), contextlib.suppress(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_ctrl_c_after_the_last_step_of_a_run_ends_the_analysis(monkeypatch: pytest.MonkeyPatch) -> None:
+    advance = Simulation.advance
+
+    def interrupted(run: Simulation, **limits: Any) -> None:
+        advance(run, **limits)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(Simulation, "advance", interrupted)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        assert ab.simulate("falling_pendulum", stop_time=1.0).run.complete
+        with pytest.raises(KeyboardInterrupt):
+            ab.linearize("falling_pendulum", (), "pendulum/q", at=1.0)
     finally:
         signal.signal(signal.SIGINT, before)

@@ -67,8 +67,10 @@ def run_to_the_end(run: Simulation, progress: Progress | None = None) -> Simulat
             if progress is not None and not run.finished:
                 _report_progress(progress, run)
     except KeyboardInterrupt:
-        interrupts.answered()
-        run.stop(f"stopped by Ctrl-C at {run.time:g} s of {run.stop_time:g} s")
+        # After the last step there is nothing to stop: the analysis that needs the run ends instead.
+        if not run.finished:
+            interrupts.answered()
+            run.stop(f"stopped by Ctrl-C at {run.time:g} s of {run.stop_time:g} s")
     result = run.result()
     if progress is not None and result.run.complete:
         _report_progress(progress, run)
