@@ -125,7 +125,7 @@ def evaluated(equations: Function, block: Block, minimum: float = 0.1) -> list[n
     States, inputs and events lie between ``minimum`` and ``minimum + 0.8``.
     """
     random = np.random.default_rng(1)
-    tunables = [np.ravel(block.parameter_value(rule.name)) for rule in block.parameters() if rule.tunable]
+    tunables = [np.ravel(block.parameter_value(rule.name)) for rule in block.inputs_of_the_run()]
     points = [0.37, *(random.uniform(minimum, minimum + 0.8, equations.numel_in(k)) for k in (1, 2, 3))]
     points.append(np.concatenate([*tunables, []]))
     return [np.asarray(value) for value in equations.call([np.asarray(point) for point in points])]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -54,14 +54,18 @@ TYPES: dict[str, tuple[Callable[[], Joint], type[Block]]] = {
 """Joint types of the robot model, and the blocks that are the same joints."""
 
 
-def started(diagram: Diagram) -> tuple[dict[str, Array], dict[str, Array]]:
-    """The states of a diagram at the start, and their rates, by path."""
+def started(
+    diagram: Diagram, tuned: Mapping[str, Array] | None = None
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """The states of a diagram at the start, and their rates, by path; ``tuned``: other parameters."""
     system = trace_diagram(diagram)
-    return _by_path(system, *_rates(system))
+    p = system.parameter_values.copy()
+    for name, value in (tuned or {}).items():
+        p[system.parameters.ranges[name]] = np.ravel(value)
+    return _by_path(system, *_rates(system, p))
 
 
-def _rates(system: HybridSystem) -> tuple[Array, Array]:
-    p = system.parameter_values
+def _rates(system: HybridSystem, p: Array) -> tuple[Array, Array]:
     (x,), (z,) = system.initial_states(p), system.initial_discrete(p)
     (rates,) = system.derivative(0.0, x, z, (), p)
     return x, rates

@@ -41,6 +41,7 @@ from armblocks.blocks import (
 )
 from armblocks.diagram import DiagramBuilder, trace_diagram, with_parameters
 from armblocks.dynamics.mechanism import mechanism
+from armblocks.face.diagram_run import tuned_parameters
 from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_robot
 from armblocks.robot import Link, Robot
 
@@ -57,11 +58,29 @@ def test_a_random_tree_has_the_accelerations_of_the_same_robot(seed: int, letter
     drawing = Drawing(robot, random)
     for link, letter in zip(links, letters):
         drawing.add(link, TYPES[letter][1], *states[link.name])
-    _, rates = started(drawing.diagram())
+    diagram = drawing.diagram()
+    heavier = replace(
+        robot,
+        links=tuple(
+            replace(link, mass=1.7 * link.mass, inertia=np.add(link.inertia, 0.03 * np.eye(3)))
+            for link in links
+        ),
+    )
+    tuned = tuned_parameters(
+        diagram,
+        with_parameters(
+            diagram,
+            {f"{link.name} body.mass": 1.7 * link.mass for link in links}
+            | {f"{link.name} body.moments": np.diag(link.inertia) + 0.03 for link in links},
+        ),
+    )
+    assert tuned is not None, "masses and moments of inertia are inputs of the compiled system"
     q, qd, tau = (np.concatenate([states[link.name][k] for link in links]) for k in range(3))
-    (expected,) = dynamics.trace_accel(robot)(q, qd, tau)
-    found = drawing.accelerations(rates, {name: state[0] for name, state in states.items()})
-    np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-11 * np.abs(expected).max())
+    for of_values, values in ((robot, {}), (heavier, tuned)):
+        _, rates = started(diagram, values)
+        (expected,) = dynamics.trace_accel(of_values)(q, qd, tau)
+        found = drawing.accelerations(rates, {name: state[0] for name, state in states.items()})
+        np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-11 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("cut", [False, True], ids=["closure", "measured closure"])
@@ -109,14 +128,15 @@ def test_the_sensitivity_of_a_closed_loop_is_the_difference_of_runs() -> None:
     bar = RigidTransform(translation=(0.4, 0.0, 0.0))
     builder.add("bar", bar, B=near["F"], F=end["F"])
     builder.add("load", BodyInertia(mass=1.5), R=near["F"])
-    diagram, name = builder.build(), "hinge.spring_stiffness"
+    diagram, parameters = builder.build(), {"hinge.spring_stiffness": 5.0, "load.mass": 1.5}
     settings = {"stop_time": 0.4, "rtol": 1e-9, "atol": 1e-10}
-    found = ab.sensitivity(diagram, name, "hinge/q", **settings)["hinge/q", name]
-    low, high = (
-        ab.simulate(with_parameters(diagram, {name: value}), **settings)["hinge/q"]
-        for value in (4.999, 5.001)
-    )
-    np.testing.assert_allclose(found[-1], (high - low)[-1] / 0.002, rtol=1e-4)
+    found = ab.sensitivity(diagram, [*parameters], "hinge/q", **settings)
+    for name, value in parameters.items():
+        low, high = (
+            ab.simulate(with_parameters(diagram, {name: value + step}), **settings)["hinge/q"]
+            for step in (-1e-3, 1e-3)
+        )
+        np.testing.assert_allclose(found["hinge/q", name][-1], (high - low)[-1] / 0.002, rtol=1e-4)
 
 
 def test_a_pendulum_with_spring_damper_and_torque_follows_its_equation() -> None:

@@ -73,7 +73,7 @@ def _without(inertia: RigidInertia, part: RigidInertia) -> RigidInertia:
     return RigidInertia(
         mass - part.mass,
         (first[0] - part.first[0], first[1] - part.first[1], first[2] - part.first[2]),
-        NO_INERTIA if second == part.second else Symmetric(*(a - b for a, b in zip(second, part.second))),
+        Symmetric(*(a - b for a, b in zip(second, part.second))),
     )
 
 

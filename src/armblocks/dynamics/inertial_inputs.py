@@ -21,6 +21,7 @@ from armblocks.dynamics.energy import kinetic_energy, potential_energy
 from armblocks.dynamics.forward import forward_dynamics
 from armblocks.dynamics.friction import joint_friction, rotor_torques
 from armblocks.dynamics.joint_motion import entries, joint_motions
+from armblocks.dynamics.loads import with_inertias
 from armblocks.dynamics.mechanism import Array
 from armblocks.dynamics.rnea import rnea
 from armblocks.dynamics.robot_trace import (
@@ -34,7 +35,7 @@ from armblocks.dynamics.springs import spring_energy, spring_torques
 from armblocks.equations import TracedFunction
 from armblocks.equations.signatures import Slot
 from armblocks.robot.robot import Robot
-from armblocks.robot.tree import BASE, KinematicTree
+from armblocks.robot.tree import Frame, KinematicTree
 from armblocks.spatial.inertia import RigidInertia
 from armblocks.spatial.vectors import Symmetric
 
@@ -70,17 +71,12 @@ class _Links:
     def tree(self, parameters: SX, *, whole: bool = False) -> KinematicTree:
         """The tree with ``parameters`` (k, 10); ``whole``: with the links that are fixed to the base."""
         tree = self._whole if whole else self._tree
-        bodies, grounded = list(tree.bodies), tree.grounded
+        added: list[tuple[Frame, RigidInertia]] = []
         for row, index in enumerate(self._indices):
             mass, x, y, z, *second = (parameters[row, k] for k in range(10))
-            frame = tree.links[index]
-            load = RigidInertia.at_centre(mass, Symmetric(*second)).shifted((x, y, z)).moved(frame.pose)
-            if frame.body == BASE:
-                grounded = grounded.plus(load)
-            else:
-                body = bodies[frame.body]
-                bodies[frame.body] = replace(body, inertia=body.inertia.plus(load))
-        return replace(tree, bodies=tuple(bodies), grounded=grounded)
+            inertia = RigidInertia.at_centre(mass, Symmetric(*second)).shifted((x, y, z))
+            added.append((tree.links[index], inertia))
+        return with_inertias(tree, added)
 
     def torques(self, name: str, inputs: Sequence[str], near: Array | None) -> TracedFunction:
         """The torques of a motion; missing inputs of ``q``, ``qd``, ``qdd`` are zero, without friction."""

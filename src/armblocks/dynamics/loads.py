@@ -1,7 +1,8 @@
-"""Loads whose values are known only at run time: a wrench at the tip and a payload on the tool."""
+"""Loads and bodies whose values are known only at run time: a wrench at the tip, a payload on the tool."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 from casadi import SX
@@ -10,7 +11,7 @@ from armblocks.dynamics.joint_motion import entries
 from armblocks.dynamics.rnea import Wrench
 from armblocks.equations import Slot
 from armblocks.robot.robot import Robot
-from armblocks.robot.tree import BASE, KinematicTree
+from armblocks.robot.tree import BASE, Frame, KinematicTree
 from armblocks.spatial.inertia import RigidInertia
 from armblocks.spatial.vectors import Symmetric, Vector, add, cross, rotate
 
@@ -26,11 +27,20 @@ def with_payload(tree: KinematicTree, payload: SX) -> KinematicTree:
     if tool.body == BASE:
         return tree
     mass, x, y, z, *second = entries(payload)
-    load = RigidInertia.at_centre(mass, Symmetric(*second)).shifted((x, y, z)).moved(tool.pose)
-    bodies = list(tree.bodies)
-    carrier = bodies[tool.body]
-    bodies[tool.body] = replace(carrier, inertia=carrier.inertia.plus(load))
-    return replace(tree, bodies=tuple(bodies))
+    return with_inertias(tree, [(tool, RigidInertia.at_centre(mass, Symmetric(*second)).shifted((x, y, z)))])
+
+
+def with_inertias(tree: KinematicTree, added: Iterable[tuple[Frame, RigidInertia]]) -> KinematicTree:
+    """The tree with more bodies that are fixed to frames; their inertias are in the axes of these frames."""
+    bodies, grounded = list(tree.bodies), tree.grounded
+    for frame, inertia in added:
+        load = inertia.moved(frame.pose)
+        if frame.body == BASE:
+            grounded = grounded.plus(load)
+        else:
+            carrier = bodies[frame.body]
+            bodies[frame.body] = replace(carrier, inertia=carrier.inertia.plus(load))
+    return replace(tree, bodies=tuple(bodies), grounded=grounded)
 
 
 def tip_loads(robot: Robot, wrench: SX, payload: SX) -> tuple[Wrench, RigidInertia]:

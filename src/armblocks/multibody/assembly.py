@@ -60,14 +60,24 @@ class PlacedElement:
 
 
 @dataclass(frozen=True, kw_only=True)
+class PlacedBody:
+    """A body that moves, with its frame R on a link. ``fraction`` of a cut body is on each of its links."""
+
+    path: str
+    at: Attachment
+    fraction: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class DrawnMechanism:
     """A network of bodies and joints as a robot.
 
-    ``closed``: the paths of the joints that are closures, without coordinates. ``animated``: whether the run
-    records the poses of the bodies.
+    ``robot``: its masses are those of ``bodies`` at the start of a run. ``closed``: the paths of the joints
+    that are closures, without coordinates. ``animated``: whether the run records the poses of the bodies.
     """
 
     robot: Robot
+    bodies: tuple[PlacedBody, ...]
     joints: tuple[PlacedJoint, ...]
     elements: tuple[PlacedElement, ...]
     closed: tuple[str, ...]
@@ -146,6 +156,7 @@ class _Assembly:
         robot = self._robot(links, (*closures, *welds))
         return DrawnMechanism(
             robot=robot,
+            bodies=tuple(body for edge in (*tree, *self.cuts) for body in self._placed_bodies(edge)),
             joints=tuple(self._placed(robot, (*tree, *self.cuts))),
             elements=elements,
             closed=tuple(edge.path for edge in chords if edge not in self.cuts),
@@ -235,13 +246,12 @@ class _Assembly:
     def _link(self, edge: _Edge) -> Link:
         at, group = self.attachment(edge.near), self._group(edge.far)
         motions = reversed_motions(edge.part.motions) if edge.reversed else edge.part.motions
-        split = sum(self._group(cut.far) == group for cut in self.cuts) + 1
         mass, centre, inertia = _summed(
             [
                 _inertia_of(part).moved(self._pose_in_link(path, edge.far))
                 for path, part in self._bodies(group)
             ],
-            1.0 / split,
+            self._fraction(group),
         )
         is_cut = edge in self.cuts
         return Link(
@@ -254,6 +264,17 @@ class _Assembly:
             inertia=inertia,
             geometry=() if is_cut else self._shapes(group, edge.far),
         )
+
+    def _fraction(self, group: int) -> float:
+        """The fraction of the bodies of a group on each of its links."""
+        return 1.0 / (sum(self._group(cut.far) == group for cut in self.cuts) + 1)
+
+    def _placed_bodies(self, edge: _Edge) -> Iterator[PlacedBody]:
+        """The bodies on the link of a joint."""
+        group = self._group(edge.far)
+        for path, _ in self._bodies(group):
+            at = Attachment(link=edge.path, pose=self._pose_in_link(path, edge.far))
+            yield PlacedBody(path=path, at=at, fraction=self._fraction(group))
 
     def _world_link(self) -> list[Link]:
         """A link with the shapes of the bodies that do not move; none without such bodies."""

@@ -3,8 +3,8 @@
 Input: the blocks of the family ``mechanics``, and the frame lines between them, of all levels.
 
 Result: for each network of connected frames, a block with its equations of motion in the place of its World
-Frame; each joint and each force element is a block with states or loads under its own path. Signals, states
-and parameters thus have the paths of the drawn blocks.
+Frame; each joint, each body and each force element is a block with states, an inertia or loads under its own
+path. Signals, states and parameters thus have the paths of the drawn blocks.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from armblocks.dynamics.base_parameters import regrouped
 from armblocks.dynamics.forward import check_accelerations_exist
 from armblocks.errors import DiagramError, RobotError
 from armblocks.multibody.assembly import DrawnMechanism, drawn_mechanism, world_block
+from armblocks.multibody.body_inertias import BodyInertias
 from armblocks.multibody.element_states import ElementLoads
 from armblocks.multibody.frames import frames_of_parts, networks
 from armblocks.multibody.joint_states import JointStates
@@ -71,6 +72,9 @@ class _Gathered:
         self.blocks[world] = plant
         for joint in drawn.joints:
             self._add_joint(world, drawn, joint.path, start)
+        for path in dict.fromkeys(body.path for body in drawn.bodies):
+            self.blocks[path] = BodyInertias(body=self.net.blocks[path])
+            self._drive(world, path, "inertia", "inertia")
         for element in drawn.elements:
             path = element.path
             self.blocks[path] = ElementLoads(element=self.net.blocks[path], place=element.part)

@@ -1,13 +1,14 @@
 """The equations of motion of a drawn mechanism in a flat diagram.
 
 The joints have the states; the mechanism computes their accelerations from the states and the generalised
-forces of all joints and from the loads of the force elements. All ports are internal.
+forces of all joints, from the inertias of the bodies and from the loads of the force elements. All ports are
+internal.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import ClassVar
 
@@ -15,13 +16,15 @@ import numpy as np
 from casadi import SX, mtimes, vertcat
 
 from armblocks.diagram import Block, ParameterKind, Port, Signals, View, ViewKind, parameter
+from armblocks.diagram.parameter import Value
 from armblocks.dynamics.ball_joints import normalised, position_rates, rotation_of
 from armblocks.dynamics.drawn_motion import DrawnMotion, Load
 from armblocks.dynamics.frame_motions import FramesOfTree
 from armblocks.dynamics.joint_motion import entries
 from armblocks.multibody.assembly import DrawnMechanism, PlacedElement, PlacedJoint
+from armblocks.multibody.body_inertias import INERTIA_SIZE
 from armblocks.multibody.parts import JointPart
-from armblocks.robot import Robot
+from armblocks.robot import Attachment, Robot
 from armblocks.robot.joints import AxisMotion, Motion
 from armblocks.robot.tree import BASE, Frame
 from armblocks.spatial import Transform
@@ -49,6 +52,23 @@ class Mechanism(Block):
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot of the mechanism")
     near: tuple[float, ...] = parameter((), kind=ParameterKind.DIAGRAM, doc="assembled coordinates (nq,)")
 
+    # -- the masses of the robot are not in the equations
+
+    def parameter_value(self, name: str) -> Value:
+        if name == "robot":
+            return _without_masses(self.robot)
+        if name == "mechanism":
+            return replace(self.mechanism, robot=_without_masses(self.robot))
+        return super().parameter_value(name)
+
+    def _motion(self) -> DrawnMotion:
+        """The equations of the mechanism."""
+        bodies = tuple(body.at for body in self.mechanism.bodies)
+        return drawn_motion(_without_masses(self.robot), self.near, bodies)
+
+    def _inertias(self, u: Signals) -> list[SX]:
+        return [body.fraction * u[port_of(body.path, "inertia")] for body in self.mechanism.bodies]
+
     # -- ports
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -62,7 +82,9 @@ class Mechanism(Block):
             )
         ]
         loads = [element for element in self.mechanism.elements if element.part.exerts]
-        return (*ports, *(_port(element.path, "loads", 6 * len(element.frames)) for element in loads))
+        ports += [_port(element.path, "loads", 6 * len(element.frames)) for element in loads]
+        bodies = dict.fromkeys(body.path for body in self.mechanism.bodies)
+        return (*ports, *(_port(path, "inertia", INERTIA_SIZE) for path in bodies))
 
     def output_ports(self) -> tuple[Port, ...]:
         ports: list[Port] = []
@@ -110,14 +132,15 @@ class Mechanism(Block):
     # -- equations
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        equations, robot = drawn_motion(self.robot, self.near), self.robot
+        equations, robot = self._motion(), self.robot
         q, qd = self._state(u)
-        consistent_q, consistent_qd = self._consistent(q, qd)
+        consistent_q, consistent_qd = self._consistent(q, qd, u)
         frames = equations.frames(consistent_q, consistent_qd)
         tau = SX.zeros(robot.nv)
         for joint in self.mechanism.joints:
             tau[_speeds(joint)] = _tree_forces(joint, q, u[port_of(joint.path, "force")])
-        qdd = equations.accelerations(consistent_q, consistent_qd, tau, list(self._loads(u)))
+        loads, inertias = list(self._loads(u)), self._inertias(u)
+        qdd = equations.accelerations(consistent_q, consistent_qd, tau, loads, inertias)
         if robot.closures:
             _, q_rates, qd_rates = equations.rates(q, qd, (consistent_q, consistent_qd), qdd)
         else:
@@ -144,8 +167,8 @@ class Mechanism(Block):
     def records(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         if not self.mechanism.animated:
             return {}
-        equations = drawn_motion(self.robot, self.near)
-        q, qd = self._consistent(*self._state(u))
+        equations = self._motion()
+        q, qd = self._consistent(*self._state(u), u)
         frames = equations.frames(q, qd)
         places = [Frame(body=BASE, pose=Transform()), *equations.tree.links, equations.tree.tool]
         return {"poses": SX(vertcat(*(frames.pose(place).matrix() for place in places)))}
@@ -159,9 +182,9 @@ class Mechanism(Block):
             qd[_speeds(joint)] = _tree_speeds(joint, coordinates, u[port_of(joint.path, "state qd")])
         return q, qd
 
-    def _consistent(self, q: SX, qd: SX) -> tuple[SX, SX]:
+    def _consistent(self, q: SX, qd: SX, u: Signals) -> tuple[SX, SX]:
         if self.robot.closures:
-            return drawn_motion(self.robot, self.near).state(q, qd)
+            return self._motion().state(q, qd, self._inertias(u))
         is_unit = self.robot.nq == self.robot.nv
         return (q if is_unit else SX(vertcat(*normalised(self.robot, entries(q))))), qd
 
@@ -175,7 +198,7 @@ class Mechanism(Block):
                 yield Load(at, (fx, fy, fz), (nx, ny, nz))
 
     def _kinematics(self, frames: FramesOfTree, element: PlacedElement) -> SX:
-        tree, parts = drawn_motion(self.robot, self.near).tree, list[SX]()
+        tree, parts = self._motion().tree, list[SX]()
         for _, at in element.frames:
             frame = tree.attached(at.link, at.pose)
             pose = frames.pose(frame)
@@ -184,15 +207,22 @@ class Mechanism(Block):
         return SX(vertcat(*parts))
 
     def _frame_accelerations(self, frames: FramesOfTree, element: PlacedElement) -> SX:
-        tree = drawn_motion(self.robot, self.near).tree
+        tree = self._motion().tree
         places = [tree.attached(at.link, at.pose) for _, at in element.frames]
         return SX(vertcat(*(vertcat(*part) for frame in places for part in frames.acceleration(frame))))
 
 
 @lru_cache(maxsize=32)
-def drawn_motion(robot: Robot, near: tuple[float, ...]) -> DrawnMotion:
-    """The equations of a robot, cached for the last 32 robots."""
-    return DrawnMotion(robot, np.array(near))
+def drawn_motion(robot: Robot, near: tuple[float, ...], bodies: tuple[Attachment, ...]) -> DrawnMotion:
+    """The equations of a robot with bodies, cached for the last 32 robots."""
+    return DrawnMotion(robot, np.array(near), bodies)
+
+
+@lru_cache(maxsize=32)
+def _without_masses(robot: Robot) -> Robot:
+    """The robot with massless links; the equations add the bodies, whose inertias are values of the run."""
+    massless = {"mass": 0.0, "centre_of_mass": (0.0,) * 3, "inertia": ((0.0,) * 3,) * 3}
+    return replace(robot, links=tuple(replace(link, **massless) for link in robot.links))
 
 
 def _port(path: str, quantity: str, size: int) -> Port:

@@ -16,6 +16,7 @@ from armblocks.robot import Closure
 from armblocks.robot.joints import Motion
 from armblocks.robot.shapes import Shape
 from armblocks.spatial import Matrix3, Transform, Vector3
+from armblocks.spatial.inertia import RigidInertia
 from armblocks.spatial.vectors import Vector
 
 BASE, FOLLOWER = "B", "F"
@@ -59,6 +60,8 @@ class BodyPart:
     """A rigid body at the frame port ``R``, in its axes.
 
     ``mass`` kg, ``centre`` of mass m, ``inertia`` about the centre of mass kg m2, ``shapes`` for drawings.
+    The numbers are those of the start of a run; the equations read the inertia from the block
+    (:class:`InertiaLaw`).
     """
 
     mass: float
@@ -123,6 +126,14 @@ class FrameMotion:
     angular_velocity: Vector
     acceleration: Vector
     angular_acceleration: Vector
+
+
+class InertiaLaw(Protocol):
+    """A block that is a body, whose inertia depends on tunable parameters."""
+
+    def inertia(self, p: Signals) -> RigidInertia:
+        """The inertia in the frame R of the block, for the values ``p`` of its tunable parameters."""
+        ...
 
 
 class ForceLaw(Protocol):

@@ -10,10 +10,12 @@ from numpy.typing import ArrayLike
 
 from armblocks.blocks.mechanics.examples import gravity_block, pendulum_example
 from armblocks.blocks.mechanics.mechanics_block import MechanicsBlock
-from armblocks.diagram import FramePort, WorkedExample, parameter, shape_of
+from armblocks.diagram import FramePort, Signals, WorkedExample, parameter, shape_of
 from armblocks.diagram.signs import FaceSign, Words
 from armblocks.errors import InputError
 from armblocks.multibody.parts import REFERENCE, BodyPart
+from armblocks.spatial.inertia import RigidInertia
+from armblocks.spatial.vectors import Symmetric
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +36,7 @@ class BodyInertia(MechanicsBlock):
         moments=(0.1, 0.02, 0.1),
     )
 
-    mass: float = parameter(1.0, above=0.0, tunable=False, doc="mass", unit="kg")
+    mass: float = parameter(1.0, above=0.0, doc="mass", unit="kg")
     centre_of_mass: ArrayLike = parameter(
         (0.0, 0.0, 0.0), dimensions=(1,), tunable=False, doc="centre of mass in R, x y z", unit="m"
     )
@@ -42,7 +44,6 @@ class BodyInertia(MechanicsBlock):
         (0.0, 0.0, 0.0),
         dimensions=(1,),
         minimum=0.0,
-        tunable=False,
         doc="moments of inertia xx yy zz about the centre of mass; 0 0 0 is a point mass",
         unit="kg m2",
     )
@@ -79,3 +80,10 @@ class BodyInertia(MechanicsBlock):
         x, y, z = np.asarray(self.centre_of_mass, dtype=float).tolist()
         inertia = ((xx, xy, zx), (xy, yy, yz), (zx, yz, zz))
         return BodyPart(mass=self.mass, centre=(x, y, z), inertia=inertia)
+
+    def inertia(self, p: Signals) -> RigidInertia:
+        """The inertia in frame R for the mass and the moments of the run."""
+        part, moments = self.part(), p["moments"]
+        yz, zx, xy = np.asarray(self.products, dtype=float).tolist()
+        second = Symmetric(moments[0], moments[1], moments[2], xy, yz, zx)
+        return RigidInertia.at_centre(p["mass"], second).shifted(part.centre)

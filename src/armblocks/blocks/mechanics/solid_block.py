@@ -7,11 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from armblocks.diagram import Block, FramePort, parameter
+from armblocks.diagram import Block, FramePort, Parameter, Signals, parameter
 from armblocks.multibody.gathering import gather_mechanisms
 from armblocks.multibody.parts import REFERENCE, BodyPart
 from armblocks.robot.shapes import Material, Shape
 from armblocks.spatial import Vector3
+from armblocks.spatial.inertia import RigidInertia
+from armblocks.spatial.vectors import Symmetric
 
 COLOURS = {
     "paint": Material.PAINT,
@@ -36,12 +38,16 @@ class SolidBlock(Block):
     mass_from: str = parameter(
         "density", choices=("density", "mass"), doc="whether density or mass determines the inertia"
     )
-    density: float = parameter(1000.0, above=0.0, tunable=False, doc="density", unit="kg/m3")
-    mass: float = parameter(1.0, above=0.0, tunable=False, doc="mass", unit="kg")
+    density: float = parameter(1000.0, above=0.0, doc="density", unit="kg/m3")
+    mass: float = parameter(1.0, above=0.0, doc="mass", unit="kg")
     appearance: str = parameter("paint", choices=tuple(COLOURS), doc="surface in drawings")
 
     def frame_ports(self) -> tuple[FramePort, ...]:
         return (FramePort(REFERENCE, "frame of the solid, at its centre"),)
+
+    def inputs_of_the_run(self) -> tuple[Parameter, ...]:
+        """Density or mass, whichever determines the inertia."""
+        return tuple(rule for rule in super().inputs_of_the_run() if rule.name == self.mass_from)
 
     @property
     def material(self) -> Material:
@@ -65,3 +71,11 @@ class SolidBlock(Block):
         xx, yy, zz = (mass * moment for moment in self.unit_inertia())
         inertia = ((xx, 0.0, 0.0), (0.0, yy, 0.0), (0.0, 0.0, zz))
         return BodyPart(mass=mass, inertia=inertia, shapes=(self.shape(),))
+
+    def inertia(self, p: Signals) -> RigidInertia:
+        """The inertia in frame R for the density or mass of the run."""
+        part = self.part()
+        mass = p["density"] * self.volume() if self.mass_from == "density" else p["mass"]
+        (xx, xy, xz), (_, yy, yz), (_, _, zz) = part.inertia
+        second = Symmetric(*(mass * (entry / part.mass) for entry in (xx, yy, zz, xy, yz, xz)))
+        return RigidInertia.at_centre(mass, second).shifted(part.centre)
