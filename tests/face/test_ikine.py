@@ -225,6 +225,7 @@ def test_results_are_pickled_and_described() -> None:
         (lambda T: np.where(np.eye(4) > 2, T, T) + np.diag([0, 0, 0, 1]), "the last row of the target is"),
         (lambda T: T @ np.diag([1, 1, -1, 1]), "is not a rotation but a reflection"),
         (lambda T: T + 1e-5 * np.eye(4, k=1) * [[1], [1], [0], [0]], "is not orthonormal: R'R differs from"),
+        (lambda T: T + 1e160 * np.eye(4, k=3), "the target is 1e\\+160 m away.*up to 1e\\+100 m"),
         (lambda T: T[:3], r"the target poses have the shape \(3, 4\)"),
         (lambda T: "here", "a target pose is not an array of real numbers but str"),
         (lambda T: [[1, 2], [3]], "a target pose is not an array of real numbers but list"),

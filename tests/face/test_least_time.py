@@ -149,6 +149,8 @@ def test_motions_that_cannot_be_found_are_refused() -> None:
         ab.least_time(arm, [[0, 0], [1, 1]])
     with pytest.raises(InputError, match="the points 1 and 2 are the same"):
         ab.least_time(arm, [points[0], points[0]], torque=100.0)
+    with pytest.raises(InputError, match="the points 1 and 2 are the same"):
+        ab.least_time(arm, [[0.0] * 6, [1e-15] * 6], torque=100.0, speed=1.0)
     with pytest.raises(InputError, match=r"blend = 0.7.*up to 0.5"):
         ab.least_time(arm, [*points, points[0]], torque=100.0, blend=0.7)
     with pytest.raises(InputError, match=r"grid = 3.*an integer of 10 or more"):

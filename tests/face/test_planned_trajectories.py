@@ -148,6 +148,12 @@ def test_units_of_headers_are_converted(tmp_path: Path) -> None:
         ab.load_trajectory(tmp_path / "units.csv")
 
 
+def test_a_joint_with_the_smallest_motion_does_not_determine_the_duration() -> None:
+    motion = ab.point_to_point([0, 0], [5e-324, 1.0], speed=1, acceleration=1)
+    assert motion.duration == 2.0
+    assert ab.point_to_point([0], [5e-324], speed=1, acceleration=1).duration == 0.0
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -161,6 +167,8 @@ def test_units_of_headers_are_converted(tmp_path: Path) -> None:
             lambda: ab.point_to_point(0, 1, speed=1, acceleration=1, duration=1.5),
             "the duration is 1.5 s.*2 s or more",
         ),
+        (lambda: ab.point_to_point(1, 1, speed=1, acceleration=1, duration=-1), "duration = -1"),
+        (lambda: ab.spline_trajectory([[0]], [0]), r"points has the shape \(1, 1\)\. Allowed"),
         (lambda: ab.spline_trajectory([[0], [1]], [1, 1]), "times has the shape.*2 ascending times"),
         (lambda: ab.spline_trajectory([[0], [1]]), "times is None.*a speed limit and rest"),
         (lambda: ab.spline_trajectory([[0], [0]], speed=1.0), "points 1 and 2 are the same"),

@@ -15,6 +15,7 @@ from armblocks.face.ikine_result import IkineResult
 from armblocks.face.ikine_search import ArmSearch, Options
 from armblocks.face.ikine_targets import (
     Target,
+    check_distances,
     is_plain,
     mask_array,
     raise_invalid_target,
@@ -78,6 +79,7 @@ class IkineCall:
         starts = None if q0 is None else start_array(q0, search.robot.nq, count, search.where)
         workers = check_threads(search.where, threads)
         targets = targets.reshape(-1, 16)
+        check_distances(targets, batch, search.where)
         found = search.run(targets, starts, self._prepared, workers)
         for k in np.flatnonzero(found.counts[:, Count.STATUS] == Status.INVALID_TARGET)[:1]:
             raise_invalid_target(targets[k].reshape(4, 4), int(k) if batch else None, search.where)

@@ -16,7 +16,7 @@ from armblocks.dynamics.pose_error import ErrorAxes, trace_pose_error
 from armblocks.face.ikine_coordinates import dependent_excess, periodic_coordinates, random_coordinates
 from armblocks.face.ikine_result import IkineResult
 from armblocks.face.ikine_search import Options
-from armblocks.face.ikine_targets import Target, checked_poses, start_array
+from armblocks.face.ikine_targets import Target, check_distances, checked_poses, start_array
 from armblocks.robot import Robot
 
 Array = NDArray[np.float64]
@@ -77,6 +77,7 @@ class ClosedLoopCall:
     def __call__(self, T: Target, q0: ArrayLike | None, threads: int) -> IkineResult:
         """Search for configurations at the targets, see :meth:`armblocks.Arm.ikine`."""
         targets, batch = checked_poses(T, self._where)
+        check_distances(targets.reshape(-1, 16), batch, self._where)
         check_threads(self._where, threads)
         count = targets.shape[0]
         given = None if q0 is None else start_array(q0, self._robot.nq, count if batch else None, self._where)

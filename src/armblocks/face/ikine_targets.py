@@ -18,6 +18,8 @@ Target = Transform | ArrayLike | Sequence[Transform]
 
 ROUNDING = 1e-12
 """Deviation of ``R' R`` from the identity above which the nearest rotation replaces ``R``."""
+FARTHEST = 1e100
+"""Greatest coordinate (m) of a target: the squares of greater numbers may overflow."""
 _ALLOWED = "a Transform, shape (4, 4), or (N, 4, 4) or a list of Transforms for N poses"
 
 
@@ -63,6 +65,20 @@ def target_array(T: Target, where: str) -> tuple[Array, bool]:
         )
     plain = np.ascontiguousarray(array, dtype=np.float64)
     return plain if plain.flags.aligned else plain.copy(), array.ndim == 3
+
+
+def check_distances(targets: Array, batch: bool, where: str) -> None:
+    """Raise InputError for targets (N, 16) whose squared distances are not finite numbers."""
+    distances = np.abs(targets[:, 3::4])
+    far = np.flatnonzero(((distances > FARTHEST) & np.isfinite(distances)).any(axis=1))
+    if far.size:
+        name = f"target {far[0]}" if batch else "the target"
+        raise InputError(
+            f"{name} is {float(distances[far[0]].max()):.3g} m away",
+            where=where,
+            allowed=f"positions up to {FARTHEST:g} m",
+            fix="check the unit of the position",
+        )
 
 
 def is_plain(T: object) -> TypeGuard[Array]:

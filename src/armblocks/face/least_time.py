@@ -26,6 +26,9 @@ _FASTEST = 1e12
 """Squared path speed where no joint speed is limited."""
 _ROUNDING = 1e-12
 """Torques that are smaller, relative to their terms, are rounding errors."""
+_SAME = 4e-15
+"""Points are the same up to this distance, relative to coordinates above 1: the path between them would be
+shorter than its rounding errors."""
 _QUARTERS = np.array([0.25, 0.75])
 _SMALL, _ACCEPTED = 8e-4, 2e-2
 """Excess over a limit between grid points, relative to the limit: above the first number the limits are
@@ -190,7 +193,8 @@ def _between(
 
 def path_through(points: Array, limits: MotionLimits, blend: float | None) -> PiecewisePolynomial:
     """The path through the points; joints are scaled by their speed limits, or by their ranges of motion."""
-    same = np.flatnonzero((np.diff(points, axis=0) == 0.0).all(axis=1))
+    rounding = _SAME * np.maximum(np.abs(points[:-1]), 1.0)
+    same = np.flatnonzero((np.abs(np.diff(points, axis=0)) <= rounding).all(axis=1))
     if same.size:
         raise InputError(
             f"the points {same[0] + 1} and {same[0] + 2} are the same",

@@ -21,6 +21,9 @@ from armblocks.trajectories.splines import cubic_spline, quintic_spline
 
 Array = NDArray[np.float64]
 
+_NO_DISTANCE = 1e-100
+"""Joint motions that are smaller (rad or m) are omitted, because limits divided by them may overflow."""
+
 
 def point_to_point(
     q0: ArrayLike,
@@ -46,7 +49,7 @@ def point_to_point(
     where = "point_to_point"
     start, goal = ends_of(q0, qf, where)
     n, change = len(start), goal - start
-    moves = change != 0.0
+    moves = np.abs(change) > _NO_DISTANCE
     step = positive("dt", dt, "s", where)
     given = {"speed": speed, "acceleration": acceleration}
     given["deceleration"] = acceleration if deceleration is None else deceleration
@@ -60,7 +63,8 @@ def point_to_point(
             fix="omit one of them",
         )
     if not moves.any():
-        return sampled(at_rest(start, 0.0 if duration is None else duration), step)
+        rest = 0.0 if duration is None or duration == 0 else positive("duration", duration, "s", where)
+        return sampled(at_rest(start, rest), step)
     v, a, d, *j = (float(np.min(limit[moves] / np.abs(change[moves]))) for limit in limits.values())
     profile = double_s(v, a, j[0]) if j else trapezoid(v, a, d)
     if duration is not None:

@@ -173,9 +173,11 @@ def mstraj(
             allowed="exactly one of them: the greatest speeds, or the durations of the segments",
             fix="give None for the other argument",
         )
-    blends = np.broadcast_to(np.asarray(tacc, dtype=np.float64), (len(via),)) if np.ndim(tacc) == 0 else tacc
-    blends = np.asarray(blends, dtype=np.float64)
-    durations = None if tsegment is None else joint_limits("tsegment", tsegment, len(via), "mstraj")
+    blends = as_array(tacc)
+    blends = np.broadcast_to(blends, (len(via),)) if blends.ndim == 0 else blends
+    durations = (
+        None if tsegment is None else joint_limits("tsegment", tsegment, len(via), "mstraj", of="segment")
+    )
     fits = blends.shape == (len(via),) and np.isfinite(blends).all() and (blends >= 0.0).all()
     if not fits or (durations is not None and (blends > durations * (1.0 + 1e-9)).any()):
         raise InputError(
@@ -206,6 +208,7 @@ def ctraj(T0: ArrayLike | Transform, T1: ArrayLike | Transform, s: ArrayLike | i
     """
     first, last = pose_of("T0", T0, "ctraj"), pose_of("T1", T1, "ctraj")
     if sample_count(s) is not None:
+        sample_times(s, "ctraj", step=1.0)
         fractions = lspb(0.0, 1.0, s).q[:, 0]
     else:
         fractions = joint_vector("s", s, "ctraj")

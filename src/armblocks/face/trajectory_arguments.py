@@ -57,7 +57,9 @@ def end_speed(name: str, value: ArrayLike | None, start: Array, where: str, of: 
     return speed
 
 
-def joint_limits(name: str, value: ArrayLike, n: int, where: str, *, infinite: bool = False) -> Array:
+def joint_limits(
+    name: str, value: ArrayLike, n: int, where: str, *, infinite: bool = False, of: str = "joint"
+) -> Array:
     """Limits (n,) above 0; one number is valid for all joints. ``infinite``: a joint may have no limit."""
     limits = as_array(value)
     is_finite = np.isfinite(limits) | (infinite & (limits == np.inf))
@@ -65,7 +67,7 @@ def joint_limits(name: str, value: ArrayLike, n: int, where: str, *, infinite: b
         raise InputError(
             f"{name} = {value!r}",
             where=where,
-            allowed=f"a number above 0, or {counted(n, 'such number')}, one per joint",
+            allowed=f"a number above 0, or {counted(n, 'such number')}, one per {of}",
             fix=f"give {name} as a positive limit",
         )
     return np.broadcast_to(limits, (n,)).copy()
@@ -87,9 +89,10 @@ def positive(name: str, value: float, unit: str, where: str) -> float:
 def via_points(name: str, value: ArrayLike, where: str, least: int = 2) -> Array:
     """Points (K, n), finite. Warns of angles that look like degrees."""
     points = as_array(value)
-    if points.ndim != 2 or len(points) < least or not points.shape[1] or not np.isfinite(points).all():
+    finite = bool(np.isfinite(points).all())
+    if points.ndim != 2 or len(points) < least or not points.shape[1] or not finite:
         raise InputError(
-            f"{name} has the shape {points.shape}" + (" with NaN or infinity" if points.size else ""),
+            f"{name} has the shape {points.shape}" + ("" if finite else " with NaN or infinity"),
             where=where,
             allowed=f"finite numbers in {least} or more rows, one row of joint values per point",
             fix=f"give {name} as a list of points, each with one number for each joint",
