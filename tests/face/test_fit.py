@@ -12,13 +12,17 @@ from numpy.testing import assert_allclose
 
 import armblocks as ab
 from armblocks.blocks import (
+    Constant,
     Expression,
     FromFile,
     Gain,
+    Inport,
     Integrator,
+    Outport,
     Saturation,
     SineWave,
     Step,
+    Subsystem,
     Sum,
     TransportDelay,
 )
@@ -52,6 +56,29 @@ def closed_form_covariance(t: np.ndarray, noise: float) -> np.ndarray:
     e = np.exp(-2.0 * t)
     J = np.column_stack([1.0 - e, -t * (0.5 - 3.0) * e, e])
     return noise**2 * np.linalg.inv(J.T @ J)
+
+
+def test_mask_parameters_in_one_formula_are_fitted_together() -> None:
+    """Exact data of ``a b``, ``a + b^2`` and, in a subsystem with ``x = 2 a``, ``x y``, for 2, 3 and 4."""
+    inner = ab.DiagramBuilder("servo")
+    inner.parameter("x", 1.0)
+    inner.parameter("y", 1.0)
+    product = inner.add("product", Gain(gain=ab.formula("x*y")), inner.add("in", Inport()))
+    inner.add("out", Outport(), product)
+    builder = ab.DiagramBuilder("products")
+    builder.parameter("a", 1.0)
+    builder.parameter("b", 1.0)
+    one = builder.add("one", Constant(value=1.0))
+    for name, text in (("g", "a*b"), ("h", "a + b^2")):
+        builder.add(name, Gain(gain=ab.formula(text)), one)
+    builder.add("servo", Subsystem(diagram=inner.build()).with_parameters(x=ab.formula("2*a")), one)
+    t = np.linspace(0.0, 1.0, 5)
+    data = {"t": t} | {"g/y": np.full(5, 6.0), "h/y": np.full(5, 11.0), "servo/out": np.full(5, 16.0)}
+    result = ab.fit(builder.build(), ["a", "b", "servo.y"], data)
+    assert_allclose(result.values, [2.0, 3.0, 4.0], rtol=1e-6)
+    run = ab.simulate(result.diagram, stop_time=1.0)
+    for name in ("g/y", "h/y", "servo/out"):
+        assert_allclose(run[name][-1], data[name][-1], rtol=1e-6)
 
 
 def test_a_step_response_gives_gain_rate_and_start_with_their_covariance() -> None:

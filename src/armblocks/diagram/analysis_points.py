@@ -96,10 +96,10 @@ def with_analysis_points(
 
     An input or opening is an output port ``block/port`` (all its connections), an input port (its
     connection), or a block with a single output. An input may also be a tunable parameter,
-    ``block.parameter``, or a mask parameter, for which :func:`~armblocks.diagram.mask_tuning.added_parameter`
-    adds the equations. Where a signal is an input and an opening, the perturbation is inserted after the
-    opening. Raises ``UnknownNameError`` for unknown names and ``InputError`` for duplicate or unsuitable
-    names.
+    ``block.parameter``, or a mask parameter, for which
+    :func:`~armblocks.diagram.mask_tuning.with_mask_parameters` adds the equations. Where a signal is an input
+    and an opening, the perturbation is inserted after the opening. Raises ``UnknownNameError`` for unknown
+    names and ``InputError`` for duplicate or unsuitable names.
     """
     form = flatten_hierarchy(diagram)
     hierarchy, diagram = diagram, form.diagram

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from casadi import SX, evalf
+from casadi import SX, evalf, vertcat
 
 from armblocks.diagram.block import Block
 from armblocks.diagram.comments import active_levels
@@ -16,7 +16,7 @@ from armblocks.diagram.mask import as_symbols, formula_symbols, parameters_read
 from armblocks.diagram.parameter import Parameter, Value, shape_of
 from armblocks.diagram.structure import DiagramBlock
 from armblocks.equations import HybridSystem, Slot, substituted, unflatten
-from armblocks.equations.added_parameters import AddedParameter, with_added_parameters
+from armblocks.equations.added_parameters import AddedParameters, with_added_parameters
 from armblocks.errors import InputError, UnknownNameError
 
 
@@ -49,60 +49,68 @@ def dependent_parameters(diagram: Diagram, path: str, symbol: SX | None = None) 
 
     Raises ``UnknownNameError`` for a path that is not a mask parameter.
     """
-    parameters = mask_parameters(diagram)
-    if path not in parameters:
-        raise UnknownNameError("mask parameter", path, parameters, where=f"diagram '{diagram.name}'")
-    level, rule = parameters[path]
-    dependents = DependentParameters()
+    level, rule = _mask_parameter(diagram, path)
     value = as_symbols(level.mask_values[rule.name])
-    perturbed = (
-        symbol if symbol is not None else SX.sym(rule.name, *((1, 1) if value is None else value.shape))
-    )
-    _add_dependents(path.rpartition(".")[0], level, {rule.name: perturbed}, dependents)
-    return dependents
+    if symbol is None:
+        symbol = SX.sym(rule.name, *((1, 1) if value is None else value.shape))
+    return _dependents(diagram, {path: symbol})
 
 
-def added_parameter(diagram: Diagram, path: str) -> AddedParameter:
-    """A mask parameter as a parameter of the equations: its change, and the changes of dependent parameters.
+def added_parameters(diagram: Diagram, paths: Sequence[str]) -> AddedParameters:
+    """Mask parameters as parameters of the equations: their changes, and those of dependent parameters.
 
     Raises ``UnknownNameError`` for a path that is not a mask parameter, ``InputError`` for a parameter that
     is not a number or on which a structural parameter depends.
     """
+    slots: list[Slot] = []
+    perturbed: dict[str, SX] = {}
+    changes: list[SX] = []
+    for path in paths:
+        level, rule = _mask_parameter(diagram, path)
+        value = level.mask_values[rule.name]
+        nominal = as_symbols(value)
+        if nominal is None or isinstance(value, bool):
+            raise InputError(
+                f"the mask parameter '{path}' is {type(value).__name__}, which has no derivative",
+                where=f"diagram '{diagram.name}'",
+                allowed="numbers and arrays",
+                fix="choose another parameter",
+            )
+        structural = dependent_parameters(diagram, path).structural
+        if structural:
+            raise InputError(
+                f"'{structural[0]}', which is not tunable, depends on '{path}'",
+                where=f"diagram '{diagram.name}'",
+                allowed="parameters on which only tunable parameters depend",
+                fix="use the difference of two runs for this parameter",
+            )
+        slots.append(Slot(path, shape_of(value), rule.unit))
+        changes.append(SX.sym(rule.name, slots[-1].size))
+        perturbed[path] = nominal + unflatten(changes[-1], slots[-1].shape)
+    change = SX(vertcat(*changes))
+    # A formula may contain several of the parameters: its change is that of all of them together.
+    formulas = _dependents(diagram, perturbed).tunable
+    return AddedParameters(
+        slots=tuple(slots),
+        symbols=tuple(changes),
+        changes={
+            name: formula - SX(evalf(substituted(formula, change, SX.zeros(change.numel()))))
+            for name, formula in formulas.items()
+        },
+    )
+
+
+def _mask_parameter(diagram: Diagram, path: str) -> tuple[Diagram, Parameter]:
     parameters = mask_parameters(diagram)
     if path not in parameters:
         raise UnknownNameError("mask parameter", path, parameters, where=f"diagram '{diagram.name}'")
-    level, rule = parameters[path]
-    value = level.mask_values[rule.name]
-    nominal = as_symbols(value)
-    if nominal is None or isinstance(value, bool):
-        raise InputError(
-            f"the mask parameter '{path}' is {type(value).__name__}, which has no derivative",
-            where=f"diagram '{diagram.name}'",
-            allowed="numbers and arrays",
-            fix="choose another parameter",
-        )
-    slot = Slot(path, shape_of(value), rule.unit)
-    change = SX.sym(rule.name, slot.size)
-    dependents = dependent_parameters(diagram, path, nominal + unflatten(change, slot.shape))
-    if dependents.structural:
-        raise InputError(
-            f"'{dependents.structural[0]}', which is not tunable, depends on '{path}'",
-            where=f"diagram '{diagram.name}'",
-            allowed="parameters on which only tunable parameters depend",
-            fix="use the difference of two runs for this parameter",
-        )
-    no_change = SX.zeros(slot.size)
-    changes = {
-        name: formula - SX(evalf(substituted(formula, change, no_change)))
-        for name, formula in dependents.tunable.items()
-    }
-    return AddedParameter(slot=slot, symbol=change, changes=changes)
+    return parameters[path]
 
 
 def with_mask_parameters(system: HybridSystem, diagram: Diagram, names: Iterable[str]) -> HybridSystem:
     """The equations of a diagram with the mask parameters among ``names`` as parameters.
 
-    A name may be the name of one entry: ``servo.gains[1]``. Raises as :func:`added_parameter`.
+    A name may be the name of one entry: ``servo.gains[1]``. Raises as :func:`added_parameters`.
     """
     parameters = mask_parameters(diagram)
     wholes = (name if name in parameters else name.rpartition("[")[0] for name in names)
@@ -111,13 +119,38 @@ def with_mask_parameters(system: HybridSystem, diagram: Diagram, names: Iterable
     ]
     if not added:
         return system
-    return with_added_parameters(system, tuple(added_parameter(diagram, name) for name in added))
+    return with_added_parameters(system, added_parameters(diagram, added))
+
+
+def _dependents(diagram: Diagram, perturbed: Mapping[str, SX]) -> DependentParameters:
+    """The parameters that depend on mask parameters, given by path with their symbols."""
+    by_level: dict[str, dict[str, SX]] = {}
+    for path, symbol in perturbed.items():
+        level, _, name = path.rpartition(".")
+        by_level.setdefault(level, {})[name] = symbol
+    dependents = DependentParameters()
+    _add_dependents("", diagram, {}, by_level, dependents)
+    return dependents
 
 
 def _add_dependents(
-    path: str, level: Diagram, perturbed: Mapping[str, SX], dependents: DependentParameters
+    path: str,
+    level: Diagram,
+    inherited: Mapping[str, SX],
+    by_level: Mapping[str, Mapping[str, SX]],
+    dependents: DependentParameters,
 ) -> None:
-    """Find formulas of the perturbed parameters in one diagram and, recursively, in its subsystems."""
+    """Find formulas of the perturbed parameters in one diagram and, recursively, in its subsystems.
+
+    Perturbed are ``inherited``, the mask parameters that depend on those of the diagram around this one, and
+    those of this level in ``by_level``.
+    """
+    perturbed = dict(inherited)
+    for name, value in by_level.get(path, {}).items():
+        nominal = as_symbols(level.mask_values[name])
+        perturbed[name] = value
+        if name in inherited and nominal is not None:
+            perturbed[name] = inherited[name] + (value - nominal)
     constants = {
         name: symbols
         for name, value in level.mask_values.items()
@@ -141,8 +174,10 @@ def _add_dependents(
                 )
             else:
                 dependents.structural.append(f"{joined(path, name)}.{parameter}")
-        if inner and isinstance(block, DiagramBlock):
-            _add_dependents(joined(path, name), block.diagram, inner, dependents)
+        below = joined(path, name)
+        has_own = any(other == below or other.startswith(f"{below}/") for other in by_level)
+        if isinstance(block, DiagramBlock) and (inner or has_own):
+            _add_dependents(below, block.diagram, inner, by_level, dependents)
 
 
 def _is_run_input(block: Block, parameter: str) -> bool:

@@ -16,33 +16,32 @@ from armblocks.equations.traced_function import TracedFunction
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class AddedParameter:
-    """An added parameter ``symbol`` with the value 0. ``changes`` are the increments of other parameters as
-    expressions of ``symbol``."""
+class AddedParameters:
+    """Added parameters ``symbols`` with the value 0. ``changes`` are the increments of other parameters as
+    expressions of all ``symbols``."""
 
-    slot: Slot
-    symbol: SX
+    slots: tuple[Slot, ...]
+    symbols: tuple[SX, ...]
     changes: Mapping[str, SX]
 
 
-def with_added_parameters(system: HybridSystem, added: tuple[AddedParameter, ...]) -> HybridSystem:
+def with_added_parameters(system: HybridSystem, added: AddedParameters) -> HybridSystem:
     """The same equations with parameters appended; at 0 they have no effect.
 
     Changes of parameters that the system does not have are ignored. The derivative with respect to an added
     parameter is the directional derivative along its changes.
     """
     old = system.parameters
-    layout = Signature((*old.slots, *(entry.slot for entry in added)))
+    layout = Signature((*old.slots, *added.slots))
     p = SX.sym("p", layout.size)
     columns = vertsplit(p, [0, *np.cumsum([slot.size for slot in layout]).tolist()])
     parts = dict(zip(layout.names, columns))
     changed = {name: parts[name] for name in old.names}
-    for entry in added:
-        paths = [path for path in entry.changes if path in changed]
-        flat = [flatten(entry.changes[path], old[path].shape) for path in paths]
-        changes = Function("f", [entry.symbol], flat).call([parts[entry.slot.name]], True, False)
-        for path, change in zip(paths, changes):
-            changed[path] = changed[path] + change
+    paths = [path for path in added.changes if path in changed]
+    flat = [flatten(added.changes[path], old[path].shape) for path in paths]
+    values = [parts[slot.name] for slot in added.slots]
+    for path, change in zip(paths, Function("f", list(added.symbols), flat).call(values, True, False)):
+        changed[path] = changed[path] + change
     whole = vertcat(*changed.values(), SX(0, 1))
 
     def extended(traced: TracedFunction) -> TracedFunction:
