@@ -20,7 +20,7 @@ from armblocks.face.model import compile_diagram
 from armblocks.face.python_calls import called_functions
 from armblocks.integration.system import CompiledSystem, compile_system
 from armblocks.simulation import Simulation, SimulationResult
-from armblocks.simulation.whole_run import run_to_the_end
+from armblocks.simulation.whole_run import check_interrupt, run_to_the_end
 
 Array = NDArray[np.float64]
 
@@ -220,8 +220,7 @@ class FittedRun:
     ) -> SimulationResult:
         calls = called_functions(diagram, compiled)
         result = run_to_the_end(Simulation(compiled, options, p, calls=calls, times=self._times))
-        if "Ctrl-C" in result.run.message:
-            raise KeyboardInterrupt
+        check_interrupt(result)
         if len(result.time) < len(self._times):
             raise SimulationError(
                 f"the run ended at {result.time[-1]:.6g} s, before the last measured time "

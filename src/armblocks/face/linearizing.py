@@ -30,6 +30,7 @@ from armblocks.face.diagrams import load_diagram
 from armblocks.face.model import CompiledDiagram, compile_diagram, simulate
 from armblocks.face.settings import RunSettings, check_settings, takes_settings
 from armblocks.simulation import RunState
+from armblocks.simulation.whole_run import check_interrupt
 
 Where = float | RunState | OperatingPoint
 """A time of a run from the diagram's start (s), the final state of a run, or an operating point."""
@@ -251,8 +252,7 @@ def operating_points_at(
             continue
         run: RunSettings = {**settings, "stop_time": time}
         result = simulate(compiled, initial_state=state, **run)
-        if not result.run.complete:
-            raise KeyboardInterrupt  # Ctrl-C ended the run early
+        check_interrupt(result)
         state = result.final_state
         assert state is not None  # a failed run has raised an error
         points[time] = _point_from_state(evaluated, state)

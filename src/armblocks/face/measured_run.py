@@ -22,6 +22,7 @@ from armblocks.face.sensitivity import check_coinciding_events
 from armblocks.integration.system import compile_system
 from armblocks.simulation import SimulationResult
 from armblocks.simulation import simulate as run_system
+from armblocks.simulation.whole_run import check_interrupt
 from armblocks.sweeps.measure_derivatives import Dual
 from armblocks.sweeps.measures import Measure, observe
 from armblocks.sweeps.quantities import EVENTS
@@ -178,9 +179,8 @@ class MeasuredRun:
         """The run with parameters ``(np,)``. Raises ``SimulationError`` for a run that fails, and for
         coinciding events that a parameter change would separate."""
         result = run_system(self._compiled, self._options, p)
+        check_interrupt(result)
         check_coinciding_events(self._compiled, result)
-        if "Ctrl-C" in result.run.message:
-            raise KeyboardInterrupt
         if result.run.message.startswith("stopped by block"):
             raise SimulationError(
                 f"the run ended at {result.time[-1]:.9g} s: {result.run.message}",

@@ -77,6 +77,13 @@ def run_to_the_end(run: Simulation, progress: Progress | None = None) -> Simulat
     return result
 
 
+def check_interrupt(result: SimulationResult) -> None:
+    """Raise ``KeyboardInterrupt`` if Ctrl-C ended a run early, or came after its last step."""
+    if not result.run.complete:
+        raise KeyboardInterrupt
+    interrupts.check()
+
+
 def _report_progress(progress: Progress, run: Simulation) -> None:
     stop = run.stop_time
     progress(run.time, run.time / stop if stop > 0.0 else 1.0, run.time / max(run.wall_time, 1e-9))
