@@ -3,8 +3,9 @@
 ``python3 scripts/test.py`` runs all steps, also after a failure. The exit code is 1 if a step failed.
 ``python3 scripts/test.py format types`` runs only the named steps.
 
-The static checks run two at a time, then the tests run. The output has the order of the steps: the output of
-the first unfinished step is shown immediately, that of later steps is buffered.
+The static checks run two at a time, then the tests run. The checks of the front end need Node.js only and run
+during the installation. The output has the order of the steps: the output of the first unfinished step is
+shown immediately, that of later steps is buffered.
 """
 
 from __future__ import annotations
@@ -22,14 +23,19 @@ from threading import Event
 
 from environment import BINARIES, ENVIRONMENT, PYTHON, ROOT, prepare, prepare_browser, print_line
 
+sys.path.insert(0, str(ROOT / "frontend"))
+from node import system_npm
+
 SOURCES = ("src", "tests", "scripts", "docs", "benchmarks", "hatch_build.py", "frontend")
 CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 TEST_PROCESSES = CORES + (CORES + 1) // 2
 """More processes than cores: a browser test waits for its page during almost half of its time."""
-WEB_TOOL = (PYTHON, "frontend/node.py", "exec", "--offline", "--")
+WEB_PYTHON = sys.executable if system_npm() else PYTHON
+"""The interpreter of the steps of the front end. Without Node.js on the system they use that of ``.venv``."""
+WEB_TOOL = (WEB_PYTHON, "frontend/node.py", "exec", "--offline", "--")
 
 STEPS: dict[str, tuple[str | object, ...]] = {
-    "page": (PYTHON, "frontend/build_page.py"),
+    "page": (WEB_PYTHON, "frontend/build_page.py"),
     "web types": (PYTHON, "scripts/studio_types.py", "--check"),
     "web lint": (*WEB_TOOL, "oxlint", "src", "tests"),
     "web format": (*WEB_TOOL, "prettier", "--check", "{src,tests}/**/*.{ts,tsx}", "*.ts"),
@@ -44,12 +50,14 @@ STEPS: dict[str, tuple[str | object, ...]] = {
 NEEDED = {"web types": "page", "web lint": "page", "web format": "page", "web tests": "page"}
 """Steps that wait for another step: the page downloads the libraries that they use."""
 STAGES = (
-    ("page", "docs", "types", "web tests", "web format", "web lint", "web types", "layers", "lint", "format"),
+    ("page", "web tests", "web format", "web lint", "docs", "types", "web types", "layers", "lint", "format"),
     ("tests",),
 )
-"""Stages run in sequence. The steps of a stage start in this order, long steps first, two at a time.
+"""Stages run in sequence. The steps of a stage start in this order, two at a time: first those that can run
+during the installation, then long steps first.
 The tests have a separate stage: browser tests need all cores, and the wheel is built from page and docs."""
 PARALLEL_STEPS = 2
+"""Steps that run at the same time. The installation counts as one of them."""
 LIBRARIES_WITH_ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
 """Each core has its own test process; threads of OpenBLAS that wait for each other take processor time."""
 POLL_SECONDS = 0.1
@@ -113,21 +121,31 @@ class Step:
         self._ended.set()
 
 
-def run_steps(names: Sequence[str]) -> list[Step]:
-    """Run these steps, each once, and show their output in the order of ``STEPS``."""
+def run_steps(names: Sequence[str], browser: Future[None]) -> list[Step]:
+    """Install armblocks, run these steps, each once, and show their output in the order of ``STEPS``.
+
+    ``browser`` is the preparation of the browser. Exits with a message if it or the installation fails.
+    """
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(PARALLEL_STEPS) as pool:
         steps = {name: Step(name, Path(folder)) for name in names}
         stopped = Event()
+        environment = pool.submit(prepare, "test")
 
         def run_step(name: str) -> None:
+            # What a step waits for has started before: it precedes the step in the pool.
             if (needed := steps.get(NEEDED.get(name, ""))) is not None:
-                needed.wait()  # has started before: it precedes this step in its stage
+                needed.wait()
+            uses_environment = steps[name].command[0].startswith(str(BINARIES))
+            if uses_environment and environment.exception() is not None:
+                return
             if not stopped.is_set():
                 steps[name].run()
 
         try:
             for stage in STAGES:
                 running: list[Future[None]] = [pool.submit(run_step, name) for name in stage if name in steps]
+                environment.result()
+                browser.result()
                 for name in names:
                     if name in stage:
                         steps[name].follow()
@@ -153,17 +171,15 @@ def main() -> int:
     for name in requested:
         if name not in STEPS:
             parser.error(f"there is no step named '{name}'; the steps are {', '.join(STEPS)}")
-    with ThreadPoolExecutor() as pool:
-        browser = pool.submit(prepare_browser)  # the downloads of both take most of the time
-        prepare("test")
-        browser.result()
     start = time.perf_counter()
-    results = run_steps([name for name in STEPS if not requested or name in requested])
+    with ThreadPoolExecutor() as pool:
+        browser = pool.submit(prepare_browser)
+        results = run_steps([name for name in STEPS if not requested or name in requested], browser)
     print_line("== summary")
     for step in results:
         verdict = "passed" if step.code == 0 else f"FAILED (exit code {step.code})"
         print_line(f"   {step.name:<10} {verdict:<24} {step.seconds:6.1f} s")
-    print_line(f"   total {time.perf_counter() - start:38.1f} s")
+    print_line(f"   total with installation {time.perf_counter() - start:20.1f} s")
     return 1 if any(step.code != 0 for step in results) else 0
 
 
