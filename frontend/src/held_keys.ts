@@ -4,6 +4,8 @@
  * just pasted, the new name of a block, the sheet inside a subsystem.
  */
 
+import { isForSheet } from './sheet_focus'
+
 /** Awaited operations. */
 let operations = 0
 /** Whether the server is connected; without it, keys act at once and their edits are sent later. */
@@ -32,12 +34,6 @@ export function setConnected(state: boolean): void {
 }
 
 const areHeld = (): boolean => connected && operations > 0
-
-/** Whether a key belongs to the sheet: the sheet or an element around it has the focus. */
-function isForSheet({ target }: KeyboardEvent): boolean {
-  if (!(target instanceof Element) || target.closest('input, textarea, [role="dialog"]')) return false
-  return target.closest('.canvas') !== null || target.querySelector('.canvas') !== null
-}
 
 const isModifier = ({ key }: KeyboardEvent): boolean =>
   ['Control', 'Shift', 'Alt', 'Meta', 'AltGraph'].includes(key)

@@ -139,7 +139,7 @@ function Sheet({ sheetKey }: { sheetKey: string }) {
   const sheetDrag = useSheetDrag(blocks, notes)
   const { graph, nodes, edges, lines } = useSheetDrawing(sheetDrag, selectedWires)
   useCentredBlock(sheet, flow, blocks)
-  useSheetKeys(sheet, selectedWires, setSelectedWires)
+  useSheetKeys(selectedWires, setSelectedWires)
   const empty = Object.keys(blocks).length === 0 && Object.keys(notes).length === 0
   const { view, motion } = useView(sheet, flow, sheetKey, blocks, empty)
   const handlers = useStableHandlers({

@@ -1,4 +1,4 @@
-import { useEffect, type RefObject } from 'react'
+import { useEffect } from 'react'
 import { commandOf } from '../commands'
 import { showDialog } from '../dialogs'
 import { change, openSheet, useStudio } from '../store'
@@ -7,16 +7,9 @@ import { rename } from './block_node'
 import { editNote } from './note_node'
 import { addNote, moveNodes, openBlock, sheetView, ZOOM_STEP } from './sheet_actions'
 import { wireKey, type Places } from '../model/wires'
+import { isForSheet } from '../sheet_focus'
 
 const ARROW_STEP = 5
-
-/** Keys that a focused button handles; all other keys are handled by the sheet. */
-const BUTTON_KEYS = new Set(['Enter', ' ', 'Tab'])
-
-/** Whether an element is a button whose group does not use the arrow keys. */
-const isButton = (element: Element | null): boolean =>
-  element instanceof HTMLButtonElement &&
-  !element.closest('[role="tablist"], [role="radiogroup"], [role="listbox"], .timeline, .stage')
 
 /** Delete the selected blocks, notes and wires. */
 export function removeSelected(selectedWires: ReadonlySet<string>): void {
@@ -30,7 +23,6 @@ export function removeSelected(selectedWires: ReadonlySet<string>): void {
 
 /** The keys of the sheet: active while the sheet or nothing has the focus. */
 export function useSheetKeys(
-  sheet: RefObject<HTMLDivElement | null>,
   selectedWires: ReadonlySet<string>,
   selectWires: (keys: ReadonlySet<string>) => void,
 ): void {
@@ -79,18 +71,7 @@ export function useSheetKeys(
   }
 
   const onKeyDown = (event: KeyboardEvent) => {
-    // If the focused block was removed, nothing has the focus. A button outside the sheet handles only the
-    // keys that press it.
-    const focused = event.target instanceof Element ? event.target : null
-    if (
-      focused instanceof HTMLInputElement ||
-      focused?.closest('textarea, [role="dialog"], [role="menu"], [role="slider"], [role="tree"]')
-    )
-      return
-    if (event.defaultPrevented) return
-    // After the selection by a rectangle, the panel around the sheet has the focus.
-    const forSheet = sheet.current?.contains(focused) || focused?.contains(sheet.current)
-    if (!forSheet && (BUTTON_KEYS.has(event.key) || (event.key.length > 1 && !isButton(focused)))) return
+    if (event.defaultPrevented || !isForSheet(event)) return
     const command = commandOf(event, true)
     if (command) {
       if (command.enabled?.() ?? true) command.run()

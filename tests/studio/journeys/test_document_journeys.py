@@ -103,8 +103,8 @@ class DelayedWebSocket:
 
     def release(self) -> None:
         self.delayed = False
-        for message in self.waiting:
-            self._page.send(message)
+        while self.waiting:
+            self._page.send(self.waiting.pop(0))
 
 
 def test_a_conflicting_edit_is_reported_and_both_pages_show_the_same_diagram(
@@ -138,6 +138,16 @@ def test_a_conflicting_edit_is_reported_and_both_pages_show_the_same_diagram(
     other.locator(".react-flow__pane").click(position={"x": 5, "y": 5})
     other.keyboard.press("Control+z")
     expect(block(page, "Sum")).to_be_visible()
+    new_diagram(other)  # the menu button keeps the focus
+    socket.delayed = True
+    add(other, "gain")
+    other.keyboard.type("integrator")
+    other.keyboard.press("Enter")
+    socket.release()
+    expect(block(other, "Integrator")).to_have_class(re.compile("selected"))
+    left = "node => new DOMMatrix(node.style.transform).e"
+    gain, integrator = (block(other, name).evaluate(left) for name in ("Gain", "Integrator"))
+    assert integrator > gain + 60  # right of the block that was added before
     other.close()
     page.keyboard.press("Control+s")
     expect(page).to_have_title("two – armblocks")

@@ -136,8 +136,10 @@ def test_a_diagram_is_built_with_the_keyboard_alone_and_undone_completely(page: 
     ports = page.locator('[data-handleid="y"], .source, [data-id="Scope"] .target')
     expect(ports).to_have_count(3)
     # The wires between them are straight. All ports are measured together, because the sheet may be moving.
-    tops = "(ports) => ports.map((port) => port.getBoundingClientRect().y)"
-    wait_until(page, lambda: np.ptp(ports.evaluate_all(tops)) < 0.01)
+    # An unconnected input is smaller than the outputs.
+    boxes = "ports.map((port) => port.getBoundingClientRect())"
+    centres = f"(ports) => {boxes}.map(({{ y, height }}) => y + height / 2)"
+    wait_until(page, lambda: np.ptp(ports.evaluate_all(centres)) < 0.01)
     for source, target in (("Sine", "Integrator"), ("Integrator", "Scope")):
         page.keyboard.press(">")
         for label, typed in (("From the output", source), ("To the input", target)):

@@ -1,0 +1,26 @@
+/** Keys that a focused button handles; all other keys are handled by the sheet. */
+const BUTTON_KEYS = new Set(['Enter', ' ', 'Tab'])
+
+/** Whether an element is a button whose group does not use the arrow keys. */
+const isButton = (element: Element | null): boolean =>
+  element instanceof HTMLButtonElement &&
+  !element.closest('[role="tablist"], [role="radiogroup"], [role="listbox"], .timeline, .stage')
+
+/**
+ * Whether a key acts on the sheet: the sheet, an element around the sheet or a button has the focus. A button
+ * outside the sheet handles only the keys that press it.
+ */
+export function isForSheet({ target, key }: KeyboardEvent): boolean {
+  const sheet = document.querySelector('.canvas')
+  const focused = target instanceof Element ? target : null
+  if (
+    !sheet ||
+    focused instanceof HTMLInputElement ||
+    focused?.closest('textarea, [role="dialog"], [role="menu"], [role="slider"], [role="tree"]')
+  )
+    return false
+  // If the focused block was removed, nothing has the focus. After the selection by a rectangle, the panel
+  // around the sheet has the focus.
+  if (sheet.contains(focused) || focused?.contains(sheet)) return true
+  return !BUTTON_KEYS.has(key) && (key.length === 1 || isButton(focused))
+}
