@@ -73,7 +73,7 @@ def dynamics_section(repeats: int) -> list[str]:
         "",
         "### Agreement of the results",
         "",
-        *table(["kernel", "largest difference to Pinocchio, relative"], agreements),
+        *table(["kernel", "largest difference from Pinocchio, relative"], agreements),
     ]
     lines += ["", "### Operations per evaluation, and the share of the core's arithmetic peak", ""]
     lines += table(

@@ -146,7 +146,7 @@ def _jacobian(model: mujoco.MjModel, tree_q: np.ndarray, order: list[int]) -> np
         ("<connect body1='ab' body2='zz' anchor='0 0 0'/>", "a body does not exist"),
         ("<weld site1='as' site2='zz'/>", "a site does not exist"),
         ("<weld body1='ab' body2='ab'/>", "both frames are on the same body"),
-        ("<tendon tendon1='t'/>", "a robot has constraints of bodies and of two joints"),
+        ("<tendon tendon1='t'/>", "only constraints of bodies and of two joints are supported"),
         (
             "<joint joint1='a1'/><joint joint1='a1'/>",
             "the coupling follows from other constraints; it is omitted",

@@ -131,8 +131,8 @@ def heat(n: int) -> tuple[HybridSystem, np.ndarray, float]:
 def pendulum() -> HybridSystem:
     """A unit mass on a unit rod in Cartesian coordinates: an implicit equation of index 1 for the rod force.
 
-    ``x'' = -w x``, ``y'' = -w y - g`` and ``x^2 + y^2 = 1``, differentiated twice; it starts horizontal, at
-    rest.
+    ``x'' = -w x``, ``y'' = -w y - g`` and ``x^2 + y^2 = 1``, differentiated twice. The rod starts horizontal,
+    at rest.
     """
     g = 9.81
     return hybrid(

@@ -5,8 +5,8 @@ to their initial values. When the control turns on, modes become consistent with
 start of a run, and guards are evaluated from then on. A triggered block executes when the trigger fires, as a
 sampled block does at a tick.
 
-``conditional`` composes functions from features to features, one for each of these rules. They treat
-equations by role (``SlotKind.while_off``), not by name."""
+``conditional`` composes functions from features to features, one for each of these rules. The
+functions treat equations by role (``SlotKind.while_off``), not by name."""
 
 from __future__ import annotations
 

@@ -85,7 +85,7 @@ class OptimisationResult(metaclass=ArgumentErrors):
 
     ``method``: ``gradient`` (exact derivatives) or ``search`` (values alone); ``reason``: why. ``message``:
     why the search ended; ``converged``: whether it found a minimum; ``feasible``: whether all constraints
-    hold. ``evaluations``: the number of evaluated points; ``runs``: of runs. ``history (K, 2 + n)``:
+    hold. ``evaluations``, ``runs``: the numbers of evaluated points and of runs. ``history (K, 2 + n)``:
     objective, largest relative violation of a constraint, and variables of each evaluated point.
     ``solutions``: the ends of the searches from all starts.
 

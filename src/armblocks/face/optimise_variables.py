@@ -22,8 +22,8 @@ Bounds = tuple[float, float] | Distribution | None
 class Variables:
     """The n variables by name, with ``lower``, ``upper`` and ``start (n,)`` in the units of the parameters.
 
-    The search uses coordinates ``u``: linear from 0 to 1 between finite bounds, and of the logarithm for
-    :func:`armblocks.loguniform`.
+    The search uses coordinates ``u``, which are linear from 0 to 1 between finite bounds. For
+    :func:`armblocks.loguniform` they are linear in the logarithm of the value.
     """
 
     def __init__(self, model: CompiledDiagram, given: object, start: Mapping[str, float], where: str) -> None:

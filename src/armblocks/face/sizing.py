@@ -235,7 +235,7 @@ def _check_joints(robot: Robot, joints: Sequence[str], drives: Sequence[Drive], 
 
 
 def _directions(speed: Array) -> Array:
-    """The sign of the speed, at rest of the motion before or after; 0 for a joint that never moves."""
+    """The sign of the speed; at rest, of the motion before or after the rest; 0 if a joint never moves."""
     still = np.abs(speed) <= 1e-12 * np.abs(speed).max(initial=0.0)
     signs = np.where(still, 0.0, np.sign(speed))
     moving = np.flatnonzero(signs)

@@ -35,7 +35,8 @@ _PREFERRED = ("B", "Tc", "Tc+", "Tc-", "Izz", "Ixx", "Ixy", "Iyz", "Ixz", "mx", 
 _SEED = 20261127
 _STATES = 60
 _MOTOR_SHARE = 0.1
-"""Unit of a motor parameter, as a fraction of the value with which it alone explains a base parameter."""
+"""Smallest unit of a motor parameter, as a fraction of the value at which this parameter alone would give the
+estimate of a base parameter."""
 
 
 class TorqueModel:
@@ -128,7 +129,7 @@ class TorqueModel:
     def base(self) -> tuple[BaseColumns, NDArray[np.bool_]]:
         """The base parameters, and which of them has an effect on the torque of each joint (n, b).
 
-        They follow from the regressor at random states within the ranges of the joints.
+        Both are computed from the regressor at random states within the ranges of the joints.
         """
         random = np.random.default_rng(_SEED)
         count = max(_STATES, 4 * len(self.names) // self.robot.n)
@@ -151,7 +152,8 @@ class TorqueModel:
         """The conditions of physical consistency, with units of the size of the robot.
 
         ``values``, ``errors`` (b,): estimated base parameters and their standard errors, 0 if not identified.
-        They enlarge the units of a description that has no friction, no masses, or far too small masses.
+        These estimates enlarge the units where the description has no friction, no masses, or far too small
+        masses.
         """
         masses = [max(link.mass, 0.0) for link in map(self.robot.link, self.links)]
         typical = max(float(np.mean(masses)) if masses else 0.0, 1e-3)

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _JUMP = 1e-9
-"""Derivatives that differ by less, relative to the largest derivative, are continuous between two pieces."""
+"""Difference of the derivatives of two pieces, relative to the largest derivative, below which the derivative
+counts as continuous."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)

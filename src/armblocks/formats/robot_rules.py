@@ -12,7 +12,7 @@ INERTIA = Rule(
 IMPLAUSIBLE = Rule(
     code="robot-units",
     allowed="angles in rad, lengths in m, inertias in kg m2, gravity as the acceleration of a falling body",
-    remedy="convert the value, or ignore this finding if it is right",
+    remedy="convert the value, or ignore this finding if the value is right",
 )
 NO_MASS = Rule(
     code="robot-mass-missing",

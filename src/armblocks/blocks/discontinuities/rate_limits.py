@@ -177,8 +177,8 @@ class RateLimiterContinuous(RateLimiting):
 class RateLimiterDynamic(RateLimiting):
     """A rate limiter whose limits are signals: y = u while falling <= u' <= rising, else y' equals the limit.
 
-    It behaves like the Rate Limiter (continuous). If ``falling`` exceeds ``rising``, no rate satisfies both
-    limits, and y moves towards u at the active limit.
+    The block behaves like the Rate Limiter (continuous). If ``falling`` exceeds ``rising``, no rate satisfies
+    both limits, and y moves towards u at the active limit.
     """
 
     title: ClassVar[str] = "Rate Limiter Dynamic"

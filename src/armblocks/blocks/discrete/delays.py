@@ -160,9 +160,9 @@ class Delay(Block):
 class ResettableDelay(Block):
     """A delay with reset: y(k) = u(k - length), or initial for length ticks after the start or a reset.
 
-    It corresponds to Simulink's Delay with its optional ports. At the tick of a reset y and all values in the
-    delay buffer become the initial value. With ``enable_port`` the block holds its state and output at every
-    tick at which the input enable is 0.
+    The block corresponds to Simulink's Delay with its optional ports. At the tick of a reset y and all values
+    in the delay buffer become the initial value. With ``enable_port`` the block holds its state and output at
+    every tick at which the input enable is 0.
     """
 
     title: ClassVar[str] = "Resettable Delay"

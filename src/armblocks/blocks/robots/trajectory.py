@@ -81,7 +81,7 @@ class Trajectory(BlockWithRows):
         begin = table.entry(row, 0)
         h = if_else(between, table.entry(next_row, 0) - begin, 1.0)
         s = if_else(between, (t - begin) / h, 0.0)
-        # The difference to the motion with constant acceleration qdd0 determines the powers 3 to 5 of s.
+        # The difference from the motion with constant acceleration qdd0 determines the powers 3 to 5 of s.
         a = (q1 - q0) - h * (qd0 + h * qdd0 / 2.0)
         b, c = h * (qd1 - qd0 - h * qdd0), h * h * (qdd1 - qdd0)
         cubic, fourth, fifth = (

@@ -172,7 +172,7 @@ class Quaternion2T(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class T2Quaternion(Block):
-    """The unit quaternion (s, x, y, z) of a pose with s >= 0: s = cos(angle / 2), the rest along the axis.
+    """The unit quaternion (s, x, y, z) of a pose with s >= 0: s = cos(angle / 2), (x, y, z) along the axis.
 
     When the rotation angle passes pi, the quaternion jumps to its negative, which is the same orientation.
     """

@@ -2,7 +2,7 @@
 
 The forward path is one row from the source to the sink. The feedback path is below it, with mirrored blocks:
 
-1. :mod:`loops`, :mod:`feedback`: every loop is cut at the links that are drawn backwards, and blocks in
+1. :mod:`loops`, :mod:`feedback`: every loop is cut at the connections that are drawn backwards, and blocks in
    feedback paths are mirrored.
 2. :mod:`columns`: every block gets a column, and a long line gets a dummy node in each column that it
    passes.

@@ -74,7 +74,7 @@ def _constraint(element: Element, parts: Parts, poses: Mapping[str | None, Trans
         case "connect" | "weld":
             return _closure(element, parts, poses)
         case _:
-            return "a robot has constraints of bodies and of two joints"
+            return "only constraints of bodies and of two joints are supported"
 
 
 def _coupling(element: Element, parts: Parts) -> Coupling | str:
@@ -102,9 +102,10 @@ def _coupling(element: Element, parts: Parts) -> Coupling | str:
 
 
 def _closure(element: Element, parts: Parts, poses: Mapping[str | None, Transform]) -> Closure | str:
-    """A weld, or the coincidence of two points: also of a weld whose ``torquescale`` is 0.
+    """The closure of a ``weld`` or ``connect``, or the reason why there is none.
 
-    A weld holds ``p1 + R1 relpos = p2 + R2 anchor`` and ``R1 relrot = R2``.
+    ``connect`` is the coincidence of two points, and so is a ``weld`` whose ``torquescale`` is 0. A weld
+    holds ``p1 + R1 relpos = p2 + R2 anchor`` and ``R1 relrot = R2``.
     """
     is_rigid = element.tag == "weld" and element.number("torquescale", 1.0) != 0.0
     kind = WeldClosure if is_rigid else SphericalClosure

@@ -58,7 +58,7 @@ SHAPE = Rule(
 INERTIAL = Rule(
     code="urdf-inertial",
     allowed="<mass> and <inertia> in every <inertial>",
-    remedy="add the missing element; it is read as zero",
+    remedy="add the missing element; a missing element is read as zero",
 )
 NAME = Rule(
     code="urdf-name",

@@ -51,7 +51,7 @@ class Presenter(ABC, Generic[OpenedT]):
 
     @abstractmethod
     def change(self, open_file: OpenedT, before: Any, place: Place) -> ContentChange:
-        """The difference to ``before``; raises ``UnknownNameError`` if the part was added or removed."""
+        """The difference from ``before``; raises ``UnknownNameError`` if the part was added or removed."""
 
     def on_shown(self, client: StudioClient, open_file: OpenedT, *, known: bool) -> None:
         """Called after a client was sent a document; ``known``: the client showed the document before."""
