@@ -6,6 +6,7 @@ import gc
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -49,8 +50,16 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Run the browser tests first: they take longest, and at the end the other workers would be idle."""
+    """Run the browser tests first: they take longest, and at the end the other processes would be idle."""
     items.sort(key=lambda item: "browser" not in getattr(item, "fixturenames", ()))
+
+
+@pytest.hookimpl(optionalhook=True)  # of the plugin xdist
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:
+    """Distribute the files so that browser tests and others run at the same time."""
+    from distribution import BrowserFilesBeside
+
+    return BrowserFilesBeside(config, log) if config.getoption("dist") == "loadfile" else None
 
 
 @pytest.fixture(params=LAW_ROBOTS.values(), ids=list(LAW_ROBOTS))
