@@ -1,12 +1,14 @@
 """Charts: labels do not overlap, peaks remain, limits are visible."""
 
 import itertools
+import re
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from armblocks.pictures.numbers import axis_number, axis_numbers, nice_ticks
 from armblocks.pictures.picture import Picture, Polyline, Text, text_marks
 from armblocks.pictures.style import Tone
 from armblocks.pictures.text_width import text_width
@@ -52,6 +54,43 @@ def test_texts_do_not_overlap_and_are_inside_the_picture(scale: float) -> None:
     assert overlapping(picture) == []
     for left, top, right, bottom in boxes(picture):
         assert left >= 0 and top >= 0 and right <= picture.width and bottom <= picture.height
+
+
+@given(st.integers(0, 2**32 - 1), st.lists(st.integers(1, 30), min_size=1, max_size=2), st.booleans())
+@settings(max_examples=12, deadline=None)
+def test_texts_of_any_number_of_lines_do_not_overlap(seed: int, counts: list[int], resting: bool) -> None:
+    """Panels grow with their labels; lines that end at one value are named in their own order."""
+    rng = np.random.default_rng(seed)
+    time = np.linspace(0, 10, 50)
+    panels: list[Panel] = []
+    for count in counts:
+        values = rng.normal(size=(50, count)).cumsum(axis=0) * 10.0 ** rng.integers(-9, 9)
+        if resting:
+            values -= values[-1] * (1 + 1e-13 * rng.normal(size=count))
+        limits = (float(values.min()) / 2, float(values.max()) / 2)
+        traces = tuple(
+            Trace(
+                label=f"line {k}" + ", a longer name" * (k % 3), values=values[:, k], index=k, limits=limits
+            )
+            for k in range(count)
+        )
+        panels.append(Panel(quantity=", ".join(t.label for t in traces), unit="deg", traces=traces))
+    picture = time_chart(time, panels, title="t", description="d", height=128.0)
+    assert overlapping(picture) == []
+    for left, top, right, bottom in boxes(picture):
+        assert left >= 0 and top >= 0 and right <= picture.width and bottom <= picture.height
+    labels = [mark.text for mark in text_marks(picture) if mark.x > picture.width / 2]
+    order = [int(match[1]) for label in labels if (match := re.match(r"line (\d+)", label))]
+    expected = [k for count in counts for k in range(count)]
+    assert order == expected if resting else sorted(order) == sorted(expected)
+
+
+@given(st.floats(-1e6, 1e6), st.floats(-8, 3), st.integers(2, 6))
+def test_tick_numbers_of_an_axis_are_different(low: float, exponent: float, count: int) -> None:
+    ticks = nice_ticks(low, low + max(abs(low), 1.0) * 10.0**exponent, count)
+    texts = axis_numbers(ticks)
+    assert len(set(texts)) == len(ticks)
+    assert texts == [axis_number(tick) for tick in ticks] or any(len(text) > 7 for text in texts)
 
 
 @given(st.lists(st.floats(0, 150), min_size=1, max_size=9))

@@ -1,5 +1,7 @@
 """Search for the signals of a run that describe the motion of a robot."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from armblocks.diagram import DiagramBuilder
 from armblocks.equations import SimulationOptions
 from armblocks.report.motion import motions, robot_of
 from armblocks.robot import Robot
+from armblocks.spatial import transl
 
 SHORT = SimulationOptions(stop_time=1.0, sample_time=0.01)
 
@@ -63,6 +66,22 @@ def test_two_arms_have_two_motions(puma560: Robot, kr180: Robot) -> None:
     arm_motions = motions(diagram, result)
     assert {motion.robot.name for motion in arm_motions} == {puma560.name, kr180.name}
     assert all(motion.tau is not None for motion in arm_motions)
+
+
+def test_a_controllers_model_with_other_masses_is_not_a_second_motion() -> None:
+    """A model with another tool is one, because its pictures differ."""
+    link = ab.Link(name="link", mass=2.0, centre_of_mass=(0.5, 0, 0), motor=ab.Motor(inertia=0.1))
+    robot = Robot(name="pendulum", links=(link,), gravity=(0, -9.81, 0))
+    model = replace(robot, name="model", links=(replace(link, mass=1.0, motor=None),), gravity=(0, -1.62, 0))
+    tool = replace(robot, tool=transl(0, 0, 0.1))
+    builder = DiagramBuilder("model", settings=SHORT)
+    weight = builder.add("a weight", Gravload(robot=model))
+    plant = builder.add("plant", ForwardDynamics(robot=robot), weight)
+    builder.connect(plant["q"], weight["q"])
+    builder.add("hand", Fkine(robot=tool), plant["q"])
+    arms = motions(*run(builder))
+    assert [arm.robot for arm in arms] == [robot, tool]
+    assert arms[0].blocks == ("plant", "a weight") and arms[0].notes == ()
 
 
 def test_a_diagram_without_a_robot_has_no_motion(puma560: Robot) -> None:

@@ -95,12 +95,13 @@ def test_both_axes_of_an_xy_graph_of_lengths_have_the_same_unit(tmp_path: Path) 
     q = builder.add("q", Constant(value=(0.0,)))
     pose = builder.add("pose", Fkine(robot=Robot(name="reach", links=arm)), q)
     place = builder.add("place", T2xyz(), pose)
+    builder.name_signal(place["z"], "height")
     builder.add("Side", XYGraph(), place["x"], place["z"])
     diagram = builder.build()
     write_report(tmp_path, diagram, ab.simulate(diagram))
     figure = (tmp_path / "figures" / "xy-side.svg").read_text()
     assert "place/x, m<" in figure
-    assert "place/z, m<" in figure
+    assert "height, m<" in figure  # the name of the signal
 
 
 def test_the_papers_report_is_complete(paper: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 MINUS = "\u2212"
@@ -83,6 +84,14 @@ def axis_number(value: float, digits: int = 6) -> str:
             left = left[:-3]
         integer_part = ("-" if value < 0 else "") + "\u202f".join(groups)
     return (integer_part + ("." + fraction if fraction else "")).replace("-", MINUS)
+
+
+def axis_numbers(values: Sequence[float]) -> list[str]:
+    """The labels of all ticks of one axis, with as many digits as distinguish them, and at least six."""
+    digits = next(
+        n for n in range(6, 18) if n == 17 or len({axis_number(v, n) for v in values}) == len(values)
+    )
+    return [axis_number(value, digits) for value in values]
 
 
 def table_number(value: float, digits: int = 4) -> str:

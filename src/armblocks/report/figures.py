@@ -339,7 +339,8 @@ def _xy_graph(block: str, view: View, result: SimulationResult) -> Picture:
     else:
         (x, x_unit), (y, y_unit) = (in_display_unit(flat, unit) for flat, unit in zip(flats, units))
     labels = [
-        (view.labels[k] if k < len(view.labels) and view.labels[k] else path) + (f", {unit}" if unit else "")
+        ((view.labels[k] if k < len(view.labels) else "") or result.signals_layout[path].title or path)
+        + (f", {unit}" if unit else "")
         for k, (path, unit) in enumerate(zip(paths, (x_unit, y_unit)))
     ]
     picture = path_chart(

@@ -6,13 +6,14 @@ that belong to one arm by these names, without the classes of the blocks.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.diagram import Block, Diagram, ParameterKind, ViewKind, flat_diagram
-from armblocks.robot import Robot
+from armblocks.robot import FrictionModel, Robot
+from armblocks.robot.configurations import Configurations
 from armblocks.robot.geometry import link_frames
 from armblocks.simulation.result import SimulationResult
 
@@ -71,13 +72,21 @@ def motions(diagram: Diagram, result: SimulationResult) -> tuple[Motion, ...]:
 
 
 def moving_arms(diagram: Diagram, result: SimulationResult) -> tuple[MovingArm, ...]:
-    """The arms of a diagram and their signals, which are the same for every run."""
+    """The arms of a diagram and their signals, which are the same for every run.
+
+    The motion of a simulated arm is one arm, also if other blocks with its ``q`` have a robot with other
+    masses or drives, for instance the model of a controller.
+    """
     diagram = flat_diagram(diagram)
     groups: dict[tuple[Robot, str], list[str]] = {}
     for name, block in diagram.blocks.items():
         robot = robot_of(block)
         path = _path(result, name, "q")
         if robot is not None and path is not None and result[path].shape[1:] == (robot.nq,):
+            owner = diagram.blocks.get(path.rpartition("/")[0])
+            simulated = None if owner is None else robot_of(owner)
+            if simulated is not None and _pictured(robot) == _pictured(simulated):
+                robot = simulated
             groups.setdefault((robot, path), []).append(name)
     arms: list[MovingArm] = []
     robots_with_views = {
@@ -89,6 +98,24 @@ def moving_arms(diagram: Diagram, result: SimulationResult) -> tuple[MovingArm, 
             continue
         arms.append(_moving_arm(robot, path, _sources_first(diagram, names), result))
     return tuple(arms)
+
+
+def _pictured(robot: Robot) -> Robot:
+    """The robot without the parameters that no picture of its motion shows: masses and drives."""
+    return replace(
+        robot,
+        name="robot",
+        manufacturer="",
+        comment="",
+        links=tuple(
+            replace(link, mass=0.0, centre_of_mass=(0.0, 0.0, 0.0), inertia=(0.0, 0.0, 0.0), motor=None)
+            for link in robot.links
+        ),
+        gravity=(0.0, 0.0, 0.0),
+        friction_model=FrictionModel.SQUARED_GEAR,
+        springs=(),
+        configurations=Configurations(),
+    )
 
 
 def _has_robot_view(diagram: Diagram, name: str) -> bool:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.pictures.numbers import axis_number, nice_ticks
+from armblocks.pictures.numbers import axis_number, axis_numbers, nice_ticks
 from armblocks.pictures.picture import Mark, Picture, Polyline, Text
 from armblocks.pictures.style import FIGURE_WIDTH, SMALL_SIZE, TEXT_SIZE, Tone, trace_dash, trace_tone
 from armblocks.pictures.text_width import shorten, text_width
@@ -20,6 +20,9 @@ _Array = NDArray[np.float64]
 
 PANEL_HEIGHT = 148.0
 _LABEL_WIDTH = 132.0
+_LABEL_STEP = SMALL_SIZE + 4.0
+_LABEL_OVERHANG = 3.0
+"""Distance of the first and the last label beyond the ends of the vertical axis, px."""
 _HEADING_HEIGHT = 26.0
 _GAP = 18.0
 _SHOWN_LIMIT_FRACTION = 0.6
@@ -59,25 +62,34 @@ def time_chart(
     height: float = PANEL_HEIGHT,
     width: float = FIGURE_WIDTH,
 ) -> Picture:
-    """Panels one below the other with a common time axis (s); each line is named at its right end."""
+    """Panels one below the other with a common time axis (s); each line is named at its right end.
+
+    ``height`` is the least height of a panel. Panels with many lines are higher, so that their names do not
+    overlap.
+    """
     spans = [_value_range(panel) for panel in panels]
     ticks = [
         nice_ticks(low, high, 4, degrees=panel.unit == "deg") for panel, (low, high) in zip(panels, spans)
     ]
-    left = 14 + max(text_width(axis_number(v), SMALL_SIZE) for values in ticks for v in values)
+    texts = [axis_numbers(values) for values in ticks]
+    left = 14 + max(text_width(text, SMALL_SIZE) for panel_texts in texts for text in panel_texts)
     left = max(left, 48.0)
     right = width - _LABEL_WIDTH
-    bottom = len(panels) * (_HEADING_HEIGHT + height) + (len(panels) - 1) * _GAP
+    heights = [max(height, _labels_height(len(panel.traces))) for panel in panels]
+    bottom = len(panels) * (_HEADING_HEIGHT + _GAP) - _GAP + sum(heights)
     picture = Picture(width=width, height=bottom + 44, title=title, description=description)
     x_scale = Scale(float(time[0]), _end_time(time), left, right)
     time_ticks = nice_ticks(x_scale.low, x_scale.high, 10 if width >= FIGURE_WIDTH else 6)
-    for number, (panel, span, values) in enumerate(zip(panels, spans, ticks)):
-        top = number * (_HEADING_HEIGHT + height + _GAP) + _HEADING_HEIGHT
-        y_scale = Scale(*span, top + height, top)
-        picture.add(Text(left, top - 10, panel.heading, size=TEXT_SIZE, bold=True))
-        picture.extend(_grid(x_scale, y_scale, time_ticks, values, last=number == len(panels) - 1))
+    top = _HEADING_HEIGHT
+    for number, (panel, span, panel_height) in enumerate(zip(panels, spans, heights)):
+        y_scale = Scale(*span, top + panel_height, top)
+        heading = shorten(panel.heading, TEXT_SIZE, width - left, bold=True)
+        picture.add(Text(left, top - 10, heading, size=TEXT_SIZE, bold=True))
+        named = list(zip(ticks[number], texts[number]))
+        picture.extend(_grid(x_scale, y_scale, time_ticks, named, last=number == len(panels) - 1))
         picture.extend(_traces(time, panel, x_scale, y_scale))
         picture.extend(_end_labels(panel, y_scale, right))
+        top += panel_height + _GAP + _HEADING_HEIGHT
     picture.add(Text((left + right) / 2, bottom + 36, "Time, s", size=TEXT_SIZE, anchor="middle"))
     return picture
 
@@ -85,6 +97,11 @@ def time_chart(
 def label_fits(label: str) -> bool:
     """Whether there is space for the label at the right end of a line."""
     return text_width(label, SMALL_SIZE) <= _LABEL_WIDTH - 31
+
+
+def _labels_height(count: int) -> float:
+    """The height of a panel beside which ``count`` labels do not overlap, px."""
+    return (count - 1) * _LABEL_STEP - 2 * _LABEL_OVERHANG
 
 
 def _end_time(time: _Array) -> float:
@@ -114,7 +131,7 @@ def _drawn_limits(trace: Trace) -> list[float]:
 
 
 def _grid(
-    x_scale: Scale, y_scale: Scale, times: Sequence[float], values: Sequence[float], *, last: bool
+    x_scale: Scale, y_scale: Scale, times: Sequence[float], values: Sequence[tuple[float, str]], *, last: bool
 ) -> list[Mark]:
     marks: list[Mark] = []
     for value in times:
@@ -122,11 +139,11 @@ def _grid(
         marks.append(Polyline([(x, y_scale.end), (x, y_scale.start)], stroke=Tone.GRID, sharp=True))
         if last:
             marks.append(Text(x, y_scale.start + 17, axis_number(value), SMALL_SIZE, Tone.MUTED, "middle"))
-    for value in values:
+    for value, text in values:
         y = y_scale(value)
         tone = Tone.HAIRLINE if value == 0 else Tone.GRID
         marks.append(Polyline([(x_scale.start, y), (x_scale.end, y)], stroke=tone, sharp=True))
-        marks.append(Text(x_scale.start - 7, y + 3.5, axis_number(value), SMALL_SIZE, Tone.MUTED, "end"))
+        marks.append(Text(x_scale.start - 7, y + 3.5, text, SMALL_SIZE, Tone.MUTED, "end"))
     frame = [(x_scale.start, y_scale.end), (x_scale.start, y_scale.start), (x_scale.end, y_scale.start)]
     marks.append(Polyline(frame, stroke=Tone.HAIRLINE, sharp=True))
     return marks
@@ -174,13 +191,14 @@ def _exceeds_limit(trace: Trace, values: _Array) -> NDArray[np.bool_]:
 
 def _end_labels(panel: Panel, y_scale: Scale, right: float) -> list[Mark]:
     """Draw names with keys at the right ends of the lines, moved apart if they would overlap."""
-    step = SMALL_SIZE + 4.0
     preferred: list[float] = []
     for trace in panel.traces:
         finite = trace.values[np.isfinite(trace.values)]
         preferred.append(y_scale(float(finite[-1])) if len(finite) else y_scale.start)
-    order = sorted(range(len(preferred)), key=lambda k: (preferred[k], k))
-    positions = separated_positions([preferred[k] for k in order], step, y_scale.end - 4, y_scale.start + 4)
+    # Lines that end at one point are named in their own order, whatever the rounding errors of their values.
+    order = sorted(range(len(preferred)), key=lambda k: (round(preferred[k]), k))
+    low, high = y_scale.end - _LABEL_OVERHANG, y_scale.start + _LABEL_OVERHANG
+    positions = separated_positions([preferred[k] for k in order], _LABEL_STEP, low, high)
     marks: list[Mark] = []
     for k, y in zip(order, positions):
         trace = panel.traces[k]
@@ -199,7 +217,7 @@ def _end_labels(panel: Panel, y_scale: Scale, right: float) -> list[Mark]:
             Text(
                 right + 29,
                 y + 3.8,
-                shorten(label, SMALL_SIZE, _LABEL_WIDTH - 31),
+                shorten(label, SMALL_SIZE, _LABEL_WIDTH - 31, bold=exceeds),
                 SMALL_SIZE,
                 Tone.ERROR if exceeds else Tone.INK,
                 bold=exceeds,
@@ -209,7 +227,7 @@ def _end_labels(panel: Panel, y_scale: Scale, right: float) -> list[Mark]:
 
 
 def separated_positions(preferred: Sequence[float], step: float, low: float, high: float) -> list[float]:
-    """Positions close to the ascending positions ``preferred``, at least ``step`` apart, within ``low`` ..
+    """Ascending positions close to ``preferred``, in its order, at least ``step`` apart, within ``low`` ..
     ``high`` if they fit.
 
     Groups that would overlap are centred on the mean of their preferred positions (pool adjacent violators,
