@@ -33,6 +33,8 @@ TEST_PROCESSES = CORES + (CORES + 1) // 2
 WEB_PYTHON = sys.executable if system_npm() else PYTHON
 """The interpreter of the steps of the front end. Without Node.js on the system they use that of ``.venv``."""
 WEB_TOOL = (WEB_PYTHON, "frontend/node.py", "exec", "--offline", "--")
+WITHOUT_TERMINAL = "addopts=-p no:cacheprovider"
+"""The options of pytest in pyproject.toml contain some of the plugin ``terminal``."""
 
 STEPS: dict[str, tuple[str | object, ...]] = {
     "page": (WEB_PYTHON, "frontend/build_page.py"),
@@ -45,17 +47,23 @@ STEPS: dict[str, tuple[str | object, ...]] = {
     "types": (BINARIES / "pyright", "--warnings"),
     "layers": (BINARIES / "lint-imports", "--no-cache"),
     "docs": (PYTHON, "docs/build_site.py"),
+    "test files": (PYTHON, "-m", "pytest", "--collect-only", "-p", "no:terminal", "-o", WITHOUT_TERMINAL),
     "tests": (PYTHON, "-m", "pytest", f"-n{TEST_PROCESSES}", "--dist=loadfile", "--no-loadscope-reorder"),
 }
 NEEDED = {"web types": "page", "web lint": "page", "web format": "page", "web tests": "page"}
 """Steps that wait for another step: the page downloads the libraries that they use."""
 STAGES = (
-    ("page", "web tests", "web format", "web lint", "docs", "types", "web types", "layers", "lint", "format"),
+    (
+        *("page", "web tests", "web format", "web lint", "docs", "types"),
+        *("web types", "layers", "lint", "format", "test files"),
+    ),
     ("tests",),
 )
 """Stages run in sequence. The steps of a stage start in this order, two at a time: first those that can run
 during the installation, then long steps first.
-The tests have a separate stage: browser tests need all cores, and the wheel is built from page and docs."""
+The tests have a separate stage: browser tests need all cores, and the wheel is built from page and docs.
+The step "test files" imports all test files, so that the test processes find their bytecode: otherwise each
+process would compile the same files. The tests report its errors."""
 PARALLEL_STEPS = 2
 """Steps that run at the same time. The installation counts as one of them."""
 LIBRARIES_WITH_ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
