@@ -50,8 +50,17 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Run the browser tests first: they take longest, and at the end the other processes would be idle."""
-    items.sort(key=lambda item: "browser" not in getattr(item, "fixturenames", ()))
+    """Run the browser tests first: they take longest, and at the end the other processes would be idle.
+
+    Then run the files that use the worked examples of all blocks: the process that runs them all builds and
+    traces each example once.
+    """
+
+    def last(item: pytest.Item) -> tuple[bool, bool]:
+        without_browser = "browser" not in getattr(item, "fixturenames", ())
+        return without_browser, not hasattr(getattr(item, "module", None), "worked_example")
+
+    items.sort(key=last)
 
 
 @pytest.hookimpl(optionalhook=True)  # of the plugin xdist
