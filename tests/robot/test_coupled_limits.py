@@ -1,4 +1,4 @@
-"""The limits of coordinates include those of the joints that couplings make depend on them."""
+"""The limits of coordinates include the limits of the joints that depend on them by couplings."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from armblocks.spatial.vectors import (
 def kinetic_energy(tree: KinematicTree, joints: Sequence[JointMotion], qd: Sequence[Scalar]) -> Scalar:
     """Kinetic energy of all bodies and rotors, J.
 
-    It is the sum of ``(m v.v + 2 v.(w x h) + w.I w) / 2`` and ``G^2 Jm qd^2 / 2``.
+    This energy is the sum of ``(m v.v + 2 v.(w x h) + w.I w) / 2`` and ``G^2 Jm qd^2 / 2``.
     """
     omegas: list[Vector] = []
     velocities: list[Vector] = []
