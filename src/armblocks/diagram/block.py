@@ -320,6 +320,10 @@ class Block(ABC, metaclass=ArgumentErrors, methods=False):
         """SI units of inputs that follow from other inputs, such as the terms of a sum."""
         return {}
 
+    def reason_of_invalid_values(self) -> str:
+        """Why signals or derivatives of the block can be NaN or infinite, for error messages of runs."""
+        return ""
+
     def views(self) -> tuple[View, ...]:
         """The views of this block: sinks have one or more."""
         return ()

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 
 from casadi import SX, atan2, cos, fabs, if_else, sin, sqrt
 
-from armblocks.robot.joints import AxisMotion
+from armblocks.robot.joints import AxisMotion, Motion
 from armblocks.robot.robot import Robot
 from armblocks.robot.tree import Body, KinematicTree
 from armblocks.spatial.vectors import Matrix, Rotation, RotationZ, Scalar, Vector, cross, dot, scale
@@ -158,25 +158,32 @@ def motion_of_rates(
 
     For a quaternion Q of any length, ``w = 2 vec(Q* Q') / |Q|²``, and its derivative.
     """
+    motions = [motion for joint in robot.joints for motion in joint.motions]
+    return speeds_of_rates(motions, q, rates, second_rates)
+
+
+def speeds_of_rates(
+    motions: Sequence[Motion], q: Sequence[Scalar], rates: Sequence[Scalar], second_rates: Sequence[Scalar]
+) -> tuple[list[Scalar], list[Scalar]]:
+    """As :func:`motion_of_rates`, for a sequence of elementary motions."""
     speeds: list[Scalar] = []
     accelerations: list[Scalar] = []
     position = 0
-    for joint in robot.joints:
-        for motion in joint.motions:
-            part = slice(position, position + len(motion.positions))
-            position = part.stop
-            if isinstance(motion, AxisMotion):
-                speeds += rates[part]
-                accelerations += second_rates[part]
-                continue
-            Q, rate = q[part], rates[part]
-            conjugate = (Q[0], -Q[1], -Q[2], -Q[3])
-            square = Q[0] * Q[0] + Q[1] * Q[1] + Q[2] * Q[2] + Q[3] * Q[3]
-            growth = 2.0 * (Q[0] * rate[0] + Q[1] * rate[1] + Q[2] * rate[2] + Q[3] * rate[3])
-            w = [2.0 * value / square for value in _product(conjugate, rate)[1:]]
-            second = _product(conjugate, second_rates[part])[1:]
-            speeds += w
-            accelerations += [(2.0 * a - growth * b) / square for a, b in zip(second, w)]
+    for motion in motions:
+        part = slice(position, position + len(motion.positions))
+        position = part.stop
+        if isinstance(motion, AxisMotion):
+            speeds += rates[part]
+            accelerations += second_rates[part]
+            continue
+        Q, rate = q[part], rates[part]
+        conjugate = (Q[0], -Q[1], -Q[2], -Q[3])
+        square = Q[0] * Q[0] + Q[1] * Q[1] + Q[2] * Q[2] + Q[3] * Q[3]
+        growth = 2.0 * (Q[0] * rate[0] + Q[1] * rate[1] + Q[2] * rate[2] + Q[3] * rate[3])
+        w = [2.0 * value / square for value in _product(conjugate, rate)[1:]]
+        second = _product(conjugate, second_rates[part])[1:]
+        speeds += w
+        accelerations += [(2.0 * a - growth * b) / square for a, b in zip(second, w)]
     return speeds, accelerations
 
 

@@ -68,7 +68,7 @@ class DrawnMotion:
             return q, qd
         at, speeds = SX.sym("q", self.robot.nq), SX.sym("qd", self.robot.nv)
         masses = _symbols(inertias)
-        equations = ConstrainedEquations(self.robot, self._tree_with(masses), at, self._relations)
+        equations = ConstrainedEquations(self.robot, self.tree_with(masses), at, self._relations)
         consistent = Function("speeds", [at, speeds, *masses], [equations.consistent_speeds(speeds)])
         q = projected(self.robot, self.tree, q, self._relations)
         (qd,) = consistent.call([q, qd, *inertias], True, False)
@@ -84,7 +84,7 @@ class DrawnMotion:
         placed = [(self.tree.attached(load.at.link, load.at.pose), load.force, load.moment) for load in loads]
         wrenches = frames.on_bodies(placed)
         if not self._relations:
-            tree = self._tree_with(inertias)
+            tree = self.tree_with(inertias)
             return SX(vertcat(*forward_dynamics(tree, q, entries(qd), entries(tau), wrenches)))
         # The bias of the relations is a derivative with respect to q at constant values of all others.
         at, speeds, given = (
@@ -93,7 +93,7 @@ class DrawnMotion:
             SX.sym("tau", self.robot.nv),
         )
         masses = _symbols(inertias)
-        equations = ConstrainedEquations(self.robot, self._tree_with(masses), at, self._relations)
+        equations = ConstrainedEquations(self.robot, self.tree_with(masses), at, self._relations)
         symbols = {body: SX.sym(f"wrench{body}", 6) for body in wrenches}
         acting = {body: _wrench(column) for body, column in symbols.items()}
         qdd, _ = equations.motion(speeds, given, acting)
@@ -107,7 +107,7 @@ class DrawnMotion:
         motion = ConstrainedMotion(*consistent, qdd, SX(0, 1))
         return Accelerations(qdd, *restoring_rates(self.robot, q, qd, motion))
 
-    def _tree_with(self, inertias: Sequence[SX]) -> KinematicTree:
+    def tree_with(self, inertias: Sequence[SX]) -> KinematicTree:
         """The tree with the inertias of the run; its frames are those of ``tree``."""
         added = (
             (self._whole.attached(at.link, at.pose), _inertia(column))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from armblocks import interrupts
 from armblocks.analysis.operating_point import OperatingPoint
 from armblocks.argument_errors import ArgumentErrors
-from armblocks.diagram import Diagram, content_key, trace_diagram, with_parameters
+from armblocks.diagram import Diagram, content_key, flat_diagram, trace_diagram, with_parameters
 from armblocks.diagram.entry_names import entry_names
 from armblocks.diagram.signal_names import signal_titles
 from armblocks.equations import HybridSystem, Signature, SimulationOptions
@@ -54,7 +54,13 @@ class CompiledDiagram(metaclass=ArgumentErrors):
         """The equations as native code; a cache entry makes tracing unnecessary."""
         key = content_key(self.diagram)
         with interrupts.kept():
-            return compile_system(self.system) if key is None else cached_system(key, lambda: self.system)
+            compiled = compile_system(self.system) if key is None else cached_system(key, lambda: self.system)
+        compiled.reasons_of_invalid_values = lambda: {
+            path: reason
+            for path, block in flat_diagram(self.diagram).blocks.items()
+            if (reason := block.reason_of_invalid_values())
+        }
+        return compiled
 
     @cached_property
     def signals_layout(self) -> Signature:

@@ -140,6 +140,8 @@ class CompiledSystem:
             looped=bool(self.loops) or self.algebraic.size > 0,
             tangents=None if description["tangents"] is None else tuple(description["tangents"]),
         )
+        self.reasons_of_invalid_values: Callable[[], Mapping[str, str]] = dict
+        """Blocks whose signals can be NaN or infinite for a known reason, for error messages."""
         self._breakpoint_count = int(description["breakpoints"])
         self._digests: Mapping[str, str] = dict(description["digests"])
         self._make_tape = tape

@@ -20,10 +20,12 @@ from armblocks.dynamics.forward import check_accelerations_exist
 from armblocks.errors import DiagramError, RobotError
 from armblocks.multibody.assembly import DrawnMechanism, drawn_mechanism, world_block
 from armblocks.multibody.body_inertias import BodyInertias
+from armblocks.multibody.driven_joints import DrivenJointStates
+from armblocks.multibody.drives import check_drives, unreachable_positions
 from armblocks.multibody.element_states import ElementLoads
 from armblocks.multibody.frames import frames_of_parts, networks
 from armblocks.multibody.joint_states import JointStates
-from armblocks.multibody.mechanism import Mechanism, port_of
+from armblocks.multibody.mechanism import Mechanism, driven_speeds, port_of
 from armblocks.multibody.parts import JointPart, Part, Targets
 from armblocks.multibody.start import Start, drawn_start, start_of
 from armblocks.robot.tree import KinematicTree
@@ -66,9 +68,15 @@ class _Gathered:
         """Add the blocks of a mechanism. Raises ``DiagramError``."""
         self._check_inertia(drawn)
         start = start_of(self.net, drawn)
+        check_drives(self.net, drawn, start.q)
         closed = bool(drawn.robot.closures)
         near = tuple(start.q.tolist()) if closed else ()
-        plant = Mechanism(mechanism=_without_targets(drawn), robot=drawn.robot, near=near)
+        plant = Mechanism(
+            mechanism=_without_targets(drawn),
+            robot=drawn.robot,
+            near=near,
+            unreachable=unreachable_positions(drawn),
+        )
         self.blocks[world] = plant
         for joint in drawn.joints:
             self._add_joint(world, drawn, joint.path, start)
@@ -88,12 +96,14 @@ class _Gathered:
         joint = next(joint for joint in drawn.joints if joint.path == path)
         closed = bool(drawn.robot.closures)
         q, qd = drawn_start(joint, start)
-        states = JointStates(
+        driven = joint.part.has_motion_input
+        states = (DrivenJointStates if driven else JointStates)(
             joint=self.net.blocks[path],
             place=joint.part if closed else _with_tunable_targets(joint.part),
             closed=closed,
             start_q=q if closed else (),
             start_qd=qd if closed else (),
+            unreachable=unreachable_positions(drawn),
         )
         self.blocks[path] = states
         inputs = {port.name for port in states.input_ports()}
@@ -103,6 +113,7 @@ class _Gathered:
             ("mechanism qd", "qd"),
             ("q rates", "q rates"),
             ("qd rates", "qd rates"),
+            ("mechanism drive", "drive"),
         ):
             if port in inputs:
                 self._connect(world, path, port, quantity)
@@ -110,6 +121,7 @@ class _Gathered:
             ("state q", "state q"),
             ("state qd", "state qd"),
             ("generalised force", "force"),
+            *((("given qdd", "given qdd"),) if driven else ()),
         ):
             self._drive(world, path, port, quantity)
 
@@ -129,7 +141,9 @@ class _Gathered:
     def _check_inertia(self, drawn: DrawnMechanism) -> None:
         """Raise ``DiagramError`` for a joint beyond which no mass moves."""
         try:
-            check_accelerations_exist(regrouped(KinematicTree.of(drawn.robot)))
+            tree = regrouped(KinematicTree.of(drawn.robot))
+            driven = {k for joint in drawn.joints for k in driven_speeds(joint)}
+            check_accelerations_exist(tree, [k for k in range(drawn.robot.nv) if k not in driven])
         except RobotError as error:
             paths = (joint.path for joint in drawn.joints)
             path = next((path for path in paths if error.where.endswith(f", link '{path}'")), "")

@@ -99,6 +99,7 @@ class JointStates(Block):
     )
     start_qd: tuple[float, ...] = parameter((), kind=ParameterKind.DIAGRAM, doc="assembled speeds")
     closed: bool = parameter(False, doc="whether the mechanism has closed loops")
+    unreachable: str = parameter("", kind=ParameterKind.DIAGRAM, doc="reason of values that are not finite")
 
     # -- the parameters of the drawn joint
 
@@ -130,6 +131,9 @@ class JointStates(Block):
         """Whether the spring is in the equations; the spring of a ball joint is not tunable."""
         tunable = any(rule.name == "spring_stiffness" for rule in self.joint.inputs_of_the_run())
         return tunable or bool(np.any(self._numbers("spring_stiffness")))
+
+    def reason_of_invalid_values(self) -> str:
+        return self.unreachable
 
     # -- ports and states
 
@@ -174,8 +178,9 @@ class JointStates(Block):
     # -- equations
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        q = u["mechanism q"] if self._reads_coordinates() else x["q"]
-        qd = u["mechanism qd"] if self.closed else x["qd"]
+        state_q, state_qd = self.state_of(x, u)
+        q = u["mechanism q"] if self._reads_coordinates() else state_q
+        qd = u["mechanism qd"] if self.closed else state_qd
         actuator = self._actuator(u)
         force = actuator + self._internal_force(q, qd, p)
         values = {
@@ -183,11 +188,15 @@ class JointStates(Block):
             "qd": qd,
             "qdd": u["mechanism qdd"],
             "actuator": actuator,
-            "state q": x["q"],
-            "state qd": x["qd"],
+            "state q": state_q,
+            "state qd": state_qd,
             "generalised force": force,
         }
-        return {port.name: values[port.name] for port in self.output_ports()}
+        return {port.name: values[port.name] for port in self.output_ports() if port.name in values}
+
+    def state_of(self, x: Signals, u: Signals) -> tuple[SX, SX]:
+        """The coordinates (nq, 1) and speeds (nv, 1) that the mechanism reads."""
+        return x["q"], x["qd"]
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         q_rates = u["q rates"] if self._reads_coordinates() else x["qd"]

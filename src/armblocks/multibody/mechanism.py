@@ -18,6 +18,7 @@ from casadi import SX, mtimes, vertcat
 from armblocks.diagram import Block, ParameterKind, Port, Signals, View, ViewKind, parameter
 from armblocks.diagram.parameter import Value
 from armblocks.dynamics.ball_joints import normalised, position_rates, rotation_of
+from armblocks.dynamics.drawn_drives import DrawnDrives
 from armblocks.dynamics.drawn_motion import DrawnMotion, Load
 from armblocks.dynamics.frame_motions import FramesOfTree
 from armblocks.dynamics.joint_motion import entries
@@ -51,6 +52,7 @@ class Mechanism(Block):
     )
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot of the mechanism")
     near: tuple[float, ...] = parameter((), kind=ParameterKind.DIAGRAM, doc="assembled coordinates (nq,)")
+    unreachable: str = parameter("", kind=ParameterKind.DIAGRAM, doc="reason of values that are not finite")
 
     # -- the masses of the robot are not in the equations
 
@@ -66,6 +68,10 @@ class Mechanism(Block):
         bodies = tuple(body.at for body in self.mechanism.bodies)
         return drawn_motion(_without_masses(self.robot), self.near, bodies)
 
+    def _drives(self) -> DrawnDrives:
+        """The equations of the mechanism with given motions."""
+        return drawn_drives(self._motion(), self.near, self.driven)
+
     def _inertias(self, u: Signals) -> list[SX]:
         return [body.fraction * u[port_of(body.path, "inertia")] for body in self.mechanism.bodies]
 
@@ -79,6 +85,7 @@ class Mechanism(Block):
                 ("state q", joint.part.nq),
                 ("state qd", joint.part.nv),
                 ("force", joint.part.nv),
+                *((("given qdd", joint.part.nv),) if joint.part.has_motion_input else ()),
             )
         ]
         loads = [element for element in self.mechanism.elements if element.part.exerts]
@@ -96,6 +103,8 @@ class Mechanism(Block):
             if self.robot.closures:
                 ports.append(_port(joint.path, "qd", joint.part.nv))
                 ports.append(_port(joint.path, "qd rates", joint.part.nv))
+            if joint.part.has_motion_input:
+                ports.append(_port(joint.path, "drive", joint.part.nv))
         for element in self.mechanism.elements:
             count = len(element.frames)
             ports.append(_port(element.path, "motion", KINEMATICS_SIZE * count))
@@ -140,7 +149,14 @@ class Mechanism(Block):
         for joint in self.mechanism.joints:
             tau[_speeds(joint)] = _tree_forces(joint, q, u[port_of(joint.path, "force")])
         loads, inertias = list(self._loads(u)), self._inertias(u)
-        qdd = equations.accelerations(consistent_q, consistent_qd, tau, loads, inertias)
+        drives = tau
+        if self.driven:
+            given = self._given_accelerations(q, u)
+            qdd, drives = self._drives().accelerations(
+                consistent_q, consistent_qd, tau, given, loads, inertias
+            )
+        else:
+            qdd = equations.accelerations(consistent_q, consistent_qd, tau, loads, inertias)
         if robot.closures:
             _, q_rates, qd_rates = equations.rates(q, qd, (consistent_q, consistent_qd), qdd)
         else:
@@ -154,6 +170,7 @@ class Mechanism(Block):
                 "q rates": _drawn_coordinates(joint, q_rates[positions]),
                 "qd": _drawn_speeds(joint, consistent_q, consistent_qd[speeds]),
                 "qd rates": _drawn_speeds(joint, q, qd_rates[speeds]),
+                "drive": _drawn_speeds(joint, q, drives[speeds]),
             }
             values |= {port_of(joint.path, name): value for name, value in of_joint.items()}
         moving: FramesOfTree | None = None
@@ -182,7 +199,26 @@ class Mechanism(Block):
             qd[_speeds(joint)] = _tree_speeds(joint, coordinates, u[port_of(joint.path, "state qd")])
         return q, qd
 
+    @property
+    def driven(self) -> tuple[int, ...]:
+        """The indices in qd of the speeds whose motion is an input."""
+        return tuple(k for joint in self.mechanism.joints for k in driven_speeds(joint))
+
+    def reason_of_invalid_values(self) -> str:
+        return self.unreachable
+
+    def _given_accelerations(self, q: SX, u: Signals) -> SX:
+        """The accelerations (nv, 1) that motion inputs give; the others are 0."""
+        given = SX.zeros(self.robot.nv)
+        for joint in self.mechanism.joints:
+            if joint.part.has_motion_input:
+                drawn_q = u[port_of(joint.path, "state q")]
+                given[_speeds(joint)] = _tree_speeds(joint, drawn_q, u[port_of(joint.path, "given qdd")])
+        return given
+
     def _consistent(self, q: SX, qd: SX, u: Signals) -> tuple[SX, SX]:
+        if self.robot.closures and self.driven:
+            return self._drives().state(q, qd)
         if self.robot.closures:
             return self._motion().state(q, qd, self._inertias(u))
         is_unit = self.robot.nq == self.robot.nv
@@ -223,6 +259,20 @@ def _without_masses(robot: Robot) -> Robot:
     """The robot with massless links; the equations add the bodies, whose inertias are values of the run."""
     massless = {"mass": 0.0, "centre_of_mass": (0.0,) * 3, "inertia": ((0.0,) * 3,) * 3}
     return replace(robot, links=tuple(replace(link, **massless) for link in robot.links))
+
+
+@lru_cache(maxsize=32)
+def drawn_drives(motion: DrawnMotion, near: tuple[float, ...], driven: tuple[int, ...]) -> DrawnDrives:
+    """The equations of a robot with given speeds; those of the last 32 robots are cached."""
+    return DrawnDrives(motion, np.array(near), driven)
+
+
+def driven_speeds(joint: PlacedJoint) -> list[int]:
+    """The indices in qd of the robot of the speeds of a joint whose motion is an input."""
+    parts = [list(range(part.start, part.stop)) for part in _slices(joint.part.motions, speeds=True)]
+    order = [k for part in (reversed(parts) if joint.reversed else parts) for k in part]
+    driven = joint.part.driven_speeds()
+    return [joint.speed + place for place, k in enumerate(order) if k in driven]
 
 
 def _port(path: str, quantity: str, size: int) -> Port:

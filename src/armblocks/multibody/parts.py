@@ -91,7 +91,7 @@ class JointPart:
     ``closure``: the type of constraint that the joint is where it closes a loop, with the pose of the frames
     of this constraint in ``B`` and in ``F``; ``None``: there is no such type. ``needs_coordinate``: whether
     the joint must have coordinates, because something acts on them or reads them. ``actuation``: ``none``,
-    ``torque`` or ``motion`` for each speed.
+    ``torque`` or ``motion`` for each speed; the three of a ball motion are equal.
     """
 
     motions: tuple[Motion, ...]
@@ -110,6 +110,26 @@ class JointPart:
     def nv(self) -> int:
         """Number of speeds."""
         return sum(len(motion.speeds) for motion in self.motions)
+
+    @property
+    def has_motion_input(self) -> bool:
+        """Whether the motion of some coordinates is an input."""
+        return "motion" in self.actuation
+
+    def driven_speeds(self) -> list[int]:
+        """The indices of the speeds whose motion is an input."""
+        return [k for k, kind in enumerate(self.actuation) if kind == "motion"]
+
+    def driven_positions(self) -> list[int]:
+        """The indices of the coordinates whose motion is an input."""
+        driven: list[int] = []
+        position = speed = 0
+        for motion in self.motions:
+            count = len(motion.positions)
+            if self.actuation and self.actuation[speed] == "motion":
+                driven += range(position, position + count)
+            position, speed = position + count, speed + len(motion.speeds)
+        return driven
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,7 @@ from armblocks.diagram.passes.netlist import Netlist
 from armblocks.dynamics.mechanism import mechanism
 from armblocks.errors import AssemblyError, DiagramError, RobotError
 from armblocks.multibody.assembly import DrawnMechanism, PlacedJoint
+from armblocks.multibody.drives import check_number_of_drives, start_of_input
 from armblocks.multibody.motion_sequence import reversed_motions
 from armblocks.robot.joints import AxisMotion, Motion
 
@@ -45,12 +47,24 @@ def start_of(net: Netlist, drawn: DrawnMechanism) -> Start:
     if not robot.closures:
         return Start(q, qd)
     functions = mechanism(robot)
-    locked = [joint.path for joint in drawn.joints if joint.part.targets.position_priority == "high"]
+    moved = _start_of_motion_inputs(net, drawn, q)
+    locked = [
+        joint.path
+        for joint in drawn.joints
+        if joint.path in moved or joint.part.targets.position_priority == "high"
+    ]
     try:
         q = functions.assembled(q, locked)
     except AssemblyError as error:
-        _refuse_positions(net, drawn, locked, error)
-    locked = [joint.path for joint in drawn.joints if joint.part.targets.velocity_priority == "high"]
+        if moved:
+            with suppress(AssemblyError):  # then the loops cannot be assembled with any motion
+                check_number_of_drives(net, drawn, functions.assembled(q))
+        _refuse_positions(net, drawn, locked, moved, error)
+    locked = [
+        joint.path
+        for joint in drawn.joints
+        if joint.part.targets.velocity_priority == "high" and not joint.part.has_motion_input
+    ]
     try:
         qd = functions.consistent_speeds(q, qd, locked)
     except RobotError as error:
@@ -63,14 +77,47 @@ def start_of(net: Netlist, drawn: DrawnMechanism) -> Start:
     return Start(q, qd)
 
 
+def _start_of_motion_inputs(net: Netlist, drawn: DrawnMechanism, q: Array) -> list[str]:
+    """Write the start of motion inputs into ``q`` (nq,), and return the joints that must not move.
+
+    These are the joints all of whose coordinates are inputs. If the start of an input is not known before
+    the run, the position target of the joint stands for it.
+    """
+    moved: list[str] = []
+    for joint in drawn.joints:
+        driven = joint.part.driven_positions()
+        if not driven:
+            continue
+        drawn_q = list(joint.part.targets.q)
+        given = start_of_input(net, joint)
+        for place, value in zip(driven, given or ()):
+            drawn_q[place] = value
+        q[joint.position : joint.position + joint.part.nq] = _of_tree(joint, drawn_q)
+        if len(driven) == joint.part.nq:
+            moved.append(joint.path)
+    return moved
+
+
 def _refuse_positions(
-    net: Netlist, drawn: DrawnMechanism, locked: Sequence[str], error: AssemblyError
+    net: Netlist,
+    drawn: DrawnMechanism,
+    locked: Sequence[str],
+    moved: Sequence[str],
+    error: AssemblyError,
 ) -> None:
     worst = next(
         (name for name in (*drawn.closed, *(j.path for j in drawn.joints)) if f"'{name}'" in error.what), ""
     )
     gap = f"; the largest gap is {error.gaps[worst]}" if worst in error.gaps else ""
     what = f"the mechanism cannot be assembled: its loop does not close at this joint{gap}"
+    if moved:
+        raise DiagramError(
+            f"the loops of the mechanism cannot reach the start of the motion input at {_listed(moved)}{gap}",
+            where=net.label(moved[0]),
+            allowed="motion inputs that start where all joints of the loops can be assembled",
+            fix="let the motion start elsewhere, correct the transforms of the loop, or start with targets "
+            "of the other joints nearer to the assembled pose",
+        ) from error
     if locked:
         what = f"the position targets of high priority, at {_listed(locked)}, cannot be met together{gap}"
     raise DiagramError(

@@ -59,13 +59,34 @@ def first_invalid_signal(
 
 def _signal_error(system: CompiledSystem, place: int, value: float, time: float) -> SimulationError:
     name = element_name(system.signals_layout, place)
-    block = name.split("[")[0].rpartition("/")[0]
+    known = _known_failure(system, name, time)
+    if known:
+        return known
+    block = _block_of(name)
     return SimulationError(
         f"signal '{name}' is {value} at {time:.9g} s",
         where=system.name,
         allowed="finite numbers; every signal before it in evaluation order is finite",
         fix=f"check block '{block}': a division by zero, a root or logarithm of a negative number, an "
         "overflow, or an algebraic loop through it that has become singular",
+    )
+
+
+def _block_of(name: str) -> str:
+    """The block of an element of a signal or state: ``arm`` of ``arm/q[2]``."""
+    return name.split("[")[0].rpartition("/")[0]
+
+
+def _known_failure(system: CompiledSystem, name: str, time: float) -> SimulationError | None:
+    """The error for a signal or state that can be invalid for a reason that its block states."""
+    reason = system.reasons_of_invalid_values().get(_block_of(name))
+    if not reason:
+        return None
+    return SimulationError(
+        f"{reason}, at {time:.9g} s",
+        where=system.name,
+        allowed="finite numbers in all signals",
+        fix="change the input, or the part of the diagram that the message names",
     )
 
 
@@ -116,6 +137,9 @@ def integration_failure(system: CompiledSystem, run: Integration, p: Array) -> S
     derivative = system.derivative(time, state, point.z, run.trial_unknowns, p)
     place = int(np.argmin(np.isfinite(derivative)))
     name = element_name(system.states, place)
+    known = _known_failure(system, name, time)
+    if known:
+        return known
     return SimulationError(
         f"the derivative of state '{name}' is not finite at {time:.9g} s, where it is {state[place]:.6g}",
         where=system.name,
@@ -188,6 +212,9 @@ def _step_too_small(system: CompiledSystem, run: Integration) -> SimulationError
         f"'{element_name(system.states, int(i))}' ({errors[i]:.3g})" for i in worst if errors[i] > 0
     )
     name = element_name(system.states, int(worst[0]))
+    known = _known_failure(system, name, run.time)
+    if known:
+        return known
     return SimulationError(
         f"the step became as small as the rounding of the time at {run.time:.9g} s, and the error is still "
         f"too large; its largest components, relative to the tolerance: {share}; "
@@ -201,6 +228,9 @@ def _step_too_small(system: CompiledSystem, run: Integration) -> SimulationError
 def _minimum_step(system: CompiledSystem, run: Integration) -> SimulationError:
     name = element_name(system.states, int(np.argmax(run.weighted_changes())))
     left = (run.stop - run.time) / run.last_step
+    known = _known_failure(system, name, run.time)
+    if known:
+        return known
     needs_jacobian = run.integrator.tableau.needs_jacobian
     stiff = "" if needs_jacobian else f"; if it is stiff, solver='{STIFF.name}'"
     return SimulationError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, ClassVar
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from armblocks.diagram import Block, FramePort, Parameter, ParameterKind, Port, parameter, shape_of
 from armblocks.errors import InputError, counted
+from armblocks.multibody.driven_joints import motion_input_port, motion_name
 from armblocks.multibody.gathering import gather_mechanisms
 from armblocks.multibody.joint_states import common_unit, force_unit, motion_ports
 from armblocks.multibody.parts import BASE, FOLLOWER, JointPart, Targets
@@ -20,7 +21,7 @@ from armblocks.robot.joints import AxisMotion, Motion
 from armblocks.spatial import Transform
 
 PRIORITIES = ("low", "high", "none")
-ACTUATIONS = ("none", "torque")
+ACTUATIONS = ("none", "torque", "motion")
 NOT_TUNABLE_WITH_BALL = ("spring_stiffness", "equilibrium_position", "position_target")
 
 
@@ -123,7 +124,16 @@ class JointBlock(Block):
         doc="penetration within which the force of a limit grows smoothly",
         unit="rad",
     )
-    actuation: str = parameter("none", choices=ACTUATIONS, doc="torque: an input for torques or forces")
+    actuation: str = parameter(
+        "none",
+        choices=ACTUATIONS,
+        doc="torque: an input for torques or forces; motion: an input for the coordinates",
+    )
+    moved: str = parameter(
+        "",
+        doc="coordinates with a motion input, separated by commas; the others are free (actuation motion) "
+        "or have torques (actuation torque); empty: the actuation applies to all coordinates",
+    )
     sense_position: bool = parameter(False, doc="output q of the coordinates")
     sense_velocity: bool = parameter(False, doc="output qd of the speeds")
     sense_acceleration: bool = parameter(False, doc="output qdd of the accelerations")
@@ -157,6 +167,7 @@ class JointBlock(Block):
             )
         if part.nq != part.nv:
             self._check_ball_values(part)
+        self._check_moved(part)
 
     def _check_ball_values(self, part: JointPart) -> None:
         target = np.asarray(self.position_target)
@@ -206,7 +217,14 @@ class JointBlock(Block):
         )
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (self._force_port("tau", "torque or force on the follower"),) * (self.actuation == "torque")
+        part = self._part_without_targets()
+        ports: list[Port] = []
+        if part.has_motion_input:
+            ports.append(motion_input_port(part))
+        if "torque" in part.actuation:
+            driven = [k for k, kind in enumerate(part.actuation) if kind == "torque"]
+            ports.append(self._force_port("tau", "torque or force on the follower", driven))
+        return tuple(ports)
 
     def output_ports(self) -> tuple[Port, ...]:
         q, qd, qdd = motion_ports(self._part_without_targets())
@@ -218,11 +236,40 @@ class JointBlock(Block):
         )
         return tuple(port for chosen, port in sensed if chosen)
 
-    def _force_port(self, name: str, doc: str) -> Port:
+    def _force_port(self, name: str, doc: str, driven: Sequence[int] | None = None) -> Port:
         part = self._part_without_targets()
-        names = tuple(entry.name for motion in part.motions for entry in motion.speeds)
-        shape = () if part.nv == 1 else (part.nv,)
-        return Port(name, doc, force_unit(common_unit(part)), shape, names if shape else ())
+        speeds = [entry for motion in part.motions for entry in motion.speeds]
+        chosen = speeds if driven is None else [speeds[k] for k in driven]
+        units = {entry.unit for entry in chosen}
+        unit = force_unit(units.pop()) if len(units) == 1 else ""
+        names = tuple(entry.name for entry in chosen) if part.nv > 1 else ()
+        return Port(name, doc, unit, (len(chosen),) if names else (), names)
+
+    def _moved_motions(self, motions: Sequence[Motion]) -> list[bool]:
+        """For each elementary motion, whether it is an input."""
+        names = [name.strip() for name in self.moved.split(",") if name.strip()]
+        if self.actuation == "none" or not names:
+            return [self.actuation == "motion"] * len(motions)
+        return [motion_name(motion) in names for motion in motions]
+
+    def _check_moved(self, part: JointPart) -> None:
+        names = [name.strip() for name in self.moved.split(",") if name.strip()]
+        where, allowed = f"{self.type_name()}.moved", [motion_name(motion) for motion in part.motions]
+        for name in names:
+            if name not in allowed or len(allowed) == 1:
+                raise InputError(
+                    f"the joint has no coordinate '{name}'",
+                    where=where,
+                    allowed="an empty text" if len(allowed) == 1 else ", ".join(allowed),
+                    fix="correct the name, or leave moved empty to move all coordinates",
+                )
+        if names and self.actuation == "none":
+            raise InputError(
+                f"moved names '{names[0]}', but the actuation is {self.actuation}",
+                where=where,
+                allowed="coordinates of a joint with the actuation motion or torque",
+                fix="change the actuation, or leave moved empty",
+            )
 
     # -- the joint of the mechanism
 
@@ -254,11 +301,18 @@ class JointBlock(Block):
             closure=self.closure,
             closure_frames=self.closure_frames,
             needs_coordinate=self._needs_coordinate(),
-            actuation=(self.actuation,) * part.nv,
+            actuation=part.actuation,
         )
 
     def _part_without_targets(self) -> JointPart:
-        return JointPart(motions=self.elementary_motions(), targets=Targets(q=(), qd=()))
+        motions = self.elementary_motions()
+        others = "torque" if self.actuation == "torque" else "none"
+        actuation = [
+            "motion" if moved else others
+            for motion, moved in zip(motions, self._moved_motions(motions))
+            for _ in motion.speeds
+        ]
+        return JointPart(motions=motions, targets=Targets(q=(), qd=()), actuation=tuple(actuation))
 
     def _needs_coordinate(self) -> bool:
         """Whether a value of a parameter has no meaning for a joint without coordinates."""
