@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -34,9 +35,10 @@ from armblocks.blocks import (
     SineWave,
     SixDofJoint,
 )
-from armblocks.diagram import Block, Diagram, trace_diagram
+from armblocks.diagram import Block, Diagram, trace_diagram, with_parameters
 from armblocks.dynamics.mechanism import mechanism
 from armblocks.errors import DiagramError, InputError, SimulationError
+from armblocks.face.diagram_run import tuned_parameters
 from armblocks.robot import Robot
 from armblocks.robot.joints import Joint, Spherical
 
@@ -86,13 +88,28 @@ def drive(drawing: Drawing, name: str, joint: Joint, qdd: Array, moved: str = ""
         drawing.wires.append((f"{name} tau/y", f"{name}/tau"))
 
 
-def signals(diagram: Diagram) -> dict[str, Array]:
-    """The signals at the start by path."""
+def signals(diagram: Diagram, tuned: Mapping[str, Any] | None = None) -> dict[str, Array]:
+    """The signals at the start by path; ``tuned``: other parameters, without other equations."""
     system = trace_diagram(diagram)
-    p = system.parameter_values
+    p = system.parameter_values.copy()
+    changed = tuned_parameters(diagram, with_parameters(diagram, dict(tuned or {})))
+    assert changed is not None
+    for name, value in changed.items():
+        p[system.parameters.ranges[name]] = np.ravel(value)
     (x,), (z,) = system.initial_states(p), system.initial_discrete(p)
     (values,) = system.signals(0.0, x, z, (), p)
     return {slot: values[part] for slot, part in system.signals_layout.ranges.items()}
+
+
+def heavier(robot: Robot) -> tuple[Robot, dict[str, Any]]:
+    """A robot with other masses and moments, and the parameters of the drawn bodies."""
+    links = [
+        replace(link, mass=(1.3 + 0.2 * k) * link.mass, inertia=np.add(link.inertia, 0.03 * np.eye(3)))
+        for k, link in enumerate(robot.links)
+    ]
+    tuned = {f"{link.name} body.mass": link.mass for link in links}
+    tuned |= {f"{link.name} body.moments": np.diag(link.inertia) for link in links}
+    return replace(robot, links=tuple(links)), tuned
 
 
 def motion_of(drawing: Drawing, found: dict[str, Array], q: dict[str, Array], port: str) -> Array:
@@ -108,7 +125,7 @@ def motion_of(drawing: Drawing, found: dict[str, Array], q: dict[str, Array], po
 def test_the_torques_of_drives_cause_the_given_motion_of_the_same_robot(
     seed: int, letters: str, driven: str
 ) -> None:
-    """Forward dynamics of the robot under the torques of drives and the other torques."""
+    """Forward dynamics of the robot under the torques of drives and all others, also with tuned masses."""
     random = np.random.default_rng(seed)
     links = [
         random_link(random, f"j{k}", None if k == 0 else f"j{random.integers(k)}", TYPES[letter][0]())
@@ -124,20 +141,21 @@ def test_the_torques_of_drives_cause_the_given_motion_of_the_same_robot(
     for k, moved in chosen:
         given[f"j{k}"] = random.normal(size=links[k].joint.nv)
         drive(drawing, f"j{k}", links[k].joint, given[f"j{k}"], moved)
-    found = signals(drawing.diagram())
-    by_joint = {name: state[0] for name, state in states.items()}
-    qdd, tau = (motion_of(drawing, found, by_joint, port) for port in ("qdd", "actuator"))
+    diagram, by_joint = drawing.diagram(), {name: state[0] for name, state in states.items()}
     q, qd = (np.concatenate([states[link.name][k] for link in links]) for k in range(2))
-    (expected,) = dynamics.trace_accel(robot)(q, qd, tau)
-    np.testing.assert_allclose(qdd, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
-    first = 0
-    for link in links:
-        if link.name in given:
-            moved = dict(chosen)[int(link.name[1:])]
-            places = [k for k, key in enumerate(("px", "py", "rz")) if key in moved] or range(link.joint.nv)
-            for k in places:
-                assert qdd[first + k] == pytest.approx(given[link.name][k], abs=1e-12)
-        first += link.joint.nv
+    for of_values, tuned in ((robot, {}), heavier(robot)):
+        found = signals(diagram, tuned)
+        qdd, tau = (motion_of(drawing, found, by_joint, port) for port in ("qdd", "actuator"))
+        (expected,) = dynamics.trace_accel(of_values)(q, qd, tau)
+        np.testing.assert_allclose(qdd, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+        first = 0
+        for link in links:
+            if link.name in given:
+                moved = dict(chosen)[int(link.name[1:])]
+                places = [k for k, key in enumerate(("px", "py", "rz")) if key in moved]
+                for k in places or range(link.joint.nv):
+                    assert qdd[first + k] == pytest.approx(given[link.name][k], abs=1e-12)
+            first += link.joint.nv
 
 
 def drawn_four_bar(motion: Block | None, **crank: Any) -> tuple[Drawing, Robot, Array]:
@@ -164,6 +182,15 @@ def drawn_four_bar(motion: Block | None, **crank: Any) -> tuple[Drawing, Robot, 
     return drawing, robot, q
 
 
+def driven_arm(robot: Robot, motion: Block, q: Array) -> Diagram:
+    """A four-bar as a robot with the given motion of its crank."""
+    builder = ab.DiagramBuilder("arm")
+    torques = builder.add("tau", Constant(value=(0.0, 0.0)))
+    vector = builder.add("vector", Gain(gain=(1.0,)), builder.add("motion", motion))
+    builder.add("arm", PositionDrivenArm(robot=robot, joints="bar0", q0=q.tolist()), vector, torques)
+    return builder.build()
+
+
 def test_a_loop_moves_as_the_arm_with_given_positions_and_stays_closed() -> None:
     """Drawn four-bar and PositionDrivenArm; the crank has no target, its start follows from the input."""
     motion = Ramp(slope=3.0, initial=1.0)
@@ -171,17 +198,16 @@ def test_a_loop_moves_as_the_arm_with_given_positions_and_stays_closed() -> None
     settings: Any = {"stop_time": 1.5, "sample_time": 0.05, "rtol": 1e-9, "atol": 1e-10}
     drawn = ab.simulate(drawing.diagram(), **settings)
     q = mechanism(robot).assembled(np.array([1.0, -0.5, -1.5]), ["bar0"])
-    builder = ab.DiagramBuilder("arm")
-    torques = builder.add("tau", Constant(value=(0.0, 0.0)))
-    vector = builder.add("vector", Gain(gain=(1.0,)), builder.add("motion", motion))
-    arm = PositionDrivenArm(robot=robot, joints="bar0", q0=q.tolist())
-    builder.add("arm", arm, vector, torques)
-    expected = ab.simulate(builder.build(), **settings)
+    expected = ab.simulate(driven_arm(robot, motion, q), **settings)
     sign = -1.0 if drawing.flipped["bar0"] else 1.0
     np.testing.assert_allclose(sign * drawn["bar0/actuator"], expected["arm/drive"][:, 0], atol=1e-6)
     for k in (1, 2):
         other = -1.0 if drawing.flipped[f"bar{k}"] else 1.0
         np.testing.assert_allclose(other * drawn[f"bar{k}/q"], expected["arm/q"][:, k], atol=1e-7)
+    other_robot, tuned = heavier(robot)
+    at_start = signals(driven_arm(other_robot, motion, q))["arm/drive"]
+    assert abs(at_start[0] - expected["arm/drive"][0, 0]) > 0.5
+    np.testing.assert_allclose(sign * signals(drawing.diagram(), tuned)["bar0/actuator"], at_start, rtol=1e-9)
 
 
 def test_the_drive_of_a_pendulum_overcomes_inertia_gravity_spring_and_damper() -> None:
