@@ -128,14 +128,33 @@ def test_mstraj_has_the_rows_of_the_toolbox(tacc: float, by_time: bool) -> None:
     ends = (np.zeros(3), np.zeros(3)) if tacc == 0.0 else RANDOM.uniform(-0.2, 0.2, (2, 3))
     mode = (None, durations) if by_time else (speeds, None)
     motion = ab.mstraj(points, *mode, start, dt, tacc, *ends)
+    if not tacc:  # without blends armblocks rounds up to multiples of dt, so that the points are reached
+        durations[1] = 1.55
     expected = mstraj_by_rows(start, points, dt, tacc, *mode, *ends)
     assert_array_equal(motion.q[0], start)
     assert_allclose(motion.q[1:], expected, rtol=0, atol=1e-12)
     assert_allclose(motion.t, dt * np.arange(len(expected) + 1), rtol=1e-14)
-    if tacc:  # without blends the position jumps where a duration is not a multiple of dt
-        assert_allclose(motion(motion.t).q, motion.q, atol=1e-14)
-    assert_allclose(motion.q[-1], points[-1] if tacc else expected[-1], atol=1e-12)
+    assert_allclose(motion(motion.t).q, motion.q, atol=1e-14)
+    assert_allclose(motion.q[-1], points[-1], atol=1e-12)
     assert_array_equal(ab.mstraj([start, *points], *mode, None, dt, tacc, *ends).q, motion.q)
+
+
+def test_mstraj_is_continuous_and_ends_at_the_last_point() -> None:
+    """Random times, blends (also none at some points), sample times and directions."""
+    for _ in range(150):
+        K, n, dt = int(RANDOM.integers(1, 5)), int(RANDOM.integers(1, 4)), RANDOM.uniform(0.01, 0.3)
+        start, points = RANDOM.normal(size=n), RANDOM.normal(size=(K, n)) * (RANDOM.random((K, 1)) < 0.9)
+        durations, speeds = RANDOM.uniform(0.02, 2.0, K), RANDOM.uniform(0.3, 2.0, n)
+        blends = RANDOM.uniform(0, 1, K) * durations * (RANDOM.random(K) < 0.6)
+        for mode in ((None, durations), (speeds, None)):
+            motion = ab.mstraj(points, *mode, start, dt, blends)
+            assert_allclose(motion.q[-1], points[-1], rtol=0, atol=1e-12)
+            assert_allclose(np.diff(motion.t), dt, rtol=1e-9)
+            knots = motion.curve.times  # both one-sided limits at the ends of the pieces
+            assert_allclose(motion.curve.at(knots, "left").q, motion.curve.at(knots).q, rtol=0, atol=1e-12)
+            assert_allclose(knots[-1], motion.t[-1], rtol=1e-12, atol=1e-15)
+            if mode[1] is not None and not blends.any():
+                assert len(motion.t) == np.ceil(durations / dt).sum() + 1
 
 
 def test_ctraj_moves_on_a_straight_line_and_rotates_about_one_axis() -> None:

@@ -161,6 +161,10 @@ def mstraj(
     least two blends, and its speed is the distance between the points divided by its duration. The table
     includes the start, which the toolbox omits. A duration that is a multiple of ``dt`` up to rounding is not
     lengthened.
+
+    The last row is the last point, and positions do not jump. For this, a segment that no blend follows takes
+    a multiple of ``dt`` also for given ``tsegment`` (rounded up) and ends at its point. The toolbox ends such
+    a segment, and then the motion, before its point.
     """
     via = via_points("points", points, "mstraj", least=1 if q0 is not None else 2)
     start, via = (via[0], via[1:]) if q0 is None else (joint_vector("q0", q0, "mstraj"), via)

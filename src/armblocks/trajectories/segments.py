@@ -2,6 +2,11 @@
 
 Source: P. Corke, Robotics Toolbox for MATLAB, releases 9 and 10, ``mstraj``; Robotics, Vision and Control,
 2017, 3.3.3. As in the toolbox, durations are rounded up to multiples of the sample time.
+
+Where no blend follows a segment, the toolbox ends the segment before its point: at the last sample time of
+the given duration, or half of a blend too early. The position then jumps, or the motion ends before the last
+point. Here such a segment ends exactly at its point, and its duration is rounded up to a multiple of the
+sample time.
 """
 
 from __future__ import annotations
@@ -39,7 +44,8 @@ def multi_segment(
 ) -> SegmentMotion:
     """The motion from ``start`` (n,) past ``points`` (K, n) with blends of the durations (K,), s.
 
-    Either the greatest ``speeds`` (n,) of the joints or the ``durations`` (K,) of the segments are given.
+    Either the greatest ``speeds`` (n,) of the joints or the ``durations`` (K,) of the segments are given. The
+    motion is continuous and ends at the last point.
     """
     parts: list[PiecewisePolynomial] = []
     q, previous, qd = start, start, qd0
@@ -47,6 +53,7 @@ def multi_segment(
     for k, (point, requested) in enumerate(zip(points, blends)):
         blend, half = _steps(requested, dt), _steps(requested / 2.0, dt)
         first = half if k == 0 else blend
+        is_blended = _steps(blends[min(k + 1, len(blends) - 1)], dt) > 0  # the end of this segment
         change = point - previous
         if speeds is not None:
             steps = first + max(_steps(longest, dt) for longest in np.abs(change) / speeds)
@@ -54,17 +61,22 @@ def multi_segment(
         else:
             assert durations is not None
             duration = float(durations[k])
+            if not is_blended:
+                duration = _steps(duration, dt) * dt
         arrivals.append(clock * dt + duration + (half * dt if k else 0.0))
         velocity = change / duration
         if first:
             target = previous + half * dt * velocity
             parts.append(quintic(q, target, first * dt, qd, velocity))
             clock, q = clock + first, target
-        linear = math.floor((duration / dt - 2 * half) * (1.0 + 1e-12))
+        blended_ends = 2 if is_blended else 1
+        linear = math.floor((duration / dt - blended_ends * half) * (1.0 + 1e-12))
         if linear > 0:
             begin = previous + half * dt * velocity
             parts.append(_linear(begin, velocity, linear * dt))
             clock, q = clock + linear, begin + linear * dt * velocity
+        if not is_blended:
+            arrivals[-1] = clock * dt
         previous, qd = point, velocity
     half = _steps(blends[-1] / 2.0, dt)
     if half:
