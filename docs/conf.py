@@ -1,5 +1,6 @@
 """Configuration of Sphinx. Importing this module generates the pages that describe the code."""
 
+import gc
 import os
 import sys
 from pathlib import Path
@@ -8,6 +9,8 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 # The worked example of each block runs once, so optimised compilation would take longer than it saves.
 os.environ.setdefault("ARMBLOCKS_EFFORT", "little")
+# Most objects live until the end. By default, garbage collection takes a seventh of the processor time.
+gc.set_threshold(100_000, 10, 1000)
 
 from generated_pages import write_generated_pages  # noqa: E402
 from name_links import link_names  # noqa: E402
