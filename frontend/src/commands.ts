@@ -1,7 +1,7 @@
 import { align, comment, distribute, flip, ground, group, rotate, selectedBlocks } from './canvas/arranging'
 import { rename } from './canvas/block_node'
 import { copy, cut, duplicate, paste } from './canvas/clipboard'
-import { addNote, sheetView, ZOOM_STEP } from './canvas/sheet_actions'
+import { addNote, sheetView, showSelection, ZOOM_STEP } from './canvas/sheet_actions'
 import {
   openBookmarks,
   openConfiguration,
@@ -114,6 +114,13 @@ const COMMANDS: Command[] = [
     run: () => comment('through'),
   },
   { title: 'Ground and terminate unconnected ports', run: ground },
+  {
+    title: 'Delete and connect the neighbours',
+    keys: 'Ctrl+Delete, Ctrl+Backspace',
+    sheetOnly: true,
+    enabled: hasBlocks,
+    run: () => void import('./canvas/selected_connections').then((actions) => actions.removeAndReconnect()),
+  },
   { title: 'Duplicate', keys: 'Ctrl+D', sheetOnly: true, enabled: hasSelection, run: () => void duplicate() },
   { title: 'Copy', keys: 'Ctrl+C', sheetOnly: true, enabled: hasSelection, run: () => void copy() },
   { title: 'Cut', keys: 'Ctrl+X', sheetOnly: true, enabled: hasSelection, run: () => void cut() },
@@ -140,6 +147,7 @@ const COMMANDS: Command[] = [
   { title: 'Zoom in', keys: '+', run: () => sheetView.zoom?.(ZOOM_STEP) },
   { title: 'Zoom out', keys: '-', run: () => sheetView.zoom?.(1 / ZOOM_STEP) },
   { title: 'Show the sheet at 100 %', keys: '1', run: () => sheetView.zoom?.(null) },
+  { title: 'Zoom to the selection', keys: '2', run: showSelection },
   { title: 'Bookmark this view', keys: 'Ctrl+B', run: () => openBookmarks('add') },
   { title: 'Bookmarks of views', keys: 'Ctrl+Shift+B', run: () => openBookmarks() },
   { title: 'Light theme', run: () => setTheme('light') },

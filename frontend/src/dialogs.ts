@@ -1,4 +1,5 @@
 import { create } from 'zustand'
+import type { Wire } from './protocol'
 import { ask, useStudio } from './store'
 
 /**
@@ -36,8 +37,8 @@ interface Dialogs {
   ownsVisibleSheet: boolean
   /** Position of a new block, screen px; `null` selects a free position. */
   at: { x: number; y: number } | null
-  /** The port to which a new block is connected. */
-  connectTo: { port: string; isOutput: boolean } | null
+  /** The port to which a new block is connected, and the wires that this connection replaces. */
+  connectTo: { port: string; isOutput: boolean; instead?: Wire[] } | null
 }
 
 /**

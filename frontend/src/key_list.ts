@@ -25,6 +25,7 @@ export const KEYS: KeyGroup[] = [
       ['+, =', 'Zoom in'],
       ['-', 'Zoom out'],
       ['1', 'Show the sheet at 100 %'],
+      ['2', 'Zoom to the selection'],
       ['?', 'Show this list'],
     ],
   },
@@ -34,6 +35,9 @@ export const KEYS: KeyGroup[] = [
     keys: [
       ['Shift+drag', 'Disconnect a block and connect its neighbours'],
       ['Ctrl+drag, right drag', 'Duplicate blocks at the pointer; from a wire: branch'],
+      ['Shift+click', 'Add a block or wire to the selection, or remove it'],
+      ['Ctrl+click', 'Select a further block, and connect it to the selected block'],
+      ['drag the end of a wire', 'Connect the wire to another input'],
       ['right click, Menu key', 'Commands on a block, wire, port, chart, the sheet or the arm'],
       ['Alt while dragging', 'Do not align the block with others'],
       ['drag a corner', 'Resize the selected block'],

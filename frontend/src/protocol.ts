@@ -151,7 +151,7 @@ export interface Change {
     | UpdatePose;
 }
 /**
- * Add blocks and connect them: insert, paste and duplicate.
+ * Add blocks and connect them; without blocks, only add wires.
  *
  * ``instead``: wires that are removed, for example the wire on which a block is dropped.
  */
@@ -276,11 +276,14 @@ export interface CommentBlocks {
 }
 /**
  * Add a wire. With ``replace`` the present wire of the input is removed.
+ *
+ * ``instead``: wires that are removed, for example the wire whose end is moved to another input.
  */
 export interface Connect {
   kind: "connect";
   wire: Wire;
   replace?: boolean;
+  instead?: Wire[];
 }
 /**
  * Interpret the D-H rows in another convention, or with ``keep_arm`` convert them for the same arm.
@@ -460,12 +463,15 @@ export interface RecordPose {
 }
 /**
  * Remove blocks, wires and notes; the wires of the removed blocks are removed with them.
+ *
+ * ``reconnections``: wires that are added between the former neighbours of the removed blocks.
  */
 export interface RemoveBlocks {
   kind: "remove";
   blocks?: string[];
   wires?: Wire[];
   notes?: string[];
+  reconnections?: Wire[];
 }
 /**
  * Remove a bookmark of the sheet.

@@ -21,11 +21,12 @@ import { alteration, ask, openSheet, useStudio } from '../store'
 import { sheetKey } from '../documents/document_views'
 import { selectedBlocks } from './arranging'
 import { BlockNode } from './block_node'
+import { useClicks } from './clicks'
 import { connect, endConnection, isConnectable, startConnection } from './connecting'
 import { DragPreview, useDraggedCopies } from './drag_preview'
 import { GRID } from './insert'
 import { NoteNode } from './note_node'
-import { useRightButton } from './right_button'
+import { usePointerDrags } from './pointer_buttons'
 import { openBlock } from './sheet_actions'
 import { dragHandlers, dropHandlers, useSheetDrag, type SheetDrag } from './sheet_drag'
 import { useSheetDrawing } from './sheet_drawing'
@@ -138,6 +139,7 @@ function Sheet({ sheetKey }: { sheetKey: string }) {
   const [selectedWires, setSelectedWires] = useState<ReadonlySet<string>>(new Set())
   const sheetDrag = useSheetDrag(blocks, notes)
   const { graph, nodes, edges, lines } = useSheetDrawing(sheetDrag, selectedWires)
+  const { press, notePress, ...clicks } = useClicks(selectedWires, setSelectedWires)
   useCentredBlock(sheet, flow, blocks)
   useSheetKeys(selectedWires, setSelectedWires)
   const empty = Object.keys(blocks).length === 0 && Object.keys(notes).length === 0
@@ -146,16 +148,14 @@ function Sheet({ sheetKey }: { sheetKey: string }) {
     onNodesChange: (changes: NodeChange<SheetNode>[]) => nodesChanged(changes, graph, sheetDrag),
     onEdgesChange: (changes: EdgeChange<WireEdgeType>[]) =>
       setSelectedWires(selectionAfter(changes, selectedWires)),
-    ...dragHandlers(sheetDrag, blocks, notes, wires, edges, flow.getZoom),
-    onNodeClick: (event: React.MouseEvent, node: SheetNode) => {
-      if (selectOnly(event, node.id)) setSelectedWires(new Set())
-    },
+    ...dragHandlers({ ...sheetDrag, press }, blocks, notes, wires, edges, flow.getZoom),
+    ...clicks,
     onNodeDoubleClick: (_: unknown, node: SheetNode) => node.type === 'block' && openBlock(node.data.block),
     onConnectStart: startConnection,
     onConnect: connect,
     onConnectEnd: endConnection,
   })
-  const rightButton = useRightButton(flow, edges, setSelectedWires)
+  const pointer = usePointerDrags(flow, edges, notePress, setSelectedWires)
   const selectedEdge = selectedWires.size === 1 ? edges.find(({ selected }) => selected) : undefined
   return (
     <div
@@ -163,7 +163,7 @@ function Sheet({ sheetKey }: { sheetKey: string }) {
       ref={sheet}
       onFocus={selectFocused}
       {...dropHandlers(sheetDrag.setTargetWire, flow, wires, edges)}
-      {...rightButton}
+      {...pointer}
     >
       <ArrowMarkers />
       <ReactFlow<SheetNode, WireEdgeType>
@@ -229,22 +229,14 @@ function insertAt(event: React.MouseEvent): void {
     showDialog('insert', '', { x: event.clientX, y: event.clientY })
 }
 
-/** Select only the clicked one of several selected blocks; returns whether the selection has changed. */
-function selectOnly({ ctrlKey, metaKey, shiftKey }: React.MouseEvent, id: string): boolean {
-  const { selection, select } = useStudio.getState()
-  if (ctrlKey || metaKey || shiftKey || selection.size < 2) return false
-  select([id])
-  return true
-}
-
-/** Show copies of the dragged blocks at the dragged positions; the blocks themselves are not moved. */
-function showCopies(places: Places): void {
+/** Show copies of blocks at the dragged positions; the blocks themselves are not moved. */
+function showCopies(names: readonly string[], places: Places): void {
   const { document } = useStudio.getState()
-  const [first] = Object.keys(places)
+  const first = names.find((name) => places[name])
   const original = document?.blocks[first!]?.place ?? document?.notes[first!]
   if (!original) return
   const { x, y } = places[first!]!
-  useDraggedCopies.setState({ names: Object.keys(places), shift: [x - original.x, y - original.y] })
+  useDraggedCopies.setState({ names, shift: [x - original.x, y - original.y] })
 }
 
 function nodesChanged(
@@ -264,7 +256,7 @@ function nodesChanged(
       graph.measured.set(nodeChange.id, nodeChange.dimensions)
   }
   const names = effect.current.cancelled ? [] : Object.keys(places)
-  if (names.length && effect.current.duplicates) showCopies(places)
+  if (names.length && effect.current.duplicated) showCopies(effect.current.duplicated, places)
   else if (names.length) setDrag((now) => ({ ...now, ...places }))
   if (selected) useStudio.getState().select(selected)
 }

@@ -1,7 +1,8 @@
 import type { Connection, Edge, FinalConnectionState } from '@xyflow/react'
 import { showDialog } from '../dialogs'
 import { freePort } from '../model/free_port'
-import { blockOf, isFrame, mixedKinds, portOf, sameKind } from '../model/wires'
+import { blockOf, isFrame, mixedKinds, portOf, sameKind, wireKey } from '../model/wires'
+import type { Wire } from '../protocol'
 import { change, refuse, useStudio } from '../store'
 import { onEscape } from './pointer_drag'
 
@@ -60,22 +61,27 @@ function isLeftFrame(port: string): boolean {
 
 /**
  * End a new wire at a point of the window. On the body of a block, connect the wire to the first free port.
- * On the empty sheet, the list of blocks opens and the chosen block is connected.
+ * On the empty sheet, the list of blocks opens and the chosen block is connected. The wire replaces the wires
+ * `instead`.
  */
-export function connectAt(at: { x: number; y: number }, port: string, isOutput: boolean): void {
+export function connectAt(
+  at: { x: number; y: number },
+  port: string,
+  isOutput: boolean,
+  instead: Wire[] = [],
+): void {
   const { document } = useStudio.getState()
   if (!document) return
   const element = window.document.elementFromPoint(at.x, at.y)
   const nodeName = element?.closest('.react-flow__node')?.getAttribute('data-id')
   if (nodeName) {
     const block = port.startsWith(`${nodeName}/`) ? undefined : document.blocks[nodeName]
-    const other = block && freePort(block, isOutput, document.wires, isFrame(document.blocks, port))
-    if (block && !other && freePort(block, isOutput, document.wires, !isFrame(document.blocks, port)))
-      refuse(mixedKinds(port, nodeName))
-    if (other)
-      void change({
-        kind: 'connect',
-        wire: isOutput ? { source: port, target: other } : { source: other, target: port },
-      })
-  } else if (element?.closest('.canvas')) showDialog('insert', '', at, { port, isOutput })
+    const replaced = new Set(instead.map(wireKey))
+    const remaining = document.wires.filter((wire) => !replaced.has(wireKey(wire)))
+    const frame = isFrame(document.blocks, port)
+    const other = block && freePort(block, isOutput, remaining, frame)
+    if (block && !other && freePort(block, isOutput, remaining, !frame)) refuse(mixedKinds(port, nodeName))
+    const wire = isOutput ? { source: port, target: other ?? '' } : { source: other ?? '', target: port }
+    if (other && !replaced.has(wireKey(wire))) void change({ kind: 'connect', wire, instead })
+  } else if (element?.closest('.canvas')) showDialog('insert', '', at, { port, isOutput, instead })
 }

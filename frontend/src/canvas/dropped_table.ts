@@ -4,11 +4,6 @@ import { ask, refuse, useStudio } from '../store'
 import { withColumnNames } from './table_choice'
 import { insertBlock, sheetPointAt } from './insert'
 
-const SUFFIXES = /\.(csv|npz|mat|parquet)$/i
-
-/** Whether a file contains a table of measurements, by its name. */
-export const isTable = (file: File): boolean => SUFFIXES.test(file.name)
-
 /** A dropped table whose file name is in use: the user decides whether to replace the file. */
 export interface DroppedTable {
   name: string
@@ -42,7 +37,7 @@ export async function addTableBlock(file: string, position: DroppedTable['at']):
   for (const blockType of useStudio.getState().library.values()) {
     const rule = blockType.parameters.find((parameter) => parameter.kind === 'table')
     if (!rule) continue
-    const stem = file.replace(/^.*\//, '').replace(SUFFIXES, '')
+    const stem = file.replace(/^.*\//, '').replace(/\.[^.]*$/, '')
     const choice = { file, time: '', columns: [] }
     const preview = await ask({ kind: 'preview_table', ...choice })
     const parameters = { [rule.name]: preview ? withColumnNames(choice, preview) : choice }

@@ -16,7 +16,7 @@ interface Insertion {
   /** y of the wire that enters the first input, px; the block is placed so that this wire is straight. */
   wireY?: number
   /** A port to which the block is connected; the point is then at the edge of the block. */
-  connectTo?: { port: string; isOutput: boolean }
+  connectTo?: { port: string; isOutput: boolean; instead?: Wire[] }
   /** Whether the view is moved so that the block is visible. */
   reveal?: boolean
   /** The values of its parameters that differ from the defaults. */
@@ -64,7 +64,7 @@ export async function insertBlock(
             { source: `${name}/${output}`, target: wire.target },
           ]
         : [],
-    instead: splitsWire ? [wire] : [],
+    instead: connectTo?.instead ?? (splitsWire ? [wire] : []),
   }).finally(() => awaitedNames.delete(name))
   if (version === undefined) return undefined
   selectIfUnchanged(selection, [name])

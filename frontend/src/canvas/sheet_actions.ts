@@ -27,6 +27,26 @@ export const sheetView: {
 /** Zoom factor of one key press. */
 export const ZOOM_STEP = 1.25
 
+/** Distance of the selection from the edge of the visible part, px of the sheet. */
+const AROUND_SELECTION = 30
+
+/** Zoom to the selected blocks and notes, or to all without a selection. */
+export function showSelection(): void {
+  const { document, selection } = useStudio.getState()
+  const boxes = [...selection].flatMap((name): Rectangle[] => {
+    const block = document?.blocks[name]
+    if (block) return [{ ...block.place, width: block.width, height: block.height }]
+    const note = document?.notes[name]
+    return note ? [{ ...note, width: 0, height: 0 }] : []
+  })
+  if (!boxes.length) return sheetView.fit?.()
+  const left = Math.min(...boxes.map(({ x }) => x)) - AROUND_SELECTION
+  const top = Math.min(...boxes.map(({ y }) => y)) - AROUND_SELECTION
+  const right = Math.max(...boxes.map(({ x, width }) => x + width)) + AROUND_SELECTION
+  const bottom = Math.max(...boxes.map(({ y, height }) => y + height)) + AROUND_SELECTION
+  sheetView.show?.({ x: left, y: top, width: right - left, height: bottom - top })
+}
+
 /** Start a note in the centre of the visible part. */
 export function addNote(): void {
   const view = sheetView.visible?.()

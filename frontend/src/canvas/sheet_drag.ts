@@ -12,6 +12,7 @@ import {
 import { wireKey, type Places } from '../model/wires'
 import type { SheetBlock, SheetNote, Wire } from '../protocol'
 import { useStudio } from '../store'
+import type { Press } from './clicks'
 import { duplicateAt } from './clipboard'
 import { clearCopies } from './drag_preview'
 import { alignment, useGuides } from './guides'
@@ -23,17 +24,17 @@ import type { WireEdgeType } from './wire_edge'
 
 /**
  * The effect of a drag on wires: names of disconnected blocks, and of an unconnected block that is inserted
- * into the wire on which it is dropped. `duplicates`: the drag duplicates the blocks. `cancelled`: Escape was
- * pressed; the blocks return to their positions.
+ * into the wire on which it is dropped. `duplicated`: the blocks and notes that the drag duplicates.
+ * `cancelled`: Escape was pressed; the blocks return to their positions.
  */
 interface DragEffect {
   disconnected: readonly string[]
   insertable: string | null
-  duplicates: boolean
+  duplicated: readonly string[] | null
   cancelled: boolean
 }
 
-const NO_EFFECT: DragEffect = { disconnected: [], insertable: null, duplicates: false, cancelled: false }
+const NO_EFFECT: DragEffect = { disconnected: [], insertable: null, duplicated: null, cancelled: false }
 
 /**
  * The state of a drag on a sheet: displaced blocks, blocks that change wires, and the wire into which a block
@@ -57,11 +58,15 @@ export function useSheetDrag(blocks: Record<string, SheetBlock>, notes: Record<s
 }
 
 export type SheetDrag = ReturnType<typeof useSheetDrag>
+/** The state of a drag, and the selection when the pointer was pressed. */
+type PressedDrag = SheetDrag & { press: { readonly current: Press } }
 
 /** The start of a drag: its effect on wires depends on the pressed keys; Escape cancels the drag. */
 function startDrag(
-  { effect, escape, setEffect, setTargetWire, setDrag }: SheetDrag,
+  { effect, escape, setEffect, setTargetWire, setDrag, press }: PressedDrag,
   { ctrlKey, metaKey, shiftKey, altKey }: MouseEvent | TouchEvent | React.MouseEvent,
+  pressed: SheetNode,
+  nodes: SheetNode[],
   dragged: SheetBlock[],
   wires: Wire[],
 ): void {
@@ -75,7 +80,9 @@ function startDrag(
     clearCopies()
   }, escape.current.signal)
   if (ctrlKey || metaKey) {
-    setEffect((effect.current = { ...NO_EFFECT, duplicates: true }))
+    // With Ctrl, React Flow has added the pressed block to the selection.
+    const duplicated = press.current.nodes.has(pressed.id) ? nodes.map(({ id }) => id) : [pressed.id]
+    setEffect((effect.current = { ...NO_EFFECT, duplicated }))
     return
   }
   const disconnected = shiftKey || altKey ? dragged.map(({ name }) => name) : []
@@ -90,7 +97,7 @@ function startDrag(
 
 /** The handlers of a drag of blocks on the sheet. */
 export function dragHandlers(
-  sheetDrag: SheetDrag,
+  sheetDrag: PressedDrag,
   blocks: Record<string, SheetBlock>,
   notes: Record<string, SheetNote>,
   wires: Wire[],
@@ -100,7 +107,7 @@ export function dragHandlers(
   const { effect, escape, setEffect, setTargetWire, setDrag } = sheetDrag
   /** Align the dragged blocks, unless Alt is pressed or the drag duplicates them. */
   const aligned = (event: MouseEvent | TouchEvent | React.MouseEvent, nodes: SheetNode[]) =>
-    event.altKey || effect.current.duplicates ? NOT_ALIGNED : alignment(nodes, blocks, zoom())
+    event.altKey || effect.current.duplicated ? NOT_ALIGNED : alignment(nodes, blocks, zoom())
   const whileDragging = (
     event: MouseEvent | TouchEvent | React.MouseEvent,
     node: SheetNode,
@@ -126,17 +133,16 @@ export function dragHandlers(
     const { dx, dy } = aligned(event, moved)
     useGuides.setState({ guides: [] })
     const positions = shifted(moved, dx, dy)
-    const { disconnected, insertable, duplicates } = effect.current
+    const { disconnected, insertable, duplicated } = effect.current
     effect.current = NO_EFFECT
-    if (duplicates) {
+    if (duplicated) {
       setEffect(NO_EFFECT)
       setDrag({})
       const original = blocks[node.id]?.place ?? notes[node.id]
       const offset =
         original && ([node.position.x - original.x, node.position.y - original.y] as [number, number])
-      const names = moved.map(({ id }) => id)
       clearCopies()
-      if (offset && (offset[0] || offset[1])) void duplicateAt(names, offset)
+      if (offset && (offset[0] || offset[1])) void duplicateAt(duplicated, offset)
       return
     }
     const remainingWires = disconnected.length
@@ -156,14 +162,14 @@ export function dragHandlers(
   return {
     onNodeDragStart: (
       event: MouseEvent | TouchEvent | React.MouseEvent,
-      _: SheetNode,
+      node: SheetNode,
       nodes: SheetNode[],
     ): void => {
       const dragged = blocksByName(
         blocks,
         nodes.map(({ id }) => id),
       )
-      startDrag(sheetDrag, event, dragged, wires)
+      startDrag(sheetDrag, event, node, nodes, dragged, wires)
     },
     onNodeDrag: whileDragging,
     onNodeDragStop: endDrag,

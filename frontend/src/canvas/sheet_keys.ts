@@ -5,7 +5,7 @@ import { change, openSheet, useStudio } from '../store'
 import { selectedBlocks } from './arranging'
 import { rename } from './block_node'
 import { editNote } from './note_node'
-import { addNote, moveNodes, openBlock, sheetView, ZOOM_STEP } from './sheet_actions'
+import { addNote, moveNodes, openBlock, sheetView, showSelection, ZOOM_STEP } from './sheet_actions'
 import { wireKey, type Places } from '../model/wires'
 import { isForSheet } from '../sheet_focus'
 
@@ -62,6 +62,7 @@ export function useSheetKeys(
     else if (event.key === '+' || event.key === '=') sheetView.zoom?.(ZOOM_STEP)
     else if (event.key === '-') sheetView.zoom?.(1 / ZOOM_STEP)
     else if (event.key === '1') sheetView.zoom?.(null)
+    else if (event.key === '2') showSelection()
     else if (event.key === 'Escape' && document.inside.length && !selection.size)
       openSheet(document.inside.slice(0, -1))
     else if (event.key === 'Escape') select([])

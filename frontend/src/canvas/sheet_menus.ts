@@ -10,7 +10,7 @@ import { selectedBlocks, setColour, setNameSide } from './arranging'
 import { pasteAt } from './clipboard'
 import { sheetPointAt } from './insert'
 import { editNote, createNote } from './note_node'
-import { nodeNameAt, wireKeyAt } from './right_button'
+import { nodeNameAt, wireKeyAt } from './pointer_buttons'
 import { hasChart } from './sheet_actions'
 import { removeSelected } from './sheet_keys'
 import { portSides } from './sheet_layout'
@@ -94,6 +94,7 @@ function blockEntries(document: OpenDocument, block: SheetBlock): Entries {
     commandEntry('Copy'),
     commandEntry('Duplicate'),
     { title: 'Delete', keys: 'Del', run: () => removeSelected(new Set()) },
+    commandEntry('Delete and connect the neighbours'),
     null,
     commandEntry('Rotate'),
     commandEntry('Flip'),

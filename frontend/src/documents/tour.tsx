@@ -32,6 +32,14 @@ const STOPS: Stop[] = [
       'names its signal. While you drag a block, thin lines show its alignment with others.',
   },
   {
+    at: '.sheet',
+    title: 'Wires without drawing',
+    text:
+      'Ctrl+click a block to connect the selected block to it; drag the end of a wire to another input. ' +
+      'Ctrl+Del deletes a block and connects its neighbours. Shift+click selects several blocks, ' +
+      '2 zooms to them.',
+  },
+  {
     at: '.palette',
     title: 'The library',
     text:

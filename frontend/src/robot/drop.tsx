@@ -1,11 +1,13 @@
 import { Text } from '@mantine/core'
 import { IconFileImport } from '@tabler/icons-react'
 import { useEffect, useState } from 'react'
-import { dropTable, isTable } from '../canvas/dropped_table'
 import { ask, refuse } from '../store'
 import './robot.css'
 
 const MAX_BYTES = 5 * 2 ** 20
+
+/** Whether a file contains a table of measurements, by its name. */
+const isTable = (file: File): boolean => /\.(csv|npz|mat|parquet)$/i.test(file.name)
 
 /** Opens the files that are dropped on the page: robot scripts, robots, diagrams, tables. */
 export function DropZone() {
@@ -59,7 +61,9 @@ export async function open(file: File): Promise<void> {
 /** Store a file with measurements in the project folder, and add a block that plays it back. */
 async function addTable(file: File, at: { x: number; y: number }): Promise<void> {
   const content = await base64Of(file)
-  if (content !== null) await dropTable(file.name, content, at)
+  if (content === null) return
+  const { dropTable } = await import('../canvas/dropped_table')
+  await dropTable(file.name, content, at)
 }
 
 /** The content of a file; null if it is too large. */

@@ -8,6 +8,7 @@ import {
   insertionAt,
   wireAt,
 } from '../../src/model/rewiring'
+import { connectionsTo, reconnections } from '../../src/model/connections'
 import { freePort } from '../../src/model/free_port'
 import { sameKind, wireKey } from '../../src/model/wires'
 import type { SheetPort, SheetBlock, Wire } from '../../src/protocol'
@@ -166,4 +167,77 @@ test('a dropped block is inserted into the horizontal segment below it and align
   expect(wireAt({ x: 200, y: 60 }, [drawn], wires), 'too far away').toBeUndefined()
   expect(wireAt({ x: 100, y: 70 }, [drawn], wires), 'a vertical segment').toBeUndefined()
   expect(wireAt({ x: 200, y: 85 }, [drawn], []), 'the preview of a new wire').toBeUndefined()
+})
+
+test('removed chains of blocks with one input and output leave their neighbours connected', () => {
+  const [gain2, sum] = [block('gain 2'), block('sum', ['in1', 'in2'])]
+  const wires = [
+    wire('step/y', 'gain/u'),
+    wire('gain/y', 'gain 2/u'),
+    wire('gain 2/y', 'plant/u'),
+    wire('gain/y', 'scope/in1'),
+    wire('gain 2/y', 'sum/in1'),
+    wire('sum/y', 'log/u'),
+  ]
+  expect(sorted(reconnections([gain, gain2], wires))).toEqual(
+    sorted([wire('step/y', 'plant/u'), wire('step/y', 'scope/in1'), wire('step/y', 'sum/in1')]),
+  )
+  expect(reconnections([gain2, sum], wires).map(wireKey)).toEqual(['gain/y -> plant/u'])
+  const loop = [wire('gain/y', 'gain 2/u'), wire('gain 2/y', 'gain/u'), wire('gain 2/y', 'scope/in1')]
+  expect(reconnections([gain, gain2], loop)).toEqual([])
+})
+
+test('selected blocks are connected to the free inputs of a block, or at one frame', () => {
+  const [pair, sum] = [block('pair', [], ['a', 'b']), block('sum', ['in1', 'in2', 'in3'])]
+  const present = [wire('gain/y', 'sum/in1')]
+  expect(connectionsTo(sum, [pair], present).map(wireKey)).toEqual(['pair/a -> sum/in2', 'pair/b -> sum/in3'])
+  expect(connectionsTo(sum, [pair, block('c'), gain], present).map(wireKey)).toEqual([
+    'pair/a -> sum/in2',
+    'c/y -> sum/in3',
+  ])
+  expect(connectionsTo(sum, [gain, sum], present)).toEqual([])
+  expect(connectionsTo(body('b'), [gain], []).map(wireKey)).toEqual(['gain/y -> b/u'])
+  const line = wire('a/F', 'b/B')
+  expect(connectionsTo(body('b'), [body('a')], [])).toEqual([line])
+  expect(connectionsTo(body('b'), [body('a')], [line]), 'a common frame').toEqual([])
+  expect(connectionsTo(body('c'), [body('a')], [line, wire('a/F', 'd/B')]).map(wireKey)).toEqual([
+    'a/B -> c/B',
+  ])
+  expect(connectionsTo(body('b'), [gain], [wire('x/y', 'b/u')]), 'no signal to a frame').toEqual([])
+  expect(connectionsTo(gain, [body('a')], [])).toEqual([])
+})
+
+/** A block with the frame ports B at its left and F at its right, and a signal input. */
+function body(name: string, signals = ['u']): SheetBlock {
+  const frame = (end: string, x: number) => ({ ...port(end, x, 20), dx: x ? 1 : -1, frame: true })
+  const frames = [frame('B', 0), frame('F', 60)]
+  const inputs = signals.map((input) => port(input, 30, 0))
+  return { ...block(name), inputs: [...frames, ...inputs], outputs: frames }
+}
+
+test('the frames at both ports of removed joints become one frame', () => {
+  const chainOfBodies = [
+    wire('world/W', 'a/B'),
+    wire('a/F', 'b/B'),
+    wire('a/F', 'side/R'),
+    wire('b/F', 'c/B'),
+    wire('x/y', 'a/u'),
+  ]
+  const after = (...names: string[]) =>
+    sorted(
+      reconnections(
+        names.map((name) => body(name)),
+        chainOfBodies,
+      ),
+    )
+  expect(after('a')).toEqual(['world/W -> b/B'])
+  expect(after('a', 'b')).toEqual(['world/W -> c/B', 'world/W -> side/R'])
+  expect(after('b')).toEqual(['a/F -> c/B'])
+  expect(
+    reconnections(
+      [{ ...body('a'), outputs: [...body('a').outputs, port('q', 60, 30)] }],
+      [wire('x/y', 'a/u'), wire('a/q', 'scope/in1')],
+    ),
+    'a joint passes no signal',
+  ).toEqual([])
 })

@@ -57,6 +57,45 @@ def test_the_right_button_copies_blocks_and_branches_from_lines(sheet: Page) -> 
     expect(sheet.get_by_role("menu")).to_have_count(0)
 
 
+def test_blocks_are_selected_connected_copied_and_deleted_with_modifiers(sheet: Page) -> None:
+    block(sheet, "damping").click()
+    block(sheet, "one").click(modifiers=["Shift"])
+    block(sheet, "x1").click(modifiers=["Shift"])
+    selected = sheet.locator(".react-flow__node.selected")
+    expect(selected).to_have_count(3)
+    block(sheet, "x1").click(modifiers=["Shift"])
+    expect(selected).to_have_count(2)
+    # A drag with Ctrl copies the block at the pointer, not the selected blocks.
+    x, y = middle(block(sheet, "PID").locator(".block"))
+    sheet.keyboard.down("Control")
+    sheet.mouse.move(x, y)
+    sheet.mouse.down()
+    sheet.mouse.move(x, y + 100, steps=4)
+    sheet.mouse.up()
+    sheet.keyboard.up("Control")
+    expect(selected).to_have_count(1)
+    expect(block(sheet, "PID 2")).to_have_class(re.compile("selected"))
+    block(sheet, "one").click()
+    block(sheet, "PID 2").click(modifiers=["Control"])
+    expect(edge(sheet, "one/y -> PID 2/u")).to_have_count(1)
+    expect(selected).to_have_count(1)
+    # The end of the wire is moved to another input: the former input is free.
+    sheet.keyboard.press("Control+z")
+    start = block(sheet, "u").locator('[data-handleid="u1"]')
+    end = block(sheet, "PID 2").locator('[data-handleid="u"]')
+    expect(edge(sheet, "one/y -> PID 2/u")).to_have_count(0)
+    sheet.mouse.move(*middle(start))
+    sheet.mouse.down()
+    sheet.mouse.move(*middle(end), steps=4)
+    sheet.mouse.up()
+    expect(edge(sheet, "PID/y -> PID 2/u")).to_have_count(1)
+    expect(edge(sheet, "PID/y -> u/u1")).to_have_count(0)
+    block(sheet, "damping").click()
+    sheet.keyboard.press("Control+Delete")
+    expect(edge(sheet, "x2/y -> u/u2")).to_have_count(1)
+    expect(block(sheet, "damping")).to_have_count(0)
+
+
 def test_context_menus_of_blocks_lines_ports_the_sheet_and_charts(sheet: Page) -> None:
     block(sheet, "PID").click(button="right")
     expect(sheet.get_by_role("menu", name="PID")).to_be_visible()

@@ -72,6 +72,7 @@ def remove(s: Sheet) -> do.DiagramEdit:
         (
             do.RemoveBlocks(blocks=[s.pick(s.blocks)] if s.blocks else []),
             do.RemoveBlocks(wires=[s.pick(s.wires)] if s.wires else []),
+            do.RemoveBlocks(blocks=s.pick_some(s.blocks), reconnections=[s.wire()]),
             do.RemoveBlocks(notes=s.pick_some(s.diagram.notes)),
         )
     )
@@ -156,7 +157,9 @@ MAKERS: dict[type[do.DiagramEdit], Callable[[Sheet], do.DiagramEdit]] = {
     do.AddBlocks: add,
     do.PasteBlocks: paste,
     do.RemoveBlocks: remove,
-    do.Connect: lambda s: do.Connect(wire=s.wire(), replace=s.rng.random() < 0.5),
+    do.Connect: lambda s: do.Connect(
+        wire=s.wire(), replace=s.rng.random() < 0.5, instead=s.pick_some(s.wires)[: s.rng.randint(0, 1)]
+    ),
     do.MoveBlocks: move,
     do.BendWires: bend,
     do.SetAppearance: lambda s: do.SetAppearance(

@@ -72,8 +72,13 @@ parameters = st.dictionaries(st.sampled_from(["gain", "signs", "inputs", "nothin
 blocks = st.builds(NewBlock, name=names, type=st.sampled_from(TYPES), parameters=parameters, place=places)
 edits: st.SearchStrategy[DiagramEdit] = st.one_of(
     st.builds(AddBlocks, blocks=st.lists(blocks, max_size=2), wires=st.lists(wires, max_size=1)),
-    st.builds(RemoveBlocks, blocks=st.lists(names, max_size=2), wires=st.lists(wires, max_size=1)),
-    st.builds(Connect, wire=wires, replace=st.booleans()),
+    st.builds(
+        RemoveBlocks,
+        blocks=st.lists(names, max_size=2),
+        wires=st.lists(wires, max_size=1),
+        reconnections=st.lists(wires, max_size=1),
+    ),
+    st.builds(Connect, wire=wires, replace=st.booleans(), instead=st.lists(wires, max_size=1)),
     st.builds(MoveBlocks, places=st.dictionaries(names, places, max_size=2), notes=notes),
     st.builds(MoveBlocks, wires=st.lists(wires, max_size=2), instead=st.lists(wires, max_size=2)),
     st.builds(
@@ -183,6 +188,27 @@ def test_inserting_a_block_into_a_wire_is_one_step() -> None:
         "between/y -> gain/u",
         "sine/y -> between/u",
     ]
+    document.undo()
+    assert content(document) == before
+
+
+def test_wires_are_moved_reconnected_and_added_in_one_step() -> None:
+    document = chain()
+    before = content(document)
+    document.edit(AddBlocks(blocks=[NewBlock(name="next", type="Gain", place=Place(x=100, y=0))]))
+    added = content(document)
+    sine = Wire(source="sine/y", target="gain/u")
+    document.edit(Connect(wire=Wire(source="sine/y", target="next/u"), instead=[sine]))
+    assert document.undo_title == "connect sine/y to next/u"
+    assert [str(wire) for wire in document.diagram.connections] == ["sine/y -> next/u"]
+    document.undo()
+    document.edit(AddBlocks(blocks=[], wires=[Wire(source="gain/y", target="next/u")]))
+    assert document.undo_title == "connect 1 wire"
+    document.edit(RemoveBlocks(blocks=["gain"], reconnections=[Wire(source="sine/y", target="next/u")]))
+    assert [str(wire) for wire in document.diagram.connections] == ["sine/y -> next/u"]
+    document.undo()
+    document.undo()
+    assert content(document) == added
     document.undo()
     assert content(document) == before
 

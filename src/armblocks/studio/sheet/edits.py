@@ -119,7 +119,12 @@ def applied(
 # -- blocks --------------------------------------------------------------------------------------------------
 
 
-@EDITS.on(AddBlocks, lambda edit: f"add {_name_list([block.name for block in edit.blocks])}")
+def _addition_title(edit: AddBlocks) -> str:
+    names = [block.name for block in edit.blocks]
+    return f"add {_name_list(names)}" if names else f"connect {_count_text(edit.wires, 'wire')}"
+
+
+@EDITS.on(AddBlocks, _addition_title)
 def _add(edit: AddBlocks, diagram: Diagram, context: EditContext) -> Diagram:
     where = f"diagram '{diagram.name}'"
     blocks, layout = dict(diagram.blocks), dict(diagram.layout)
@@ -131,9 +136,7 @@ def _add(edit: AddBlocks, diagram: Diagram, context: EditContext) -> Diagram:
         blocks[new.name] = _new_block(new, diagram.mask_values, context)
         layout[new.name] = _placement(new.place)
     added = dataclasses.replace(diagram, blocks=blocks, layout=layout)
-    if edit.instead:
-        added = _without_removed(RemoveBlocks(wires=edit.instead), added)
-    return _with_wires(edit.wires, added, replace=False)
+    return _with_wires(edit.wires, _without_removed(RemoveBlocks(wires=edit.instead), added), replace=False)
 
 
 @EDITS.on(PasteBlocks, lambda edit: "paste")
@@ -169,11 +172,9 @@ def _new_block(new: NewBlock, scope: Scope, context: EditContext) -> Block:
             values[name] = parameter_value(rule, default, where, resolve_robot)
     block = block_type(**values)
     # The sheet of a new subsystem must be drawable as well.
-    return (
-        dataclasses.replace(block, diagram=placed(block.diagram))
-        if isinstance(block, DiagramBlock)
-        else block
-    )
+    if isinstance(block, DiagramBlock):
+        return dataclasses.replace(block, diagram=placed(block.diagram))
+    return block
 
 
 def _removal_title(edit: RemoveBlocks) -> str:
@@ -184,16 +185,14 @@ def _removal_title(edit: RemoveBlocks) -> str:
 
 @EDITS.on(RemoveBlocks, _removal_title)
 def _remove(edit: RemoveBlocks, diagram: Diagram, _: EditContext) -> Diagram:
-    return _without_removed(edit, diagram)
+    return _with_wires(edit.reconnections, _without_removed(edit, diagram), replace=False)
 
 
 def _without_removed(edit: RemoveBlocks, diagram: Diagram) -> Diagram:
     removed = {_checked_block(name, diagram) for name in edit.blocks}
     wires, lines = split_wires(edit.wires, diagram)
     diagram = without_lines(diagram, lines)
-    removed_wires = {connection(wire) for wire in wires}
-    for wire in removed_wires:
-        _checked_wire(wire, diagram)
+    removed_wires = {_checked_wire(connection(wire), diagram) for wire in wires}
     return dataclasses.replace(
         diagram,
         blocks={name: block for name, block in diagram.blocks.items() if name not in removed},
@@ -232,7 +231,8 @@ def _log(edit: LogSignal, diagram: Diagram, _: EditContext) -> Diagram:
 
 @EDITS.on(Connect, lambda edit: f"connect {edit.wire.source} to {edit.wire.target}")
 def _connect(edit: Connect, diagram: Diagram, _: EditContext) -> Diagram:
-    return _with_wires([edit.wire], diagram, replace=edit.replace)
+    remaining = _without_removed(RemoveBlocks(wires=edit.instead), diagram)
+    return _with_wires([edit.wire], remaining, replace=edit.replace)
 
 
 def _with_wires(wires: Sequence[Wire], diagram: Diagram, *, replace: bool) -> Diagram:

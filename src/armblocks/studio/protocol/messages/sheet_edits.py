@@ -62,7 +62,7 @@ class DiagramEdit(Edit):
 
 
 class AddBlocks(DiagramEdit):
-    """Add blocks and connect them: insert, paste and duplicate.
+    """Add blocks and connect them; without blocks, only add wires.
 
     ``instead``: wires that are removed, for example the wire on which a block is dropped.
     """
@@ -87,20 +87,28 @@ class PasteBlocks(DiagramEdit):
 
 
 class RemoveBlocks(DiagramEdit):
-    """Remove blocks, wires and notes; the wires of the removed blocks are removed with them."""
+    """Remove blocks, wires and notes; the wires of the removed blocks are removed with them.
+
+    ``reconnections``: wires that are added between the former neighbours of the removed blocks.
+    """
 
     kind: Literal["remove"] = "remove"
     blocks: list[str] = Field(default_factory=list[str])
     wires: list[Wire] = Field(default_factory=list[Wire])
     notes: list[str] = Field(default_factory=list[str])
+    reconnections: list[Wire] = Field(default_factory=list[Wire])
 
 
 class Connect(DiagramEdit):
-    """Add a wire. With ``replace`` the present wire of the input is removed."""
+    """Add a wire. With ``replace`` the present wire of the input is removed.
+
+    ``instead``: wires that are removed, for example the wire whose end is moved to another input.
+    """
 
     kind: Literal["connect"] = "connect"
     wire: Wire
     replace: bool = False
+    instead: list[Wire] = Field(default_factory=list[Wire])
 
 
 class MoveBlocks(DiagramEdit):
