@@ -406,6 +406,7 @@ article figure.drawing{overflow-x:auto}
 article h1{font-size:2.1em}article .highlight pre{font-size:.79rem}
 article table.docutils{margin-left:0}
 article table.docutils:has(th:nth-child(5)){font-size:.875rem}
+article table.docutils:has(th:nth-child(9)) :is(th,td){padding:.25rem .12rem}
 #parameters td:last-child{min-width:9rem}
 .symbol.alone{float:right;margin:0 0 1rem 1.5rem}
 .block-list{display:grid;grid-template-columns:repeat(auto-fill,minmax(320px,1fr));gap:.4rem 1.6rem}
