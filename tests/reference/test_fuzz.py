@@ -7,26 +7,25 @@ import warnings
 import numpy as np
 import pytest
 from fuzz_laws import LAWS, InconclusiveError, findings
-from fuzzing import reduced
+from fuzzing import NO_FINDING, judged, reduced
 from random_diagrams import Node, Recipe, random_recipe
 
-SEEDS = (0, 2, 3, 4, 5, 7, 8, 6)
-"""The diagram of the last seed has infinite signals, also in the reference; all others are compared."""
 BASIC_LAWS = ("reference", "formulas", "equations")
 OTHER_LAWS = tuple(name for name in LAWS if name not in BASIC_LAWS)
 
 
-@pytest.mark.parametrize(("number", "seed"), list(enumerate(SEEDS)))
-def test_a_random_diagram_obeys_the_laws(number: int, seed: int) -> None:
-    """Check all laws that need one run, and two of the others."""
+@pytest.mark.parametrize("number", range(7))
+def test_a_random_diagram_obeys_the_laws(number: int) -> None:
+    """Check all laws that need one run, and two of the others, on a diagram that can be compared.
+
+    Another diagram of a seed, after a change of the blocks, may be refused or have infinite signals.
+    """
     other_laws = (OTHER_LAWS[number % len(OTHER_LAWS)], OTHER_LAWS[(3 * number + 1) % len(OTHER_LAWS)])
+    laws = (*BASIC_LAWS, *dict.fromkeys(other_laws))
+    judgements = (judged(random_recipe(seed), laws) for seed in range(10 * number, 10 * number + 10))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        try:
-            contradictions = findings(random_recipe(seed), (*BASIC_LAWS, *dict.fromkeys(other_laws)))
-        except InconclusiveError:
-            return
-    contradictions.pop("inconclusive", None)
+        contradictions = next(found for found in judgements if not found.keys() & set(NO_FINDING))
     assert contradictions == {}
 
 
@@ -61,3 +60,15 @@ def test_a_loop_without_a_solution_contradicts_the_equations() -> None:
         except (InconclusiveError, ValueError):
             return  # the diagram is refused, which is correct
     assert "equations" in contradictions
+
+
+def test_a_pole_behind_a_limited_state_is_not_reported_as_a_failed_run() -> None:
+    """1/u has a pole at 1/3 s. The reference crosses it, and the limits of the state hide the step size."""
+    fall = {"times": [0.0, 0.25, 0.5], "values": [0.5, 0.5, -1.0]}
+    nodes = (
+        Node("fall", "RepeatingSequence", fall),
+        Node("inverse", "MatrixInverse", {}, {"u": "fall/y"}),
+        Node("x", "IntegratorLimited", {}, {"u": "inverse/y"}),
+    )
+    with pytest.raises(InconclusiveError, match=r"'inverse/y' has a pole at 0\.3333"):
+        findings(Recipe(nodes, 0.375), ("equations",))
