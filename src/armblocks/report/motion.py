@@ -7,6 +7,7 @@ that belong to one arm by these names, without the classes of the blocks.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,7 +86,7 @@ def moving_arms(diagram: Diagram, result: SimulationResult) -> tuple[MovingArm, 
         if robot is not None and path is not None and result[path].shape[1:] == (robot.nq,):
             owner = diagram.blocks.get(path.rpartition("/")[0])
             simulated = None if owner is None else robot_of(owner)
-            if simulated is not None and _pictured(robot) == _pictured(simulated):
+            if simulated is not None and simulated is not robot and _pictured(robot) == _pictured(simulated):
                 robot = simulated
             groups.setdefault((robot, path), []).append(name)
     arms: list[MovingArm] = []
@@ -100,6 +101,7 @@ def moving_arms(diagram: Diagram, result: SimulationResult) -> tuple[MovingArm, 
     return tuple(arms)
 
 
+@lru_cache(maxsize=32)
 def _pictured(robot: Robot) -> Robot:
     """The robot without the parameters that no picture of its motion shows: masses and drives."""
     return replace(
