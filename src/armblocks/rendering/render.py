@@ -1,13 +1,14 @@
 """A small software renderer: converts triangles with normals to shaded pixels with transparency and depth.
 
-All triangles are rasterised together with array operations. Every triangle is divided into rows and every row
-into pixels, and the nearest fragment of each pixel is shaded. :func:`render` numbers the passes.
+The triangles of a band of rows are rasterised together with array operations. Every triangle is divided into
+rows and every row into pixels, and the nearest fragment of each pixel is shaded. The passes are numbered.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,8 @@ _Index = NDArray[np.intp]
 
 SUPERSAMPLES = 2
 """Rendered pixels per output pixel in each direction."""
+_BAND = 32 * SUPERSAMPLES
+"""Rows of supersamples that are drawn together: their arrays remain in the cache of the processor."""
 
 # Colour (sRGB), strength and sharpness of the highlight.
 _FINISH: dict[Material, tuple[str, float, float]] = {
@@ -85,48 +88,105 @@ def render(
     doubled_area = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
     front = doubled_area < -1e-9  # y runs downwards: anticlockwise is negative
     x, y, inverse_depth, doubled_area = x[front], y[front], inverse_depth[front], doubled_area[front]
-    normals, material = normals[front], material[front]
+    surface = _Surface(x, y, doubled_area, inverse_depth, normals[front], material[front])
 
-    # Pass 2: fragments, and the nearest of each pixel.
-    triangle, column, row = _fragments(x, y, columns, rows)
-    pixel = row * columns + column
-    depth = _linear_in_pixels(x, y, doubled_area, inverse_depth)(triangle, column, row)
-    nearest = np.zeros(rows * columns)
-    np.maximum.at(nearest, pixel, depth)
-    visible = np.flatnonzero(depth == nearest[pixel])
-    triangle, column, row, pixel = triangle[visible], column[visible], row[visible], pixel[visible]
+    # Passes 2 to 4, in bands of rows.
+    n = SUPERSAMPLES
+    pixels = np.zeros((rows // n, columns // n, 4), dtype=np.uint8)
+    depths = np.zeros((rows // n, columns // n))
+    for begin in range(0, rows, _BAND):
+        end = min(begin + _BAND, rows)
+        target = slice(begin // n, end // n)
+        _draw_band(surface, range(begin, min(end + 1, rows)), end, pixels[target], depths[target])
+    return Rendering(pixels=pixels, inverse_depth=depths, left=left, top=top, scale=scale)
 
-    # Pass 3: shade, in camera axes.
-    normal = np.stack(
-        [_linear_in_pixels(x, y, doubled_area, normals[:, :, k])(triangle, column, row) for k in range(3)]
-    )
+
+class _Surface(NamedTuple):
+    """Visible triangles: corners (F, 3) in supersamples, with doubled areas, normals and materials."""
+
+    x: _Array
+    y: _Array
+    doubled_area: _Array
+    inverse_depth: _Array
+    normals: _Array
+    material: _Index
+
+    def touching(self, rows: range) -> _Surface:
+        """The triangles that may cover some of the rows."""
+        is_near = (self.y.max(axis=1) >= rows.start) & (self.y.min(axis=1) <= rows.stop)
+        return _Surface(
+            x=self.x[is_near],
+            y=self.y[is_near],
+            doubled_area=self.doubled_area[is_near],
+            inverse_depth=self.inverse_depth[is_near],
+            normals=self.normals[is_near],
+            material=self.material[is_near],
+        )
+
+    def plane(self, values: _Array) -> Callable[[_Index, _Index, _Index], _Array]:
+        """The interpolation of corner values (F, 3)."""
+        return _linear_in_pixels(self.x, self.y, self.doubled_area, values)
+
+
+def _draw_band(surface: _Surface, rows: range, end: int, pixels: NDArray[np.uint8], depths: _Array) -> None:
+    """Draw the supersamples of ``rows`` up to the row ``end`` into the output ``pixels`` and ``depths``.
+
+    ``rows`` includes one row after ``end``, unless it is the last, because outlines depend on it.
+    """
+    # Pass 2: fragments, and the nearest of each supersample.
+    n, columns = SUPERSAMPLES, pixels.shape[1] * SUPERSAMPLES
+    surface = surface.touching(rows)
+    triangle, column, row = _fragments(surface.x, surface.y, columns, rows)
+    sample = (row - rows.start) * columns + column
+    depth = surface.plane(surface.inverse_depth)(triangle, column, row)
+    nearest = np.zeros(len(rows) * columns)
+    np.maximum.at(nearest, sample, depth)
+    fragment = np.full(len(nearest), -1, dtype=np.intp)  # of several at one depth the last
+    visible = np.flatnonzero(depth == nearest[sample])
+    fragment[sample[visible]] = visible
+    sample = np.flatnonzero(fragment >= 0)
+    visible = fragment[sample]
+    triangle, column, row = triangle[visible], column[visible], row[visible]
+    depths[:] = nearest.reshape(len(rows), columns)[: end - rows.start : n, ::n]
+
+    # Pass 3: shade, in camera axes. Arrays have one entry for each covered supersample.
+    planes = [surface.plane(surface.normals[:, :, k]) for k in range(3)]
+    normal = np.stack([plane(triangle, column, row) for plane in planes])
     normal /= np.sqrt(np.einsum("ij,ij->j", normal, normal)) + 1e-12
-    linear = np.zeros((4, rows * columns))
-    linear[:3, pixel] = _shade(normal, material[triangle])
-    linear[3, pixel] = 1.0
-    facing = np.zeros((3, rows * columns))
-    facing[:, pixel] = normal
-    nearest = nearest.reshape(rows, columns)
-    linear[:3] *= _outlines(nearest, facing.reshape(3, rows, columns)).ravel()
+    colour = _shade(normal, surface.material[triangle])
+    colour *= _outlines(nearest.reshape(len(rows), columns), normal, sample)
 
     # Pass 4: average the supersamples (colours weighted by coverage) and encode.
-    n = SUPERSAMPLES
-    planes = linear.reshape(4, rows, columns)
-    averaged = _block_means(planes, n)
+    count = int(np.count_nonzero(sample < (end - rows.start) * columns))
+    column, row = column[:count], row[:count] - rows.start
+    target = (row // n) * (columns // n) + column // n
+    shown, averaged = _block_means(colour[:, :count], target, (row % n) * n + column % n, depths.size)
     alpha = averaged[3]
-    pixels = np.empty((rows // n, columns // n, 4), dtype=np.uint8)
+    encoded = np.empty((len(shown), 4), dtype=np.uint8)
     for k in range(3):
-        pixels[..., k] = _SRGB[np.rint(averaged[k] / np.maximum(alpha, 1e-9) * _SRGB_STEPS).astype(np.intp)]
-    pixels[..., 3] = np.rint(alpha * 255)
-    return Rendering(pixels=pixels, inverse_depth=nearest[::n, ::n], left=left, top=top, scale=scale)
+        encoded[:, k] = _SRGB[np.rint(averaged[k] / alpha * _SRGB_STEPS).astype(np.intp)]
+    encoded[:, 3] = np.rint(alpha * 255)
+    pixels.reshape(-1, 4)[shown] = encoded
 
 
-def _block_means(planes: _Array, n: int) -> _Array:
-    """Means over n x n blocks of the last two axes."""
-    total = planes[:, ::n, ::n].copy()
-    for k in range(1, n * n):
-        total += planes[:, k // n :: n, k % n :: n]
-    return total / n**2
+def _block_means(colour: _Array, target: _Index, place: _Index, count: int) -> tuple[_Index, _Array]:
+    """The covered output pixels (M,) of ``count``, and the means (4, M) of their colours and coverage.
+
+    ``colour`` (3, P), ``target`` (P,) and ``place`` (P,): of each covered supersample the colour, the output
+    pixel and the number within the output pixel.
+    """
+    is_shown = np.zeros(count, dtype=bool)
+    is_shown[target] = True
+    shown = np.flatnonzero(is_shown)
+    number = np.cumsum(is_shown) - 1
+    samples = np.zeros((4, SUPERSAMPLES**2, len(shown)))
+    where = place * len(shown) + number[target]
+    for plane, values in zip(samples, (*colour, 1.0)):
+        plane.reshape(-1)[where] = values
+    total = samples[:, 0].copy()
+    for k in range(1, SUPERSAMPLES**2):
+        total += samples[:, k]
+    return shown, total / SUPERSAMPLES**2
 
 
 def _extent(values: _Array, limit: int) -> tuple[int, int]:
@@ -158,7 +218,7 @@ def shadow(
     x, y, _ = camera.project(corners + heights * light_direction)
     mask = np.zeros(rows * columns)
     x, y = x * scale, y * scale
-    _, column, row = _fragments(x, y, columns, rows)
+    _, column, row = _fragments(x, y, columns, range(rows))
     mask[row * columns + column] = 1.0
     blurred = mask.reshape(rows, columns)
     for _ in range(3):  # three box filters approximate a Gaussian filter (central limit theorem)
@@ -172,7 +232,10 @@ def composite(front: NDArray[np.uint8], back: NDArray[np.uint8]) -> NDArray[np.u
     """``front`` composited over ``back``, both with straight alpha (Porter and Duff 1984)."""
     result = back.copy()
     result[back[..., 3] == 0] = 0
-    covered = front[..., 3] > 0  # outside of the window, ``back`` is unchanged
+    strength = front[..., 3]  # outside of the window, ``back`` is unchanged
+    opaque = strength == 255
+    result[opaque] = front[opaque]
+    covered = (strength > 0) & ~opaque
     f, b = front[covered] / 255, back[covered] / 255
     alpha = f[:, 3:] + b[:, 3:] * (1 - f[:, 3:])
     colour = (f[:, :3] * f[:, 3:] + b[:, :3] * b[:, 3:] * (1 - f[:, 3:])) / np.maximum(alpha, 1e-9)
@@ -197,15 +260,16 @@ def crop(pixels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], int, int]:
     return pixels[top:bottom, left:right], left, top
 
 
-def _fragments(x: _Array, y: _Array, columns: int, rows: int) -> tuple[_Index, _Index, _Index]:
+def _fragments(x: _Array, y: _Array, columns: int, rows: range) -> tuple[_Index, _Index, _Index]:
     """Triangle, column and row of every pixel centre inside a triangle; corners (F, 3) in pixels."""
-    first = np.clip(np.ceil(y.min(axis=1) - 0.5), 0, rows).astype(np.intp)
-    last = np.clip(np.floor(y.max(axis=1) - 0.5), -1, rows - 1).astype(np.intp)
+    first = np.clip(np.ceil(y.min(axis=1) - 0.5), rows.start, rows.stop).astype(np.intp)
+    last = np.clip(np.floor(y.max(axis=1) - 0.5), rows.start - 1, rows.stop - 1).astype(np.intp)
     triangle, row = _ranges(first, np.maximum(last - first + 1, 0))
     centre = row + 0.5
     left, right = np.full(len(row), np.inf), np.full(len(row), -np.inf)
+    corners = [(x[triangle, k], y[triangle, k]) for k in range(3)]
     for i, j in ((0, 1), (1, 2), (2, 0)):
-        xi, yi, xj, yj = x[triangle, i], y[triangle, i], x[triangle, j], y[triangle, j]
+        (xi, yi), (xj, yj) = corners[i], corners[j]
         crossed = ((yi <= centre) & (centre < yj)) | ((yj <= centre) & (centre < yi))
         with np.errstate(divide="ignore", invalid="ignore"):
             crossing = xi + (xj - xi) * (centre - yi) / (yj - yi)
@@ -223,7 +287,7 @@ def _ranges(first: _Index, counts: _Index) -> tuple[_Index, _Index]:
     """Range index and number of each entry of the ranges ``first[k] .. first[k] + counts[k] - 1``."""
     owner = np.repeat(np.arange(len(first)), counts)
     begin = np.cumsum(counts) - counts
-    return owner, np.arange(len(owner)) - begin[owner] + first[owner]
+    return owner, np.arange(len(owner)) + (first - begin)[owner]
 
 
 def _linear_in_pixels(
@@ -255,21 +319,28 @@ def _shade(normal: _Array, material: _Index) -> _Array:
     return np.clip(_BASE[:, material] * light + white, 0.0, 1.0)
 
 
-def _outlines(inverse_depth: _Array, facing: _Array) -> _Array:
-    """A factor (rows, columns) that is below 1 where depth or normal jumps between neighbouring pixels."""
-    factor = np.ones_like(inverse_depth)
-    views = (
-        (factor[:-1], inverse_depth[:-1], inverse_depth[1:], facing[:, :-1], facing[:, 1:]),
-        (factor[:, :-1], inverse_depth[:, :-1], inverse_depth[:, 1:], facing[:, :, :-1], facing[:, :, 1:]),
-    )
-    for target, near, other, facing_near, facing_other in views:
-        both = (near > 0) & (other > 0)
-        jump = both & (np.abs(other - near) > 0.006 * near)
-        aligned = facing_near[0] * facing_other[0]
-        aligned += facing_near[1] * facing_other[1]
-        aligned += facing_near[2] * facing_other[2]
-        target[both & (aligned < 0.55)] *= 0.72
-        target[jump] *= 0.6
+def _outlines(inverse_depth: _Array, normal: _Array, pixel: _Index) -> _Array:
+    """A factor (P,) that is below 1 where depth or normal jumps to the next pixel, below or on the right.
+
+    ``normal`` (3, P): normals of the surface at the covered pixels ``pixel`` (P,), which ascend.
+    """
+    rows, columns = inverse_depth.shape
+    depth = inverse_depth.ravel()
+    number = np.full(rows * columns, -1, dtype=np.intp)
+    number[pixel] = np.arange(len(pixel))
+    factor = np.ones(len(pixel))
+    not_last: _Index = np.flatnonzero(pixel % columns < columns - 1)
+    not_lowest: _Index = np.flatnonzero(pixel < (rows - 1) * columns)
+    for begin, step in ((not_lowest, columns), (not_last, 1)):
+        neighbour = number[pixel[begin] + step]
+        is_covered = neighbour >= 0
+        here, other = begin[is_covered], neighbour[is_covered]
+        near, far = depth[pixel[here]], depth[pixel[other]]
+        aligned = normal[0, here] * normal[0, other]
+        aligned += normal[1, here] * normal[1, other]
+        aligned += normal[2, here] * normal[2, other]
+        factor[here[aligned < 0.55]] *= 0.72
+        factor[here[np.abs(far - near) > 0.006 * near]] *= 0.6
     return factor
 
 

@@ -71,7 +71,8 @@ def _ring_surface(
     next_index = np.roll(np.arange(len(lower)), -1)
     corners = _quads(lower, lower[next_index], upper[next_index], upper)
     normals = _quads(lower_normals, lower_normals[next_index], upper_normals[next_index], upper_normals)
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    (ax, ay, az), (bx, by, bz) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
+    area = np.sqrt((ay * bz - az * by) ** 2 + (az * bx - ax * bz) ** 2 + (ax * by - ay * bx) ** 2)
     solid = area > 1e-12 * max(float(np.abs(corners).max()), 1e-9) ** 2
     return corners[solid], normals[solid]
 
