@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from abc import ABC
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, ClassVar, Self
@@ -319,6 +319,13 @@ class Block(ABC, metaclass=ArgumentErrors, methods=False):
     def input_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         """SI units of inputs that follow from other inputs, such as the terms of a sum."""
         return {}
+
+    def known_dependences(self) -> Mapping[str, Collection[str]] | None:
+        """The inputs on which each output and record can depend, for checks without the equations.
+
+        ``None``: they are read from the equations. Blocks with states, modes or delays return ``None``.
+        """
+        return None
 
     def reason_of_invalid_values(self) -> str:
         """Why signals or derivatives of the block can be NaN or infinite, for error messages of runs."""

@@ -171,6 +171,22 @@ def block_equations(
     )
 
 
+def known_equations(
+    block: Block, input_shapes: Shapes, dependences: Mapping[str, Collection[str]]
+) -> BlockEquations:
+    """The groups of a block by :meth:`Block.known_dependences`, without expressions: not for evaluation."""
+    features, empty = features_of(block, input_shapes), SX(0, 1)
+    members: dict[tuple[str, ...], list[BlockSlot]] = {}
+    for kind, named in ((SlotKind.OUTPUT, features.outputs), (SlotKind.RECORD, features.records)):
+        for name, shape in named.items():
+            members.setdefault(tuple(dependences[name]), []).append(BlockSlot(kind, name, shape))
+    groups = tuple(
+        Group(tuple(slots), (), (), inputs, (), False, empty, SX(0.0), empty, empty)
+        for inputs, slots in members.items()
+    )
+    return BlockEquations(features=features, states=(), discrete=(), modes=(), guards=(), groups=groups)
+
+
 @lru_cache(maxsize=1024)
 def _trace(structure: _Structure) -> BlockEquations:
     own = features_of(structure.block, dict(structure.input_shapes))

@@ -6,7 +6,7 @@ from armblocks.diagram.comments import active_levels, check_connected
 from armblocks.diagram.connection_port import ConnectionPort
 from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.levels import levels_of
-from armblocks.diagram.model import diagram_model
+from armblocks.diagram.model import check_model
 from armblocks.diagram.structure import Inport, Outport, port_blocks
 from armblocks.diagram.virtual_wiring import From, Goto
 
@@ -22,7 +22,7 @@ def check_diagram(diagram: Diagram) -> None:
         port_blocks(diagram, Outport)
         check_connected(levels_of(diagram))
     else:
-        diagram_model(diagram)
+        check_model(diagram)
 
 
 def _is_part(diagram: Diagram) -> bool:

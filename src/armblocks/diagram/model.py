@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 
 from armblocks.diagram.block_equations import (
     BlockEquations,
     block_equations,
+    known_equations,
 )
 from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.event_order import EventOrder, event_order
@@ -36,8 +39,23 @@ class Model:
         return event_order(self.flow)
 
 
-def diagram_model(diagram: Diagram) -> Model:
-    """Analyse the flat form of a diagram.
+def check_model(diagram: Diagram) -> None:
+    """Raise the errors of :func:`diagram_model`, without tracing blocks whose dependences are known.
+
+    The known dependences of an output may include inputs that its equations do not contain. After an error,
+    or if there is a loop, the diagram is therefore analysed with all equations.
+    """
+    flat = flatten_hierarchy(diagram).diagram
+    if any(block.known_dependences() is not None for block in flat.blocks.values()):
+        with suppress(ArmblocksError):
+            model = diagram_model(diagram, traced=False)
+            if not model.flow_order.loops and not model.tick_order.loops:
+                return
+    diagram_model(diagram)
+
+
+def diagram_model(diagram: Diagram, *, traced: bool = True) -> Model:
+    """Analyse the flat form of a diagram; ``traced``: whether blocks with known dependences are traced.
 
     Raises ``DiagramError`` for unconnected inputs, for shapes and sample times that do not fit, and for
     blocks whose parameters allow no equations (a robot without mass). Raises ``AlgebraicLoopError`` for loops
@@ -48,13 +66,15 @@ def diagram_model(diagram: Diagram) -> Model:
     diagram = form.diagram
     check_declared_shapes(form, shapes)
     free = [name for name in diagram.blocks if not diagram.clocked(name)]
-    equations = {name: _equations(diagram, name, shapes) for name in free}
+    known = {} if traced else _known_equations(diagram, free, shapes)
+    equations = {name: known.get(name) or _equations(diagram, name, shapes) for name in free}
     check_triggered(diagram, equations)
     sampling = resolve_sampling(diagram, equations)
     moving = moving_blocks(diagram, equations)
     for name in free:
-        # Conditions that change only at instants need no events.
-        constant = name not in moving and name not in diagram.gates
+        # Conditions that change only at instants need no events. Their blocks then depend on more inputs;
+        # without all equations it is not known which blocks these are.
+        constant = (name not in moving or not traced) and name not in diagram.gates
         features = equations[name].features
         if constant and features.conditions and not features.states:
             equations[name] = _equations(diagram, name, shapes, consistent_modes=not features.modes)
@@ -64,7 +84,9 @@ def diagram_model(diagram: Diagram) -> Model:
     equations = {name: equations[name] for name in diagram.blocks}
     flow, tick = Network(diagram, equations), Network(diagram, equations, ticking=True)
     if sampling.clocks:
-        consistent = {name: _equations(diagram, name, shapes, consistent_modes=True) for name in free}
+        consistent = {
+            name: known.get(name) or _equations(diagram, name, shapes, consistent_modes=True) for name in free
+        }
         for name, clock in sampling.clock_of.items():
             period = sampling.clocks[clock].period
             consistent[name] = _equations(diagram, name, shapes, period=period, consistent_modes=True)
@@ -73,9 +95,9 @@ def diagram_model(diagram: Diagram) -> Model:
         shapes=shapes,
         sampling=sampling,
         flow=flow,
-        flow_order=_order(flow),
+        flow_order=_order(flow) if traced else evaluation_order(flow),
         tick=tick,
-        tick_order=_order(tick),
+        tick_order=_order(tick) if traced else evaluation_order(tick),
     )
 
 
@@ -84,6 +106,18 @@ def _order(network: Network) -> Evaluation:
     order = evaluation_order(network)
     sums = sums_on_loops(network, order)
     return evaluation_order(network, sums) if sums else order
+
+
+def _known_equations(
+    diagram: Diagram, names: Sequence[str], shapes: DiagramShapes
+) -> dict[str, BlockEquations]:
+    """The equations without expressions of the blocks whose dependences are known."""
+    found: dict[str, BlockEquations] = {}
+    for name in names:
+        dependences = diagram.blocks[name].known_dependences()
+        if dependences is not None and not diagram.gates.get(name):
+            found[name] = known_equations(diagram.blocks[name], shapes.inputs[name], dependences)
+    return found
 
 
 def _equations(

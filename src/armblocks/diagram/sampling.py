@@ -126,14 +126,30 @@ def moving_blocks(diagram: Diagram, equations: Mapping[str, BlockEquations]) -> 
             wires[wire.source.block].append((wire.source.port, wire.target))
     on_loops = _on_loops({name: [target.block for _, target in entries] for name, entries in wires.items()})
     inputs: dict[str, set[str]] = {name: set() for name in equations}
-    queue = deque(equations)
+    wires_of: dict[PortRef, list[PortRef]] = {}
+    for name, entries in wires.items():
+        for port, target in entries:
+            wires_of.setdefault(PortRef(name, port), []).append(target)
+    always, readers = dict[str, set[str]](), dict[str, dict[str, list[str]]]()
+    for name, own in equations.items():
+        always[name], readers[name] = _moving_outputs(diagram.blocks[name], own)
+    queue = deque(
+        PortRef(name, port)
+        for name, entries in wires.items()
+        for port in dict.fromkeys(port for port, _ in entries)
+        if port in always[name] or name in on_loops
+    )
+    moving = set(queue)
     while queue:
-        name = queue.popleft()
-        outputs = _moving_outputs(diagram.blocks[name], equations[name], inputs[name])
-        for port, target in wires[name]:
-            if (port in outputs or name in on_loops) and target.port not in inputs[target.block]:
-                inputs[target.block].add(target.port)
-                queue.append(target.block)
+        for target in wires_of[queue.popleft()]:
+            if target.port in inputs[target.block]:
+                continue
+            inputs[target.block].add(target.port)
+            for port in readers[target.block].get(target.port, ()):
+                output = PortRef(target.block, port)
+                if output in wires_of and output not in moving:
+                    moving.add(output)
+                    queue.append(output)
     continuous = {name for name, own in equations.items() if _is_continuous(own)}
     return frozenset(continuous | on_loops | {name for name, ports in inputs.items() if ports})
 
@@ -160,20 +176,23 @@ def _is_continuous(block: BlockEquations) -> bool:
     return bool(block.states or block.delays) or any(group.timed for group in block.groups)
 
 
-def _moving_outputs(block: Block, equations: BlockEquations, moving: Collection[str]) -> set[str]:
-    """The outputs of a block that may change between instants if the inputs ``moving`` do."""
+def _moving_outputs(block: Block, equations: BlockEquations) -> tuple[set[str], dict[str, list[str]]]:
+    """The outputs of a block that may change between instants, and the outputs that depend on each input."""
     delayed = {line.name for line in equations.delays}
     outputs: set[str] = set()
+    readers: dict[str, list[str]] = {}
     for port in block.output_ports():
         index = equations.group_of.get((SlotKind.OUTPUT, port.name))
         if index is None or port.name in block.implicit_outputs:
             outputs.add(port.name)
             continue
         group = equations.groups[index]
-        inputs = {name.rstrip("'") for name in group.inputs}
-        if group.timed or group.states or delayed & set(group.discrete) or inputs & set(moving):
+        if group.timed or group.states or delayed & set(group.discrete):
             outputs.add(port.name)
-    return outputs
+            continue
+        for name in dict.fromkeys(entry.rstrip("'") for entry in group.inputs):
+            readers.setdefault(name, []).append(port.name)
+    return outputs, readers
 
 
 def _on_loops(successors: Mapping[str, Iterable[str]]) -> set[str]:

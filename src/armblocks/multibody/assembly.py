@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from armblocks.diagram.passes.netlist import Netlist
 from armblocks.errors import DiagramError, RobotError
@@ -230,11 +231,17 @@ class _Assembly:
     def _has_mass(self, group: int) -> bool:
         return group != self._group(self.world) and any(body.mass > 0.0 for _, body in self._bodies(group))
 
-    def _bodies(self, group: int) -> Iterator[tuple[str, BodyPart]]:
+    def _bodies(self, group: int) -> Sequence[tuple[str, BodyPart]]:
         """The bodies of a rigid group, with their paths."""
+        return self._bodies_of_groups.get(group, ())
+
+    @cached_property
+    def _bodies_of_groups(self) -> Mapping[int, list[tuple[str, BodyPart]]]:
+        bodies: dict[int, list[tuple[str, BodyPart]]] = {}
         for path, part in self.parts.items():
-            if isinstance(part, BodyPart) and self._at(path, REFERENCE) == group:
-                yield path, part
+            if isinstance(part, BodyPart):
+                bodies.setdefault(self._at(path, REFERENCE), []).append((path, part))
+        return bodies
 
     # -- links and constraints
 

@@ -26,6 +26,7 @@ from armblocks.multibody.element_states import ElementLoads
 from armblocks.multibody.frames import frames_of_parts, networks
 from armblocks.multibody.joint_states import JointStates
 from armblocks.multibody.mechanism import Mechanism, driven_speeds, port_of
+from armblocks.multibody.moving_masses import every_joint_moves_mass
 from armblocks.multibody.parts import JointPart, Part, Targets
 from armblocks.multibody.start import Start, drawn_start, start_of
 from armblocks.robot.tree import KinematicTree
@@ -140,6 +141,8 @@ class _Gathered:
 
     def _check_inertia(self, drawn: DrawnMechanism) -> None:
         """Raise ``DiagramError`` for a joint beyond which no mass moves."""
+        if every_joint_moves_mass(drawn.robot):
+            return
         try:
             tree = regrouped(KinematicTree.of(drawn.robot))
             driven = {k for joint in drawn.joints for k in driven_speeds(joint)}

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -141,6 +142,10 @@ class JointStates(Block):
         return None if port == "q" and self.place.nq != self.place.nv else super().output_rate(port)
 
     def input_ports(self) -> tuple[Port, ...]:
+        return self._inputs
+
+    @cached_property
+    def _inputs(self) -> tuple[Port, ...]:
         q, qd, qdd = motion_ports(self.place, internal=True, prefix="mechanism ")
         ports = [*self.joint.input_ports(), qdd]
         if self._reads_coordinates():
@@ -150,6 +155,10 @@ class JointStates(Block):
         return tuple(ports)
 
     def output_ports(self) -> tuple[Port, ...]:
+        return self._outputs
+
+    @cached_property
+    def _outputs(self) -> tuple[Port, ...]:
         own = motion_ports(self.place)
         names = [port.name for port in own]
         others = [port for port in self.joint.output_ports() if port.name not in names]

@@ -7,9 +7,9 @@ internal.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -78,6 +78,10 @@ class Mechanism(Block):
     # -- ports
 
     def input_ports(self) -> tuple[Port, ...]:
+        return self._inputs
+
+    @cached_property
+    def _inputs(self) -> tuple[Port, ...]:
         ports = [
             _port(joint.path, quantity, shape)
             for joint in self.mechanism.joints
@@ -94,6 +98,10 @@ class Mechanism(Block):
         return (*ports, *(_port(path, "inertia", INERTIA_SIZE) for path in bodies))
 
     def output_ports(self) -> tuple[Port, ...]:
+        return self._outputs
+
+    @cached_property
+    def _outputs(self) -> tuple[Port, ...]:
         ports: list[Port] = []
         for joint in self.mechanism.joints:
             ports.append(_port(joint.path, "qdd", joint.part.nv))
@@ -139,6 +147,19 @@ class Mechanism(Block):
         return (View(kind=ViewKind.ROBOT, signals=("poses",), title=self.robot.name, subject=self.robot),)
 
     # -- equations
+
+    def known_dependences(self) -> Mapping[str, Collection[str]]:
+        """Coordinates and frames depend on the state, in loops also on inertias; all others on all inputs."""
+        if self.robot.closures:
+            self._motion()  # raises the errors of loops
+        inputs = tuple(port.name for port in self.input_ports())
+        of_state = ("motion of ", "q of ", "q rates of ", "qd of ")
+        of_inputs = ("state q of ", "state qd of ", *(("inertia of ",) if self.robot.closures else ()))
+        state = tuple(name for name in inputs if name.startswith(of_inputs))
+        known = {
+            port.name: state if port.name.startswith(of_state) else inputs for port in self.output_ports()
+        }
+        return known | {port.name: inputs for port in self.record_ports()}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         equations, robot = self._motion(), self.robot

@@ -6,7 +6,7 @@ A block of the family ``mechanics`` returns one of these parts. Frame ports are 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 from casadi import SX
@@ -84,6 +84,9 @@ class Targets:
     velocity_priority: str = "low"
 
 
+_AT_THE_JOINT = (Transform(), Transform())
+
+
 @dataclass(frozen=True, kw_only=True)
 class JointPart:
     """A joint from frame ``B`` to frame ``F``: a sequence of elementary motions.
@@ -97,7 +100,7 @@ class JointPart:
     motions: tuple[Motion, ...]
     targets: Targets
     closure: type[Closure] | None = None
-    closure_frames: tuple[Transform, Transform] = field(default_factory=lambda: (Transform(), Transform()))
+    closure_frames: tuple[Transform, Transform] = _AT_THE_JOINT
     needs_coordinate: bool = False
     actuation: tuple[str, ...] = ()
 
