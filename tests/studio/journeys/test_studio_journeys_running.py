@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from building import DIALOG, keep_view, play_slowly, wait_until
+from building import DIALOG, keep_view, play_slowly, select_block, wait_until
 from playwright.sync_api import Locator, Page, expect
 
 import armblocks as ab
@@ -402,7 +402,7 @@ def test_the_trigger_is_saved_with_its_model_and_can_be_undone(opened: Opened, s
     )
     wait_until(page, lambda: stored() == expected)
     # Renamed blocks do not lose the trigger.
-    page.locator('.react-flow__node[data-id="lag"]').focus()
+    select_block(page, "lag")  # focus() selects a block in Firefox only if the last input was a key
     page.keyboard.press("F2")
     page.keyboard.type("slow")
     page.keyboard.press("Enter")
