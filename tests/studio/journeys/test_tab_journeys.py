@@ -48,9 +48,13 @@ def test_a_document_returns_with_its_view_selection_and_run(two: Page) -> None:
     two.keyboard.press("+")
     wait_until(two, lambda: two.evaluate(VIEW_IS_STILL))
     before = two.evaluate(VIEW)
+    two.keyboard.press("Control+c")
     two.keyboard.press("Alt+PageDown")
     expect(two.locator(".title")).to_have_text("untitled")
     expect(two.locator(".run-state")).to_have_text("")
+    two.keyboard.press("Control+v")  # the clipboard belongs to all tabs
+    expect(block(two, "PID")).to_have_class(re.compile("selected"))
+    expect(block(two, "u")).to_have_count(0)
     tabs(two).filter(has_text="van_der_pol_pid").last.click()
     expect(block(two, "PID")).to_have_class(re.compile("selected"))
     assert two.evaluate(VIEW) == before

@@ -68,6 +68,10 @@ def test_edits_keep_the_frame_lines_of_other_blocks() -> None:
     # the lines of gravity and hinge end at the world; without it, both are still at one frame
     document.edit(RemoveBlocks(blocks=["world"]))
     assert "gravity/C -- revolute joint/B" in lines(document)
+    document.undo()
+    neighbours = Wire(source="world/W", target="brick/R", bends=())
+    document.edit(RemoveBlocks(blocks=["revolute joint", "rod"], reconnections=[neighbours]))
+    assert lines(document) == {"brick/R -- world/W", "gravity/C -- world/W"}
 
 
 def test_lines_are_drawn_and_removed_like_wires() -> None:
