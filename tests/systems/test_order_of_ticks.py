@@ -16,13 +16,16 @@ from small_subsystems import counter, scaled
 import armblocks as ab
 from armblocks.blocks import (
     ActionSubsystem,
+    Backlash,
     Bias,
     Constant,
     EnabledSubsystem,
     Gain,
     If,
+    RateLimiterContinuous,
     Relay,
     ResettableIntegrator,
+    SignalGenerator,
     SineWave,
     Sum,
     TriggeredSubsystem,
@@ -176,3 +179,24 @@ def test_derivatives_follow_the_order_of_ticks(seed: int) -> None:
         expected = (np.array(values) - np.array(lower[name])) / 2e-6
         actual = np.ravel(derivatives[name, parameter])[BETWEEN_TICKS]
         np.testing.assert_allclose(actual, expected, atol=1e-6, rtol=1e-6, err_msg=name)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_hold_samples_blocks_with_hysteresis_after_a_jump_at_the_tick(seed: int) -> None:
+    """The input jumps at ticks and runs back at once. A rate limiter causes events before the ticks."""
+    random = np.random.default_rng(seed)
+    builder = ab.DiagramBuilder("jumps at ticks")
+    limited = builder.add(
+        "limited", RateLimiterContinuous(initial=1.0), builder.add("end", Constant(value=0.3))
+    )
+    names = []
+    for k, gain in enumerate([*random.uniform(0.5, 3.0, 2), *random.uniform(-3.0, -0.5, 2)]):
+        jumping = SignalGenerator(waveform="sawtooth", frequency=1.0 / (2.0 * PERIOD), amplitude=gain)
+        u = builder.add(f"u{k}", Sum(signs="++"), builder.add(f"jumping{k}", jumping), limited)
+        for block in (Backlash(width=random.uniform(0.1, 2.0)), Relay(on_point=0.4, off_point=-0.2)):
+            names.append(f"{block.type_name().lower()}{k}")
+            y = builder.add(names[-1], block, u)
+            builder.add(f"{names[-1]} held", ZeroOrderHold(sample_time=PERIOD), y)
+    result = ab.simulate(builder.build(), stop_time=20 * PERIOD, sample_time=PERIOD)
+    for name in names:
+        np.testing.assert_allclose(result[f"{name} held"], result[name], atol=1e-9, err_msg=name)

@@ -218,8 +218,8 @@ def _trace(structure: _Structure) -> BlockEquations:
             p["T_next"] = p["T"]
     at = Arguments(t, {**x, **z}, u, p, e)
     at = at.with_states(evaluated_conditions(own, requested, at))
-    at_consistent_modes = (
-        at.with_states(own.equations[SlotKind.MODE](at)) if structure.consistent_modes else at
+    at_consistent_modes = (  # from the previous modes: events before the ticks may have changed the modes
+        at.with_states(features.equations[SlotKind.MODE](at)) if structure.consistent_modes else at
     )
     results = {
         kind: features.equations[kind](at if kind is SlotKind.MODE else at_consistent_modes)
