@@ -79,8 +79,8 @@ class InternalForce(MechanicsBlock):
     title: ClassVar[str] = "Internal Force"
     sign: ClassVar[FaceSign] = Words("← f →")
     example: ClassVar[WorkedExample] = _slider_example(
-        "A constant force pulls a brick upwards against its weight.",
-        {"f": driver("Constant", value=-9.0).named("pull")},
+        "A force of 9.75 N carries most of the weight of a brick of 1 kg, which sinks slowly.",
+        {"f": driver("Constant", value=-9.75).named("pull")},
     )
 
     def frame_ports(self) -> tuple[FramePort, ...]:
