@@ -77,12 +77,30 @@ def test_the_search_can_be_stopped() -> None:
     assert stopped.stopped and stopped.evaluations < 50 and np.isfinite(stopped.condition)
 
 
+def test_limits_hold_between_samples_also_with_many_harmonics() -> None:
+    found = ab.excitation(
+        limited_arm(), 4.0, harmonics=60, speed=1.0, acceleration=40.0, dt=4 / 4001, evaluations=3
+    )
+    assert np.abs(found.trajectory.qd).max() <= 1.0 and np.abs(found.trajectory.qdd).max() <= 40.0
+
+
 def test_unsuitable_arguments_are_refused() -> None:
     arm = limited_arm()
     with pytest.raises(InputError, match="an integer from 2 to 100"):
         ab.excitation(arm, harmonics=1)
-    with pytest.raises(InputError, match="evaluations = 0"):
-        ab.excitation(arm, evaluations=0)
+    for wrong in ({"harmonics": float("nan")}, {"harmonics": "3"}):
+        with pytest.raises(InputError, match=r"harmonics = .*an integer from 2 to 100"):
+            ab.excitation(arm, **wrong)
+    for name, value in (
+        ("evaluations", 0),
+        ("evaluations", float("nan")),
+        ("evaluations", 2.5),
+        ("seed", -1),
+    ):
+        with pytest.raises(InputError, match=rf"{name} = {value}.*an integer, . or more"):
+            ab.excitation(arm, **{name: value})
+    with pytest.raises(InputError, match=r"dt = 5.0.*up to 0.2 s: 4 samples"):
+        ab.excitation(arm, 4.0, dt=5.0)
     with pytest.raises(InputError, match="no motion within the torque limits was found"):
         ab.excitation(arm, torque=0.01, evaluations=5)
     with pytest.raises(RobotError, match="the robot has ball joints"):

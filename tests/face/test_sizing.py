@@ -230,6 +230,7 @@ def test_unknown_columns_and_joints_are_refused(tmp_path: Path) -> None:
         (lambda: replace(DRIVE, max_speed="fast"), "max_speed = 'fast'"),
         (lambda: replace(DRIVE, rated_torque=1.0), "rated_torque and rated_speed are not given together"),
         (lambda: ab.size_drives(pendulum(), sine(1, 1), [DRIVE], pause=-1.0), "pause = -1.0.*0 or more"),
+        (lambda: ab.size_drives(pendulum(), sine(1, 1), [DRIVE], pause="1"), "pause = '1'.*0 or more"),
         (lambda: ab.size_drives(pendulum(), sine(1, 1), []), "no candidate for the joint 'joint'"),
         (
             lambda: ab.size_drives(pendulum(), ab.point_to_point(0, 0, speed=1, acceleration=1), [DRIVE]),

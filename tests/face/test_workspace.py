@@ -341,6 +341,7 @@ WRONG = [
     ({"samples": 0}, "samples = 0", InputError),
     ({"samples": 10.5}, "samples = 10.5", InputError),
     ({"measures": "speed"}, "measure named 'speed'", UnknownNameError),
+    ({"measures": ()}, "there is no measure. Allowed: one or more of condition", InputError),
     ({"axes": "linear"}, "choice of axes named 'linear'", UnknownNameError),
     ({"cell": -1.0}, "cell = -1.0", InputError),
     ({"frame": "hand"}, "frame named 'hand'", UnknownNameError),

@@ -20,8 +20,12 @@ from armblocks.face.trajectory_arguments import positive
 
 Array = NDArray[np.float64]
 
+_SAMPLES_A_WAVE = 4
+"""Least number of samples in a period of the last harmonic: fewer do not describe the motion."""
 _SAMPLES = 200
-"""Samples of a motion in the search."""
+"""Least number of samples of a motion in the search."""
+_SEARCH_SAMPLES_A_WAVE = 20
+"""Least number of samples in a period of the last harmonic, so that limits also hold between samples."""
 _FILL = 0.9
 """Share of the ranges of positions, speeds and accelerations that a motion uses at most."""
 _RANDOM = 0.2
@@ -81,15 +85,29 @@ def excitation(
     where = "excitation"
     check_joint_space(arm, where)
     period, step = positive("duration", duration, "s", where), positive("dt", dt, "s", where)
-    if isinstance(harmonics, bool) or int(harmonics) != harmonics or not 2 <= harmonics <= 100:
+    if not _is_integer(harmonics) or not 2 <= harmonics <= 100:
         raise InputError(
             f"harmonics = {harmonics!r}",
             where=where,
             allowed="an integer from 2 to 100",
             fix="use 5: a start and an end at rest need two or more terms",
         )
-    if evaluations < 1:
-        raise InputError(f"evaluations = {evaluations!r}", where=where, allowed="1 or more", fix="use 500")
+    if step * _SAMPLES_A_WAVE * harmonics > period * (1.0 + 1e-9):
+        raise InputError(
+            f"dt = {dt!r}",
+            where=where,
+            allowed=f"up to {period / (_SAMPLES_A_WAVE * harmonics):g} s: {_SAMPLES_A_WAVE} samples in a "
+            "period of the last harmonic",
+            fix="give a smaller dt, a longer duration, or fewer harmonics",
+        )
+    for name, value, least, usual in (("evaluations", evaluations, 1, 500), ("seed", seed, 0, 0)):
+        if not _is_integer(value) or value < least:
+            raise InputError(
+                f"{name} = {value!r}",
+                where=where,
+                allowed=f"an integer, {least} or more",
+                fix=f"use {usual}",
+            )
     limits = motion_limits(arm, where, speed, acceleration, torque)
     search = _Search(arm, period, int(harmonics), limits)
     best, found, count, stopped = search.run(evaluations, np.random.default_rng(seed), progress)
@@ -107,6 +125,10 @@ def excitation(
     return Excitation(trajectory=path, condition=found, evaluations=count, stopped=stopped)
 
 
+def _is_integer(value: object) -> bool:
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+
+
 class _Search:
     """Fourier series of the joints, as vectors of shapes (n, 2 H - 1): factors of series, and a position."""
 
@@ -122,7 +144,9 @@ class _Search:
         # Factors a with sum a = 0, and b with sum k b = 0: no speed and no acceleration at the start.
         ones, numbers = np.ones(harmonics), np.arange(1.0, harmonics + 1)
         self._cosines, self._sines = _complement(ones), _complement(numbers)
-        self._times = np.linspace(0.0, period, _SAMPLES, endpoint=False)
+        self._times = np.linspace(
+            0.0, period, max(_SAMPLES, _SEARCH_SAMPLES_A_WAVE * harmonics), endpoint=False
+        )
         low, high = robot.qlim.T
         wide = np.array([1.0 if entry.unit == "m" else np.pi for entry in robot.positions])
         self._low = np.where(np.isfinite(low), low, np.where(np.isfinite(high), high - 2.0 * wide, -wide))

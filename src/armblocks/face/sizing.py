@@ -149,7 +149,7 @@ def size_drives(
     with closed loops, ball joints, or motors at joints that depend on others.
     """
     where = "size_drives"
-    if not 0.0 <= pause < math.inf:
+    if isinstance(pause, str) or not 0.0 <= pause < math.inf:  # pyright: ignore[reportUnnecessaryIsInstance]
         raise InputError(
             f"pause = {pause!r}",
             where=where,

@@ -130,6 +130,13 @@ def checked_measures(measures: str | Sequence[str], where: str) -> tuple[str, ..
     for name in names:
         if name not in MEASURES:
             raise UnknownNameError("measure", str(name), MEASURES, where=where)
+    if not names:
+        raise InputError(
+            "there is no measure",
+            where=where,
+            allowed=f"one or more of {', '.join(sorted(MEASURES))}",
+            fix='omit measures for "manipulability"',
+        )
     return tuple(name for name in MEASURES if name in names)
 
 
