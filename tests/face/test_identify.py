@@ -283,6 +283,24 @@ def test_missing_samples_outliers_and_slow_samples() -> None:
     assert slow.degrees_of_freedom < result.degrees_of_freedom - 100
 
 
+def test_samples_at_rest_do_not_distort_a_vertical_slide_and_logs_may_be_split() -> None:
+    """On a vertical slide, weight and asymmetric Coulomb friction have one effect, except at rest."""
+    motor = ab.Motor(inertia=2e-3, gear_ratio=50.0, viscous_friction=1e-3, coulomb_friction=(0.02, -0.03))
+    up = ab.Link(name="up", joint=ab.Prismatic(axis=(0, 0, 1)), mass=3.0, motor=motor)
+    arm = ab.Arm(ab.Robot(name="lift", links=(up,)))
+    moving = noisy_log(arm, 600, noise=0.0)
+    rest = np.zeros((600, 1))
+    still = {"t": moving["t"], "q": rest, "qd": rest, "qdd": rest, "tau": arm.rne(rest, rest, rest)}
+    halves = [{k: v[part] for k, v in moving.items()} for part in (slice(0, 250), slice(250, None))]
+    for friction in ("asymmetric", "coulomb"):
+        alone = ab.identify(arm, moving, friction=friction)
+        for logs in ([moving, still], halves[::-1], [*halves, still]):
+            found = ab.identify(arm, logs, friction=friction)
+            assert_allclose(found.values, alone.values, rtol=1e-8, atol=1e-8)
+    with pytest.raises(InputError, match="decimate = nan"):
+        ab.identify(arm, moving, decimate=float("nan"))
+
+
 def test_logs_are_read_from_files_frames_and_runs(tmp_path: Path) -> None:
     arm = small_arm()
     log = noisy_log(arm, 200)

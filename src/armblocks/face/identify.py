@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -32,6 +33,9 @@ _ROBUST_ROUNDS = 30
 _KEPT = 1.12
 """Cut-off frequency before decimation, in units of half the new sample rate: neighbouring samples of white
 noise are then independent. Torques and regressor have the same aliasing, so that the estimate has no bias."""
+
+_COULOMB = ("asymmetric", "coulomb")
+"""Kinds of friction with unknown Coulomb friction."""
 
 
 @interrupts.kept()
@@ -66,7 +70,8 @@ def identify(
     joint, ``"coulomb"`` B and a symmetric Tc, ``"viscous"`` B; ``"none"`` keeps the friction of the
     description. ``rotor_inertia``: whether the inertia of the rotors is estimated. ``payload``: a known body
     at the tool during the measurement, a :class:`Payload` or kg. Samples of a joint that moves with less than
-    ``min_speed`` (rad/s or m/s) have no effect, because static friction is not in the model.
+    ``min_speed`` (rad/s or m/s) have no effect, because static friction is not in the model. If Coulomb
+    friction is estimated, samples at rest (speed 0) of a joint that also moves have no effect either.
 
     The torque of each joint has its own unknown noise, from which the weights follow (iterated weighted least
     squares). ``robust``: Huber's weights, for torques with outliers. Springs and gravity are taken from the
@@ -92,7 +97,7 @@ def identify(
         )
     base, effect = model.base()
     logs = prepared(read_logs(data, robot, where), robot, cutoff, whole=decimate > 1)
-    rows = _Rows(model, base, effect, arm, logs, payload, decimate, min_speed)
+    rows = _Rows(model, base, effect, arm, logs, payload, decimate, min_speed, friction in _COULOMB)
     rows.check_count(where)
     start = base.combined(model.prior)
     sensors, fit = _robust_fit(rows, start) if robust else _plain_fit(rows, start)
@@ -154,7 +159,7 @@ def _check_numbers(cutoff: float | None, decimate: int, min_speed: float, where:
             allowed="a frequency in Hz above 0",
             fix="use about five times the highest frequency of the motion",
         )
-    if isinstance(decimate, bool) or int(decimate) != decimate or decimate < 1:
+    if isinstance(decimate, bool) or not (1 <= decimate < math.inf and int(decimate) == decimate):
         raise InputError(
             f"decimate = {decimate!r}",
             where=where,
@@ -182,6 +187,7 @@ class _Rows:
     payload: Payload | float | None
     decimate: int
     min_speed: float
+    has_unknown_coulomb: bool
 
     def check_count(self, where: str) -> None:
         """Raise InputError for fewer torques than parameters."""
@@ -189,7 +195,7 @@ class _Rows:
         for segment in self.logs.segments:
             speeds = np.abs(segment.qd[:: self.decimate])
             samples += len(speeds)
-            torques += int(np.sum(speeds >= self.min_speed))
+            torques += sum(int(np.sum(self._counts(speeds[:, j], j))) for j in range(speeds.shape[1]))
         needed = len(self.base.base)
         if torques <= needed:
             raise InputError(
@@ -199,6 +205,22 @@ class _Rows:
                 fix="give a longer log, or choose fewer links; rows with missing values and samples below "
                 "min_speed do not count",
             )
+
+    def _counts(self, qd: Array, j: int) -> NDArray[np.bool_]:
+        """Which samples of joint ``j`` have an effect, by their speeds (N,)."""
+        speed = np.abs(qd)
+        if self._rest_is_unknown[j]:
+            return (speed >= self.min_speed) & (speed > 0.0)
+        return speed >= self.min_speed
+
+    @cached_property
+    def _rest_is_unknown(self) -> NDArray[np.bool_]:
+        """The joints (n,) whose samples at rest have no effect: they also move, and have unknown friction.
+
+        The Coulomb friction at rest is unknown, and a base parameter may contain it.
+        """
+        moves = np.any([np.any(segment.qd != 0.0, axis=0) for segment in self.logs.segments], axis=0)
+        return moves & self.has_unknown_coulomb
 
     def parts(self) -> Sequence[tuple[Segment, Array, Array]]:
         """Samples with the regressor X (n, b, N) and the torques y (n, N) without known parts; cached."""
@@ -243,7 +265,8 @@ class _Rows:
         for part, X, y in self.parts():
             count = len(part.time)
             for j, rows in enumerate(sensors):
-                used = np.abs(part.qd[:, j]) >= self.min_speed if self.min_speed else slice(None)
+                counts = self._counts(part.qd[:, j], j)
+                used = slice(None) if counts.all() else counts
                 columns = X[j][rows.columns].T[used]
                 values = y[j][used]
                 if weights is not None:
