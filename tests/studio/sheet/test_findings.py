@@ -3,7 +3,19 @@
 Messages and shapes are those of the flat diagram, which has other blocks than the sheets.
 """
 
-from armblocks.blocks import BusCreator, Constant, EnabledSubsystem, Gain, Switch
+from armblocks.blocks import (
+    BusCreator,
+    ConnectionPort,
+    Constant,
+    EnabledSubsystem,
+    Gain,
+    RevoluteJoint,
+    RigidTransform,
+    SphericalSolid,
+    Subsystem,
+    Switch,
+    WorldFrame,
+)
 from armblocks.diagram import Diagram, DiagramBuilder
 from armblocks.studio.sheet.check import check
 
@@ -38,3 +50,22 @@ def test_signals_of_a_subsystem_have_shapes_on_its_sheet_and_outside() -> None:
     assert findings == []
     for port in ("inside/u/y", "inside/gain/y", "inside/y"):
         assert wires[port].shape == [3], port
+
+
+def test_faults_of_a_mechanism_are_marked_while_inputs_are_unconnected() -> None:
+    builder = DiagramBuilder("rigid")
+    world = builder.add("world", WorldFrame())
+    inner = DiagramBuilder("inside")
+    base = inner.add("base", ConnectionPort())
+    tip = inner.add("tip", ConnectionPort())
+    hinge = inner.add("hinge", RevoluteJoint(actuation="torque"), B=base, F=tip)
+    inner.add("ball", SphericalSolid(), R=hinge["F"])
+    arm = builder.add("arm", Subsystem(diagram=inner.draft()))
+    builder.draw_line(arm["base"], world)
+    rod = builder.add("rod", RigidTransform(), B=world)
+    assert marked(builder.draft()) == {"arm/hinge": "the input 'tau' is not connected"}
+    builder.draw_line(rod["F"], arm["tip"])
+    fault, warning = check(builder.draft())[0]
+    assert (fault.block, fault.severity) == ("arm/hinge", "error")
+    assert "the base and the follower of the joint are on the same rigid body" in fault.what
+    assert (warning.block, warning.port, warning.severity) == ("arm/hinge", "tau", "warning")

@@ -10,6 +10,7 @@ from armblocks.diagram.check import check_diagram
 from armblocks.diagram.levels import joined, levels_of
 from armblocks.diagram.parameter_sets import check_parameter_sets
 from armblocks.errors import AlgebraicLoopError, ArmblocksError, DiagramError
+from armblocks.multibody.drawn_robots import drawn_robots
 from armblocks.studio.protocol.messages.sheets import Finding, WireKind
 
 _QUOTED = re.compile(r"block '([^']+)'")
@@ -23,7 +24,8 @@ def check(diagram: Diagram) -> tuple[list[Finding], dict[str, WireKind]]:
         return _findings(error, (), {}), {}
     if unconnected := list(open_inputs(levels)):
         # Shapes and loops can be checked only when every input has a driver.
-        return [_open_input(ref.block, ref.port) for ref in unconnected], {}
+        warnings = [_open_input(ref.block, ref.port) for ref in unconnected]
+        return [*_assembly_faults(diagram, levels), *warnings], {}
     block_paths = [joined(path, name) for path, level in levels.items() for name in level.blocks]
     try:
         wires = _wires(diagram)
@@ -32,6 +34,26 @@ def check(diagram: Diagram) -> tuple[list[Finding], dict[str, WireKind]]:
     except ArmblocksError as error:
         return _findings(error, block_paths, _origins(diagram)), {}
     return [], wires
+
+
+def _assembly_faults(diagram: Diagram, levels: Mapping[str, Diagram]) -> list[Finding]:
+    """Return the faults of mechanisms with a World Frame, at physical blocks, in a diagram with open inputs.
+
+    Other errors are not faults of a mechanism: they may follow from the unconnected inputs.
+    """
+    in_mechanisms = [
+        joined(path, name)
+        for path, level in levels.items()
+        for name, block in level.blocks.items()
+        if type(block).gathers is not None
+    ]
+    if not in_mechanisms:
+        return []
+    try:
+        drawn_robots(diagram)
+    except ArmblocksError as error:
+        return [finding for finding in _findings(error, in_mechanisms, {}) if finding.block]
+    return []
 
 
 def _open_input(block: str, port: str) -> Finding:
