@@ -595,6 +595,9 @@ def failure(recipe: Recipe, message: str) -> dict[str, list[str]]:
         raise InconclusiveError(
             f"{message}; comparisons are evaluated while their subsystem is disabled, too"
         )
+    stalled = re.search("block '(.+?)' causes events without end", message)
+    if stalled and getattr(flat.blocks.get(stalled[1]), "relation", "") in ("==", "~="):
+        raise InconclusiveError(f"{message}; the relation holds at one instant, which short steps pass over")
     is_stalled = "events without end" in message or "extremely short steps" in message
     if is_stalled and all(runs(neighbour) for neighbour in neighbours(recipe)):
         raise InconclusiveError(f"{message}; rounding errors cause the events or steps")

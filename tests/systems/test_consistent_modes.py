@@ -19,6 +19,7 @@ from armblocks.blocks import (
     Bias,
     Clock,
     CombinatorialLogic,
+    CompareToConstant,
     CompareToZero,
     Constant,
     CoulombFriction,
@@ -270,6 +271,22 @@ def test_a_quantizer_that_chatters_in_a_loop_is_reported() -> None:
     builder.connect(error, place["u"])
     with pytest.raises(SimulationError, match=r"'steps' causes events without end.*100000 within 1e-08"):
         ab.simulate(builder.build(), stop_time=100.0)
+
+
+def test_an_equality_that_drives_its_signal_back_is_reported_and_passes_without_zero_crossings() -> None:
+    """x' = (x ~= 0.5) - x: at 0.5 the comparison reverses x'. Elsewhere x = 1 - exp(-t)."""
+
+    def run(zero_crossing: bool) -> float:
+        builder = DiagramBuilder("equality")
+        x = builder.add("x", Integrator())
+        test = CompareToConstant(relation="~=", constant=0.5, zero_crossing=zero_crossing)
+        rate = builder.add("rate", Sum(signs="+-"), builder.add("test", test, x), x)
+        builder.connect(rate, x["u"])
+        return float(ab.simulate(builder.build(), stop_time=2.0)["x"][-1])
+
+    with pytest.raises(SimulationError, match=r"'test' causes events without end.* zero_crossing to False"):
+        run(zero_crossing=True)
+    assert run(zero_crossing=False) == pytest.approx(1.0 - np.exp(-2.0), abs=1e-6)
 
 
 def test_jumps_that_accumulate_at_a_pole_are_reported() -> None:

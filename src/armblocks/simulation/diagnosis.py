@@ -172,7 +172,7 @@ def _endless_events(system: CompiledSystem, run: Integration) -> SimulationError
         allowed=f"{MAX_CLOSE_EVENTS} consecutive events within {CLOSE_DISTANCE:g} t of each other, "
         f"{MAX_RAPID_EVENTS} within {RAPID_DISTANCE:g} t",
         fix=f"give '{blocks[0]}' a hysteresis, a dead band or a state of rest (no bounce below some speed), "
-        "or stop the run earlier",
+        "set its parameter zero_crossing to False if it has this parameter, or stop the run earlier",
     )
 
 
