@@ -284,7 +284,7 @@ def test_an_equality_that_drives_its_signal_back_is_reported_and_passes_without_
         builder.connect(rate, x["u"])
         return float(ab.simulate(builder.build(), stop_time=2.0)["x"][-1])
 
-    with pytest.raises(SimulationError, match=r"'test' causes events without end.* zero_crossing to False"):
+    with pytest.raises(SimulationError, match=r"'test' causes events without end.* zero_crossing=False"):
         run(zero_crossing=True)
     assert run(zero_crossing=False) == pytest.approx(1.0 - np.exp(-2.0), abs=1e-6)
 
