@@ -135,14 +135,17 @@ def wire(page: Page, source: str, target: str) -> None:
     """Draw a wire with the mouse, between two handles ``block/port``.
 
     The sheet pans while the mouse is near its edge, so the mouse follows the target until the sheet shows
-    that the wire would end there.
+    that the wire would end there. A frame port has two handles at one place, and the last one is uppermost.
     """
 
     keep_view(page)
 
-    def handle(port: str) -> Locator:
+    def handles(port: str, state: str = "") -> Locator:
         name, _, end = port.partition("/")
-        return block(page, name).locator(f'[data-handleid="{end}"]')
+        return block(page, name).locator(f'[data-handleid="{end}"]{state}')
+
+    def handle(port: str) -> Locator:
+        return handles(port).last
 
     def is_free(port: str) -> bool:
         """Whether the mouse can reach the handle: it is on the sheet and not covered."""
@@ -155,8 +158,8 @@ def wire(page: Page, source: str, target: str) -> None:
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(x + 4, y, steps=2)
-    expect(handle(source)).to_have_class(re.compile(r"\bconnectingfrom\b"))
-    reached = handle(target).and_(page.locator(".connectingto"))
+    expect(handles(source, ".connectingfrom")).to_have_count(1)
+    reached = handles(target, ".connectingto")
 
     def reach() -> bool:
         page.mouse.move(*middle(handle(target)), steps=5)
