@@ -355,9 +355,10 @@ class Network:
             return
         self.evaluate(float(np.nextafter(t, 0.0)), frozen=True)
         for block in self.blocks.values():
-            if block.on:
+            names = block.names("capture") if block.on else block.captured_while_off
+            if names:
                 self._feed_all(block)
-                captured = {name: block.value("capture", name).copy() for name in block.names("capture")}
+                captured = {name: block.value("capture", name).copy() for name in names}
                 for name, value in captured.items():
                     block.arrays[f"x:{name}"][:] = value
 
@@ -439,6 +440,18 @@ class Network:
             if block.name in later:
                 block.set_modes(old[block.name])
         return bool(fired) or acted or bool(later) or self.fingerprint() != before
+
+    def settle(self) -> bool:
+        """Apply the resets without events of blocks that start at this instant, as at the start of a run;
+        return whether a state has changed."""
+        before = self.fingerprint()
+        for name in {name for name, _ in self.signs}:
+            block = self.blocks[name]
+            if block.has_events and block.on and (block.was_restarted or not self.was_on[name]):
+                for array, value in self._reset(block, {}, {mode.name for mode in block.modes}):
+                    array[:] = value
+        self.evaluate(self.t)
+        return self.fingerprint() != before
 
     def _lowest_rank(self, fired: Iterable[tuple[str, str]]) -> float:
         """Return the lowest rank of the blocks with pending events, or infinity."""
@@ -528,6 +541,8 @@ class Network:
         self.was_on = {name: self.blocks[name].on for name in self.was_on}
         for block in self.blocks.values():
             block.was_restarted = False
+            for name in block.momentary:
+                block.arrays[f"x:{name}"][:] = 0.0
 
     @property
     def delays(self) -> bool:

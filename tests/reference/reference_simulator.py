@@ -251,7 +251,9 @@ class ReferenceRun:
         """Repeat the iteration of an instant until nothing changes; with a ``last_rank``, only for events up
         to this rank."""
         for _ in range(MAX_ITERATIONS):
-            if not self.network.iterate(t, last_rank=last_rank):
+            if not self.network.iterate(t, last_rank=last_rank) and not (
+                last_rank == math.inf and self.network.settle()
+            ):
                 return
         raise EndlessEventsError(f"the events at {t} do not end")
 

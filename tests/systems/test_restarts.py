@@ -17,13 +17,17 @@ from numpy.typing import ArrayLike
 import armblocks as ab
 from armblocks import Diagram, DiagramBuilder
 from armblocks.blocks import (
+    PWM,
     ActionSubsystem,
     Backlash,
     Bias,
+    Clock,
     Constant,
     CoulombFriction,
+    Derivative,
     EnabledSubsystem,
     EnabledTriggeredSubsystem,
+    FirstOrderHold,
     Gain,
     HitCrossing,
     If,
@@ -34,6 +38,8 @@ from armblocks.blocks import (
     PulseGenerator,
     RateLimiterContinuous,
     Relay,
+    RepeatingSequenceStair,
+    ResettableIntegrator,
     ResettableSubsystem,
     SignalGenerator,
     SineWave,
@@ -123,6 +129,19 @@ def _contents() -> Diagram:
     b.add("hit relay", HitCrossing(offset=0.5), b.add("relay", Relay(on_point=0.15, off_point=-0.1), x))
     limited = b.add("limited", RateLimiterContinuous(rising=1.0, falling=-1.0), v)
     b.add("hit limited", HitCrossing(offset=0.1), limited)
+    stairs = b.add("stairs", RepeatingSequenceStair(values=(-0.7, 0.4, -0.3), sample_time=0.125))
+    b.add("limited stairs", RateLimiterContinuous(), stairs)
+    for method in ("extrapolation", "interpolation"):
+        b.add(method, FirstOrderHold(method=method, period=0.125, initial=0.3), x)
+    b.add("pulses", PWM(period=0.125), above)
+    from_port = ResettableIntegrator(
+        external_reset="rising", initial_condition_source="external", initial=9.0, state_port=True
+    )
+    first = b.add("from x", from_port, u, above, x)
+    second = b.add("from first", from_port, first["y"], above, first["y"])
+    third = b.add("from second", from_port.with_parameters(limit_output=True), v, above, second["state"])
+    b.add("sampled state", ZeroOrderHold(sample_time=0.125), third["state"])
+    b.add("from a hold", from_port, v, above, b.add("held x", ZeroOrderHold(sample_time=0.125), x))
     b.add("friction", CoulombFriction(), above)
     b.add("tally", Tally(sample_time=0.0625))
     b.add("delay", UnitDelay(sample_time=0.125, initial=3.0), x)
@@ -158,7 +177,54 @@ def test_a_subsystem_continues_after_a_reset_as_at_the_start_of_a_run(kind: str,
             first_period = np.broadcast_to(periods[0], periods.shape)
             np.testing.assert_allclose(periods, first_period, rtol=0.0, atol=1e-6, err_msg=name)
             changes += np.ptp(periods) > 0.0
-    assert changes > 40
+    assert changes > 60
+
+
+def test_the_initial_value_from_a_port_is_the_value_of_the_signal_at_the_start() -> None:
+    """x(0) = k x(0) + 1 is solved also where an iteration diverges; a hold reads the state at the start."""
+    b = DiagramBuilder("starts")
+    one = b.add("one", Constant(value=1.0))
+    rule = ResettableIntegrator(
+        external_reset="none", initial_condition_source="external", initial=0.5, state_port=True
+    )
+    for number, k in enumerate((-1.0, 0.99, 2.0)):
+        x = b.add(f"x {number}", rule)
+        b.connect(one, x["u"])
+        product = b.add(f"gain {number}", Gain(gain=k), x["y"])
+        b.connect(b.add(f"sum {number}", Sum(), product, one), x["initial"])
+        b.add(f"hold {number}", ZeroOrderHold(sample_time=0.25), x["state"])
+        b.add(f"rate {number}", Derivative(), x["y"])
+    result = ab.simulate(b.build(), stop_time=1.0, sample_time=0.25)
+    for number, k in enumerate((-1.0, 0.99, 2.0)):
+        expected = 1.0 / (1.0 - k) + result.time
+        for name in (f"x {number}/y", f"x {number}/state", f"hold {number}"):
+            np.testing.assert_allclose(result[name], expected, rtol=1e-9, atol=1e-9, err_msg=name)
+        assert [*result[f"rate {number}"]] == [1.0] * 5
+
+
+@pytest.mark.parametrize("states", ("held", "reset"))
+def test_a_sampling_block_in_a_subsystem_misses_the_samples_while_it_is_off(states: str) -> None:
+    """On for 0.3 to 0.9 s and 1.3 to 1.9 s: the samples at 0.5, 0.75, 1.5 and 1.75 s are taken."""
+    inner = DiagramBuilder("part")
+    u = inner.add("u", Inport())
+    inner.add("line", FirstOrderHold(period=0.25, initial=-1.0), u)
+    inner.add("pulses", PWM(period=0.25), inner.add("duty", Constant(value=0.4)))
+    inner.add("y", Outport(), u)
+    b = DiagramBuilder("misses")
+    on = b.add("on", PulseGenerator(period=1.0, width=60.0, delay=0.3))
+    inside = EnabledSubsystem(diagram=inner.build(), states_when_enabling=states)
+    b.add("sub", inside, b.add("t", Clock()), enable=on)
+    result = ab.simulate(b.build(), stop_time=1.875, sample_time=0.0625)
+    t = result.time
+    is_on = ((t > 0.3) & (t < 0.9)) | (t > 1.3)
+    latest = np.floor(4.0 * t) / 4.0  # the latest sample time
+    taken = (latest == 0.5) | (latest == 0.75) | (latest == 1.5) | (latest == 1.75)
+    kept = np.where(t < 1.0, -1.0, {"held": 0.75, "reset": -1.0}[states])
+    before = np.where((latest == 0.5) | (latest == 1.5), kept, latest - 0.25)
+    line = np.where(taken, latest + (latest - before) * (t - latest) / 0.25, kept)
+    np.testing.assert_allclose(result["sub/line"][is_on], line[is_on], rtol=0.0, atol=1e-12)
+    pulses = taken & (t - latest < 0.1)
+    assert np.array_equal(result["sub/pulses"][is_on], pulses[is_on])
 
 
 def test_guards_of_a_sampled_block_fire_after_the_tick_that_changes_its_states() -> None:

@@ -119,6 +119,7 @@ def while_on(features: Features, kinds: Iterable[SlotKind]) -> Features:
     off at the same instant. The mode then returns to its previous value.
     """
     previous = {mode.name: mode.before for mode in features.modes if mode.hysteresis}
+    captured = {state.name for state in features.discrete if state.captured_while_off}
 
     def off_value(kind: SlotKind, name: str, at: Arguments) -> SX | float:
         if kind is SlotKind.MODE:
@@ -129,7 +130,9 @@ def while_on(features: Features, kinds: Iterable[SlotKind]) -> Features:
 
     def gated(kind: SlotKind, equation: Equation) -> Equation:
         return lambda at: {
-            name: if_else(at.u[ON] != 0.0, value, off_value(kind, name, at))
+            name: value
+            if kind is SlotKind.CAPTURE and name in captured
+            else if_else(at.u[ON] != 0.0, value, off_value(kind, name, at))
             for name, value in equation(at).items()
         }
 
@@ -293,9 +296,13 @@ def _plain(values: Signals) -> dict[str, SX]:
 
 
 def _initial_states(features: Features, at: Arguments) -> dict[str, SX]:
-    """The initial states after a restart; the previous values of modes are 0."""
+    """The initial states after a restart; the previous values of modes are 0.
+
+    A state that is captured while the subsystem is off, such as the time of an instant, keeps its value.
+    """
     before = {name_before(name) for name in at.x} & set(at.x)
-    starts = {name: SX(value) for name, value in features.initial_states(at.p).items()}
+    kept = {state.name for state in features.discrete if state.captured_while_off}
+    starts = {name: SX(v) for name, v in features.initial_states(at.p).items() if name not in kept}
     return starts | {name: SX(0.0) for name in sorted(before)}
 
 

@@ -13,9 +13,11 @@ from armblocks.blocks.periodic import (
     INSTANT,
     ODD,
     RESAMPLE,
+    UP_TO_DATE,
     WHEN,
     sample_time,
     sampled,
+    sampling_contradictions,
     sampling_guards,
 )
 from armblocks.diagram import (
@@ -43,7 +45,8 @@ class FirstOrderHold(Block):
     jump, one period late: y(t) = u(t_(k-1)) + (u(t_k) - u(t_(k-1))) (t - t_k) / T. Simulink's First Order
     Hold extrapolates. ``initial`` is the sample before the first sample, and y before ``offset``.
 
-    A sampled block that ticks at t_k reads the left limit of y.
+    A sampled block that ticks at t_k reads the left limit of y. Sample times at which the block is in a
+    subsystem that is off are missed; y is then constant until the next sample time.
     """
 
     title: ClassVar[str] = "First Order Hold"
@@ -81,6 +84,9 @@ class FirstOrderHold(Block):
         )
         return (COUNT, WHEN, ODD, *samples)
 
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return (UP_TO_DATE,)
+
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         return INSTANT, RESAMPLE
 
@@ -100,10 +106,16 @@ class FirstOrderHold(Block):
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return sampling_guards(t, x, p, u["u"], x["last"])
 
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"up_to_date": SX(1.0)}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return sampling_contradictions(t, x, p, u["u"], x["last"])
+
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        at_sample_time, samples, sampling_states = sampled(t, x, p, e)
+        sampling = sampled(t, x, p, e)
         return {
-            **sampling_states,
-            "last": if_else(samples, u["u"], x["last"]),
-            "before": if_else(at_sample_time, x["last"], x["before"]),
+            **sampling.states,
+            "last": if_else(sampling.samples, u["u"], x["last"]),
+            "before": if_else(sampling.begins, x["last"], x["before"]),
         }

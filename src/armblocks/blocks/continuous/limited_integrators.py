@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from casadi import SX, fmax, fmin, if_else, logic_and, logic_or
+from casadi import SX, fabs, fmax, fmin, if_else, logic_and, logic_or, mmax
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import parameters_shape
@@ -101,20 +101,23 @@ class ResettableIntegrator(Block):
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         shape = self.output_shapes(inputs)["y"]
-        initialised = (
+        from_port = (
             State("initialised", (), "0 until the initial value has been read from the port, then 1"),
+            State("starts", (), "1 from then to the end of the instant", momentary=True),
         )
         left_limit = (State("left_limit", shape, "left limit of the initial value"),)
         return (
-            *(initialised if self.initial_condition_source == "external" else ()),
+            *(from_port if self._starts_from_port else ()),
             *(left_limit if self.external_reset == "level hold" else ()),
         )
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         held = (State("held", (), "1 while the trigger is not 0, else 0"),)
+        started = (State("started", (), "1 after the initial value has been read from the port"),)
         shape = self.output_shapes(inputs)["y"]
         return (
             *(held if self._by_level else ()),
+            *(started if self._starts_from_port else ()),
             *((_limit_mode(shape),) if self.limit_output else ()),
         )
 
@@ -124,14 +127,15 @@ class ResettableIntegrator(Block):
         shape = self.output_shapes(inputs)["y"]
         return (
             *(() if self.external_reset == "none" else (reset,)),
-            *((initialisation,) if self.initial_condition_source == "external" else ()),
+            *((initialisation,) if self._starts_from_port else ()),
             *(_limit_guards(shape) if self.limit_output else ()),
         )
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        y = if_else(x["held"], self._start(u, p), x["x"]) if self._by_level else x["x"]
+        state = if_else(self._starts(x), self._start(u, p), x["x"]) if self._starts_from_port else x["x"]
+        y = if_else(x["held"], self._start(u, p), state) if self._by_level else state
         saturated = {"saturated": x["mode"]} if self.limit_output else {}
-        return {"y": y, **saturated, **({"state": x["x"]} if self.state_port else {})}
+        return {"y": y, **saturated, **({"state": state} if self.state_port else {})}
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         rate = if_else(x["mode"] == 0.0, u["u"], 0.0) if self.limit_output else u["u"]
@@ -139,10 +143,9 @@ class ResettableIntegrator(Block):
 
     def initial_states(self, p: Signals) -> Signals:
         start = self._within(p["initial"], p)
-        initialised = {"initialised": SX(0.0)} if self.initial_condition_source == "external" else {}
         return {
             "x": start,
-            **initialised,
+            **({"initialised": SX(0.0), "starts": SX(0.0)} if self._starts_from_port else {}),
             **({"left_limit": start} if self.external_reset == "level hold" else {}),
         }
 
@@ -150,13 +153,24 @@ class ResettableIntegrator(Block):
         values = _limit_guard_values(x, u, p) if self.limit_output else {}
         if self.external_reset != "none":
             values["reset"] = (self._level(u) if self._by_level else u["reset"]) - THRESHOLD_OFFSET
-        if self.initial_condition_source == "external":
+        if self._starts_from_port:
             values["initialisation"] = 0.5 - x["initialised"]
         return values
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         held = {"held": self._level(u) > 0.0} if self._by_level else {}
-        return {**held, **({"mode": _limit_side(x["x"], x["mode"], u, p)} if self.limit_output else {})}
+        started = {"started": SX(1.0)} if self._starts_from_port else {}
+        limit = {"mode": _limit_side(x["x"], x["mode"], u, p)} if self.limit_output else {}
+        return {**held, **started, **limit}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        contradictions = dict(super().contradictions(t, x, u, p))
+        if self._starts_from_port:
+            # At the restart of a subsystem no guard fires. The contradiction causes the reset, and repeats it
+            # where the signal at the port changes within the instant.
+            differs = mmax(fabs(x["x"] - self._start(u, p)) > 0.0)
+            contradictions["started"] = if_else(x["starts"], differs, x["initialised"] == 0.0)
+        return contradictions
 
     def captures(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"left_limit": self._start(u, p)} if self.external_reset == "level hold" else {}
@@ -171,11 +185,11 @@ class ResettableIntegrator(Block):
             after["held"] = if_else(e["reset"] == 0.0, x["held"], e["reset"] > 0.0)
         elif self.external_reset != "none":
             is_reset = e["reset"] != 0.0
-        if self.initial_condition_source == "external":
-            # At t = 0 the signal at the port may still change during the mode iteration.
-            initialises = logic_or(x["initialised"] == 0.0, t <= 0.0)
-            start = if_else(initialises, self._start(u, p), start)
-            is_reset = logic_or(is_reset, initialises)
+        if self._starts_from_port:
+            # The signal at the port may still change during the mode iteration of the instant.
+            start = if_else(self._starts(x), self._start(u, p), start)
+            is_reset = logic_or(is_reset, self._starts(x))
+            after["starts"] = if_else(x["initialised"], x["starts"], 1.0)
             after["initialised"] = SX(1.0)
         after["x"] = if_else(is_reset, start, after["x"])
         if self.limit_output:
@@ -185,6 +199,15 @@ class ResettableIntegrator(Block):
     @property
     def _by_level(self) -> bool:
         return self.external_reset in LEVELS
+
+    @property
+    def _starts_from_port(self) -> bool:
+        return self.initial_condition_source == "external"
+
+    @staticmethod
+    def _starts(x: Signals) -> SX:
+        """Whether the state follows the port: before the initial value is read, and at the same instant."""
+        return logic_or(x["initialised"] == 0.0, x["starts"] != 0.0)
 
     def _level(self, u: Signals) -> SX:
         return if_else(trigger_state(self.external_reset, u["reset"]), 1.0, 0.0)

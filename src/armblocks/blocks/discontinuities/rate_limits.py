@@ -61,7 +61,8 @@ class RateLimiting(Block):
             self.output_shapes(inputs)["y"],
             "left limit of the output at the latest tick, event or breakpoint",
         )
-        return (left_limit, State("left_limit_time", (), "time of the latest tick, event or breakpoint", "s"))
+        doc = "time of the latest tick, event or breakpoint"
+        return (left_limit, State("left_limit_time", (), doc, "s", captured_while_off=True))
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         doc = "1 at the rising limit, -1 at the falling limit, 0 following u"

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from casadi import SX, fmax, fmin, if_else, logic_or
+from casadi import SX, fmax, fmin, if_else
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.external_resets import (
@@ -119,7 +119,9 @@ class DiscreteIntegrator(Block):
         values = {"y": y}
         if self.saturation_port:
             values["saturated"] = if_else(y >= p["upper"], 1.0, if_else(y <= p["lower"], -1.0, 0.0))
-        return values | ({"state": x["x"]} if self.state_port else {})
+        return values | (
+            {"state": self._limited(self._state_before_reset(x, u, p), p)} if self.state_port else {}
+        )
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         interval = interval_of_update(self.method, p)
@@ -141,14 +143,17 @@ class DiscreteIntegrator(Block):
 
     def _state_after_reset(self, x: Signals, u: Signals, p: Signals) -> SX:
         """The state at this tick, after a possible reset."""
-        if not self._has_resets:
+        state = self._state_before_reset(x, u, p)
+        if self.external_reset == "none":
+            return state
+        resets = fires_at_tick(self.external_reset, u["reset"], x["previous"])
+        return if_else(resets, u.get("initial", p["initial"]), state)
+
+    def _state_before_reset(self, x: Signals, u: Signals, p: Signals) -> SX:
+        """The state at this tick; at the first tick, the initial value."""
+        if self.initial_condition_source != "external":
             return x["x"]
-        resets = SX(0.0)
-        if self.external_reset != "none":
-            resets = fires_at_tick(self.external_reset, u["reset"], x["previous"])
-        if self.initial_condition_source == "external":
-            resets = logic_or(resets, x["previous"] < 0.0)
-        return if_else(resets, u.get("initial", p["initial"]), x["x"])
+        return if_else(x["previous"] < 0.0, u["initial"], x["x"])
 
     def _limited(self, value: SX, p: Signals) -> SX:
         return fmin(fmax(value, p["lower"]), p["upper"])

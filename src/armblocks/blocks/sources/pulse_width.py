@@ -5,16 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from casadi import SX, fmax, fmin, if_else, logic_and
+from casadi import SX, fmax, fmin, if_else, logic_and, logic_or
 
 from armblocks.blocks.periodic import (
     COUNT,
     INSTANT,
     ODD,
     RESAMPLE,
+    UP_TO_DATE,
     WHEN,
     sample_time,
     sampled,
+    sampling_contradictions,
     sampling_guards,
 )
 from armblocks.blocks.switching import since
@@ -38,7 +40,7 @@ class PWM(Block):
 
     The duty cycle D is sampled at the start of each period, as in Simulink's PWM. Both edges are located
     exactly. The mean of y over a period is D times the amplitude. A sampled block that ticks at an edge reads
-    the left limit of y.
+    the left limit of y. A period that begins while the block is in a subsystem that is off has no pulse.
     """
 
     title: ClassVar[str] = "PWM"
@@ -63,6 +65,9 @@ class PWM(Block):
         high = State("high", (), "1 during a pulse, else 0")
         return (COUNT, WHEN, ODD, State("duty", (), "the duty cycle of this period"), high)
 
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return (UP_TO_DATE,)
+
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         return INSTANT, RESAMPLE, Guard("edge", (), "t - the end of the pulse", 1)
 
@@ -76,12 +81,18 @@ class PWM(Block):
         edge = since(t, sample_time(p, x["count"] - 1.0 + x["duty"]))
         return {**sampling_guards(t, x, p, _limited(u["D"]), x["duty"]), "edge": edge}
 
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"up_to_date": SX(1.0)}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return sampling_contradictions(t, x, p, _limited(u["D"]), x["duty"])
+
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        _, samples, sampling_states = sampled(t, x, p, e)
-        duty = if_else(samples, _limited(u["D"]), x["duty"])
-        pulse_ends = logic_and(e["edge"] > 0.0, x["duty"] < 1.0)
-        high = if_else(samples, duty > 0.0, if_else(pulse_ends, 0.0, x["high"]))
-        return {**sampling_states, "duty": duty, "high": high}
+        sampling = sampled(t, x, p, e)
+        duty = if_else(sampling.missed, 0.0, if_else(sampling.samples, _limited(u["D"]), x["duty"]))
+        pulse_ends = logic_or(sampling.missed, logic_and(e["edge"] > 0.0, x["duty"] < 1.0))
+        high = if_else(sampling.samples, duty > 0.0, if_else(pulse_ends, 0.0, x["high"]))
+        return {**sampling.states, "duty": duty, "high": high}
 
 
 def _limited(duty: SX) -> SX:
