@@ -158,7 +158,7 @@ class _AugmentedSystem:
         elements = [element for slot in self.old.discrete for element in slot.elements]
         delays = [elements[index].rpartition("/")[0] for index in self.delays.values]
         breakpoints = [self.instants.source(index) for index in self.instants.moving_breakpoints]
-        names = [self.old.name, self.old.name, *breakpoints, *delays, *delays]
+        names = [self.old.name, self.old.name, *breakpoints, *delays, *delays, self.old.name]
         assert len(names) == count
         return names
 

@@ -125,18 +125,22 @@ class Instants:
             self.arms,
             *(c.t - self.times[k] + 1e-300 for k in self.moving_breakpoints),
             *self.delays.guards(at_instant),
+            1.0,
         )
 
     def directions(self) -> tuple[int, ...]:
-        """The directions of the added guards."""
-        return 0, 0, *[1] * (len(self.moving_breakpoints) + 2 * self.delays.n)
+        """The directions of the added guards.
+
+        The last guard never fires. The loop marks it where a call changes following modes only.
+        """
+        return 0, 0, *[1] * (len(self.moving_breakpoints) + 2 * self.delays.n), 0
 
     def ranks(self, own: EventRanks) -> EventRanks:
         """The ranks of all guards. Guards of sources and of arriving delayed jumps come first, with a
         negative rank, because they change only derivatives. Guards of delay inputs that jumped come after the
         guards of the system, and guards that end an instant come last."""
         n, last = self.delays.n, max(own.guards)
-        added = (last + 2, last + 2, *[-1] * (len(self.moving_breakpoints) + n), *[last + 1] * n)
+        added = (last + 2, last + 2, *[-1] * (len(self.moving_breakpoints) + n), *[last + 1] * n, last + 2)
         return dataclasses.replace(
             own,
             guards=(*own.guards, *added),
@@ -191,9 +195,9 @@ class Instants:
     def reset(self, e: SX) -> tuple[SX, SX]:
         """All states and discrete variables after the events ``e``, including events of the added guards."""
         c, d, names = self.columns, self.delays, self.columns.names
-        counts = [self.guards, 2, len(self.moving_breakpoints), d.n, d.n]
-        own, arms, sources, arrived, jumped = vertsplit(e, [0, *accumulate(counts)])
-        fired, no_event = _any_marked(own), logic_not(_any_marked(e))
+        counts = [self.guards, 2, len(self.moving_breakpoints), d.n, d.n, 1]
+        own, arms, sources, arrived, jumped, follows = vertsplit(e, [0, *accumulate(counts)])
+        fired, no_event = _any_marked(own), logic_not(_any_marked(e[:-1]))
         others = logic_or(_any_marked(vertcat(own, sources, arrived, jumped)), no_event)
         first = logic_not(self.known)
         instants, mixed = self._instants(own, no_event, sources, arrived)
@@ -208,7 +212,9 @@ class Instants:
         S = [known + step for known, step in zip(c.S, along)]
         Z = [self._with_left_limits(c.Z[k], first, instants[k]) for k in range(len(names))]
 
-        n, jumps = c.x.numel(), logic_or(fired, no_event)
+        n, changes_values = c.x.numel(), logic_or(fired, no_event)
+        # A call for following modes changes no state, and therefore no derivative of a state.
+        changes_derivatives = logic_and(changes_values, follows == 0.0)
         after = c.value(c.system.reset, own)
         changed = [
             c.derivative_along(
@@ -222,8 +228,9 @@ class Instants:
             for k, instant in enumerate(instants)
         ]
         parts = [vertsplit(column, [0, n, n + c.z.numel()]) for column in (after, *changed)]
-        x = [if_else(jumps, part[0], present) for part, present in zip(parts, (c.x, *S))]
-        z = [if_else(jumps, part[1], present) for part, present in zip(parts, (c.z, *Z))]
+        jumps = [changes_values, *[changes_derivatives] * len(names)]
+        x = [if_else(jump, part[0], present) for jump, part, present in zip(jumps, parts, (c.x, *S))]
+        z = [if_else(jump, part[1], present) for jump, part, present in zip(jumps, parts, (c.z, *Z))]
 
         opened = logic_and(logic_or(self.open, enters), logic_not(leaves))
         repeats = logic_and(opened, others)

@@ -108,9 +108,7 @@ class Events:
             iterations.value = iterations.value + 1
             loop.leave_unless(iterations.value < ITERATIONS_TOGETHER + self.modes)
             loop.leave_unless(r.call(functions.any_inconsistent, f.reals, r.constant_boolean(True)))
-            self.reset()
-            self._restrict_mode_changes(iterations, follows=True)
-            r.call(functions.copy_following_modes, f.reals)
+            self._reset_following_modes(iterations)
 
     def reset(self) -> None:
         """Compute ``new_x`` and ``new_z`` for the events that are marked in ``fired``."""
@@ -206,13 +204,27 @@ class Events:
         f, r, functions = self.frame, self.frame.r, self.functions
         r.call(functions.any_fired, f.reals, r.constant_boolean(True))
         self._count_iteration_without_event(time, iterations)
-        self.reset()
-        self._restrict_mode_changes(iterations, follows=True)
-        r.call(functions.copy_following_modes, f.reals)
+        self._reset_following_modes(iterations)
         self.evaluation.solve(self.point.memory, self.x)
         if f.sizes.tangents is not None:
             functions.evaluate(r, self.point.memory, self.x, f.reals, f.p)
             r.call(functions.store_tangent_signs, f.reals)
+
+    def _reset_following_modes(self, iterations: IntegerVariable) -> None:
+        """Give inconsistent following modes their consistent values; no state changes.
+
+        The last guard of a system with derivatives marks this call: derivatives of states change only along
+        the instant.
+        """
+        f, fired = self.frame, self.frame.vector(self.frame.workspace.fired)
+        marks = f.sizes.tangents is not None and self.guards > f.sizes.tangents[2]
+        if marks:
+            fired[self.guards - 1] = 1.0
+        self.reset()
+        if marks:
+            fired[self.guards - 1] = 0.0
+        self._restrict_mode_changes(iterations, follows=True)
+        f.r.call(self.functions.copy_following_modes, f.reals)
 
     def _iterate_stateful_modes(self, time: Real, iterations: IntegerVariable) -> None:
         """One iteration of the stateful modes, without an event."""

@@ -18,6 +18,7 @@ from armblocks.blocks.external_resets import (
     reset_ports,
     trigger_state,
 )
+from armblocks.blocks.periodic import SAME_VALUE
 from armblocks.blocks.switching import THRESHOLD_OFFSET, limits_in_order
 from armblocks.diagram import (
     Block,
@@ -168,7 +169,8 @@ class ResettableIntegrator(Block):
         if self._starts_from_port:
             # At the restart of a subsystem no guard fires. The contradiction causes the reset, and repeats it
             # where the signal at the port changes within the instant.
-            differs = mmax(fabs(x["x"] - self._start(u, p)) > 0.0)
+            start = self._start(u, p)
+            differs = mmax(fabs(x["x"] - start) > SAME_VALUE * fmax(fabs(x["x"]), fabs(start)))
             contradictions["started"] = if_else(x["starts"], differs, x["initialised"] == 0.0)
         return contradictions
 
