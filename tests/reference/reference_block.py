@@ -82,7 +82,7 @@ class BlockNumbers:
         self.states = block.states(shapes)
         self.discrete = block.discrete_states(shapes)
         self.momentary = [state.name for state in self.discrete if state.momentary]
-        self.captured_while_off = [state.name for state in self.discrete if state.captured_while_off]
+        self.captured_when_enabled = [state.name for state in self.discrete if state.captured_when_enabled]
         self.lines = block.delay_lines(shapes)
         self.conditions = block.conditions(shapes)
         self.modes = (*block.modes(shapes), *self.conditions)
@@ -257,7 +257,7 @@ class BlockNumbers:
 
     def restart(self) -> None:
         self.was_restarted = True
-        for name in set(self.names("start")) - set(self.captured_while_off):
+        for name in set(self.names("start")) - set(self.captured_when_enabled):
             self.arrays[f"x:{name}"][:] = self.value("start", name)
         for name in (*(mode.name for mode in self.modes), *(mode.before for mode in self.remembered)):
             self.arrays[f"x:{name}"][:] = 0.0

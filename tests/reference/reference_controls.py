@@ -21,7 +21,7 @@ class _ControlBlock:
 
     clock = None
     period = 0.0
-    states = lines = guards = conditions = momentary = captured_while_off = ()
+    states = lines = guards = conditions = momentary = captured_when_enabled = ()
     has_events = False
     expressions: Mapping[Any, Any] = {}
     memory: tuple[str, ...] = ()

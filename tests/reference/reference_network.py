@@ -355,10 +355,9 @@ class Network:
             return
         self.evaluate(float(np.nextafter(t, 0.0)), frozen=True)
         for block in self.blocks.values():
-            names = block.names("capture") if block.on else block.captured_while_off
-            if names:
+            if block.on:
                 self._feed_all(block)
-                captured = {name: block.value("capture", name).copy() for name in names}
+                captured = {name: block.value("capture", name).copy() for name in block.names("capture")}
                 for name, value in captured.items():
                     block.arrays[f"x:{name}"][:] = value
 
@@ -405,6 +404,10 @@ class Network:
         the end of the previous mode. With a ``last_rank``, only events up to this rank are processed.
         """
         before = self.fingerprint()
+        for name in self.was_on:
+            block = self.blocks[name]
+            for entry in block.captured_when_enabled if block.on and not self.was_on[name] else ():
+                block.arrays[f"x:{entry}"][:] = block.value("capture", entry)
         eventful = [block for block in self.blocks.values() if block.has_events]
         old = {block.name: block.mode_values() for block in eventful}
         self.evaluate(t)

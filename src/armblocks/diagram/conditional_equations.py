@@ -119,7 +119,6 @@ def while_on(features: Features, kinds: Iterable[SlotKind]) -> Features:
     off at the same instant. The mode then returns to its previous value.
     """
     previous = {mode.name: mode.before for mode in features.modes if mode.hysteresis}
-    captured = {state.name for state in features.discrete if state.captured_while_off}
 
     def off_value(kind: SlotKind, name: str, at: Arguments) -> SX | float:
         if kind is SlotKind.MODE:
@@ -130,9 +129,7 @@ def while_on(features: Features, kinds: Iterable[SlotKind]) -> Features:
 
     def gated(kind: SlotKind, equation: Equation) -> Equation:
         return lambda at: {
-            name: value
-            if kind is SlotKind.CAPTURE and name in captured
-            else if_else(at.u[ON] != 0.0, value, off_value(kind, name, at))
+            name: if_else(at.u[ON] != 0.0, value, off_value(kind, name, at))
             for name, value in equation(at).items()
         }
 
@@ -232,6 +229,7 @@ def with_consistent_modes(features: Features) -> Features:
     """
     equations = features.equations
     captured_with_modes = {state.name for state in features.discrete if state.hysteresis}
+    captured_when_enabled = {state.name for state in features.discrete if state.captured_when_enabled}
 
     def modes(at: Arguments) -> Signals:
         return {**equations[SlotKind.MODE](at), _MODES_CONSISTENT: at.u[ON] != 0.0}
@@ -257,6 +255,9 @@ def with_consistent_modes(features: Features) -> Features:
         earlier = {name: present[name_before(name)] for name in present if name_before(name) in present}
         for name, value in modes(dataclasses.replace(at, x={**present, **earlier})).items():
             after[name] = if_else(turns_on, value, after.get(name, at.x[name]))
+        for name, value in equations[SlotKind.CAPTURE](at).items() if captured_when_enabled else ():
+            if name in captured_when_enabled:
+                after[name] = if_else(turns_on, value, after.get(name, at.x[name]))
         after[_MODES_CONSISTENT] = at.u[ON] != 0.0
         return after
 
@@ -298,10 +299,10 @@ def _plain(values: Signals) -> dict[str, SX]:
 def _initial_states(features: Features, at: Arguments) -> dict[str, SX]:
     """The initial states after a restart; the previous values of modes are 0.
 
-    A state that is captured while the subsystem is off, such as the time of an instant, keeps its value.
+    A state that is captured when the subsystem is enabled, such as the time of an instant, keeps its value.
     """
     before = {name_before(name) for name in at.x} & set(at.x)
-    kept = {state.name for state in features.discrete if state.captured_while_off}
+    kept = {state.name for state in features.discrete if state.captured_when_enabled}
     starts = {name: SX(v) for name, v in features.initial_states(at.p).items() if name not in kept}
     return starts | {name: SX(0.0) for name in sorted(before)}
 

@@ -40,7 +40,8 @@ class State(metaclass=ArgumentErrors):
     the instant, or before the latest event at this instant. A discrete state with ``hysteresis`` is captured
     at the same times. ``stored_while``: a mode of the same block; while it is 0, the previous value does not
     change. ``momentary``: whether a discrete state becomes 0 at the end of every instant.
-    ``captured_while_off``: whether a discrete state is also captured while the subsystem of the block is off.
+    ``captured_when_enabled``: whether a discrete state is also captured when the subsystem of the block is
+    enabled.
     """
 
     name: str
@@ -51,7 +52,7 @@ class State(metaclass=ArgumentErrors):
     hysteresis: bool = False
     stored_while: str = ""
     momentary: bool = False
-    captured_while_off: bool = False
+    captured_when_enabled: bool = False
 
     @property
     def before(self) -> str:

@@ -62,7 +62,7 @@ class RateLimiting(Block):
             "left limit of the output at the latest tick, event or breakpoint",
         )
         doc = "time of the latest tick, event or breakpoint"
-        return (left_limit, State("left_limit_time", (), doc, "s", captured_while_off=True))
+        return (left_limit, State("left_limit_time", (), doc, "s", captured_when_enabled=True))
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         doc = "1 at the rising limit, -1 at the falling limit, 0 following u"
