@@ -1,4 +1,4 @@
-"""From a URDF file to a pick-and-place cycle in the least time, its drives, and a video.
+"""From a URDF file to a time-optimal pick-and-place cycle, its drives, and a video.
 
     python pick_and_place_cell.py OUT [--film]
 

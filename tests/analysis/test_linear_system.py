@@ -347,7 +347,7 @@ def test_inconsistent_shapes_and_unsuitable_systems_are_refused() -> None:
         system.bandwidth()
     with pytest.raises(InputError, match="the steady-state gain is inf"):
         transfer([1.0], [1.0, 0.0]).bandwidth()
-    with pytest.raises(InputError, match="is not stable and has no gramians"):
+    with pytest.raises(InputError, match="is not stable and has no Gramians"):
         transfer([1.0], [1.0, 0.0]).gramians()
     with pytest.raises(InputError, match="the stop time is -1"):
         system.step_response(-1.0)

@@ -35,7 +35,7 @@ def test_an_existing_file_is_replaced_only_with_force(invoke: Invoke, tmp_path: 
     (tmp_path / "model.py").write_text("mine", encoding="utf-8")
     result = invoke("convert", "kr180model", "model.py")
     assert result.exit_code == 2
-    assert "the file exists already" in result.stderr
+    assert "the file already exists" in result.stderr
     assert (tmp_path / "model.py").read_text(encoding="utf-8") == "mine"
     assert invoke("convert", "kr180model", "model.py", "--force").exit_code == 0
     assert "import armblocks" in (tmp_path / "model.py").read_text(encoding="utf-8")

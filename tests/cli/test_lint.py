@@ -132,7 +132,7 @@ def test_the_file_itself_is_replaced_only_in_place(invoke: Invoke, tmp_path: Pat
         assert result.exit_code == 2 and message in result.stderr
     assert invoke("lint", "arm.urdf", "--fix", "--output", "b.urdf").exit_code == 0
     result = invoke("lint", "arm.urdf", "--fix", "--output", "b.urdf")
-    assert result.exit_code == 2 and "the file exists already" in result.stderr
+    assert result.exit_code == 2 and "the file already exists" in result.stderr
     assert file.read_text(encoding="utf-8") == DAMAGED
     assert invoke("lint", "arm.urdf", "--fix", "--in-place").exit_code == 0
     assert lint_robot(file) == ()

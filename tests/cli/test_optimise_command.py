@@ -60,4 +60,4 @@ def test_progress_names_the_least_objective(capsys: pytest.CaptureFixture[str]) 
         progress._next_line = 0.0
         progress(4, 1.5)
     text = capsys.readouterr().err
-    assert "evaluation 3, no valid point" in text and "evaluation 4, least objective 1.5" in text
+    assert "evaluation 3, no valid point" in text and "evaluation 4, smallest objective 1.5" in text

@@ -51,7 +51,7 @@ def test_the_first_contact_is_at_the_time_of_the_closed_form(kind: str, shape: s
     assert not free.collides and free.clearance == pytest.approx(
         0.2, abs=5e-3 if kind == "cylinder" else 1e-8
     )
-    assert "no contact, least distance" in str(free)
+    assert "no contact, minimum distance" in str(free)
 
 
 def test_a_thin_obstacle_between_samples_is_found() -> None:
@@ -132,7 +132,7 @@ def test_a_folded_arm_touches_its_base_and_pairs_of_the_wrist_are_excluded() -> 
     assert {pair.first for pair in floor.pairs if pair.second == "plane" and pair.distance < 0.05}
     assert ab.collisions(arm, low, [ab.Plane(point=(0, 0, 0.06))]).collides
     assert "link1 and plane: they touch in almost all configurations" in floor.excluded
-    assert "drawn castings as bodies: link1" in str(floor)
+    assert "bodies from the default drawing: link1" in str(floor)
 
 
 def test_a_box_in_the_first_link_counts() -> None:

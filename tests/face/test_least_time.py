@@ -145,7 +145,7 @@ def test_motions_that_cannot_be_found_are_refused() -> None:
         ab.least_time(arm, points, torque=20.0, speed=1.0)
     with pytest.raises(InputError, match="nothing limits the motion of the robot"):
         ab.least_time(one_joint(), [[0.0], [1.0]])
-    with pytest.raises(InputError, match=r"the points have 2 joints.*6, as the robot"):
+    with pytest.raises(InputError, match=r"the points have 2 joints.*6, the number of joints of robot"):
         ab.least_time(arm, [[0, 0], [1, 1]])
     with pytest.raises(InputError, match="the points 1 and 2 are the same"):
         ab.least_time(arm, [points[0], points[0]], torque=100.0)

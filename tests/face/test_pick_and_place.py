@@ -89,7 +89,7 @@ def test_reports_of_a_cycle_have_the_payload_in_its_loaded_phases_only() -> None
         ),
         ({"place": np.eye(3)}, "pick_and_place: place is not a pose"),
         ({"lift": 0.0}, "lift = 0.0.*above 0, in m"),
-        ({"q0": [0.0, 0.0]}, "q0 has 2 joints.*6, as the robot"),
+        ({"q0": [0.0, 0.0]}, "q0 has 2 joints.*6, the number of joints of the robot"),
         ({"blend": 0.9}, "blend = 0.9"),
     ],
 )

@@ -293,7 +293,7 @@ def test_wrong_symbols_are_refused() -> None:
         arm.with_symbols({"link1": {"mass": "link2"}})
     with pytest.raises(InputError, match=r"2 values are given.*Allowed: 3 numbers or formulas"):
         arm.with_symbols({"link1": {"centre_of_mass": (0, "x")}})
-    with pytest.raises(InputError, match="neither a number nor a text"):
+    with pytest.raises(InputError, match="neither a number nor a string"):
         arm.with_symbols({"link1": {"mass": None}})
     with pytest.raises(InputError, match=r"the formula '\[1 2\]' has 2 values"):
         arm.with_symbols({"link1": {"mass": "[1 2]"}}).inertia()

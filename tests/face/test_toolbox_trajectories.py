@@ -201,7 +201,7 @@ def test_jtraj_is_a_motion_at_any_time() -> None:
             lambda: ab.mstraj([[1.0]], 1.0, None, None, 0.1, 0.1),
             r"points has the shape \(1, 1\).*2 or more rows",
         ),
-        (lambda: ab.mstraj([[1.0]], 1.0, None, [0, 0], 0.1, 0.1), "points has 1 joint.*2, as q0"),
+        (lambda: ab.mstraj([[1.0]], 1.0, None, [0, 0], 0.1, 0.1), "points has 1 joint.*2, the number of"),
         (lambda: ab.ctraj(np.eye(3), np.eye(4), 5), "T0 is not a pose"),
         (lambda: ab.ctraj(np.eye(4), 2 * np.eye(4), 5), "T1 is not a pose"),
         (lambda: ab.ctraj(np.eye(4), np.eye(4), [0, 2]), "s is between 0 and 2"),

@@ -29,7 +29,7 @@ def test_jtraj_with_a_number_of_samples_uses_normalised_time() -> None:
     ("arguments", "message"),
     [
         (([0, np.nan], [1, 1], 10), r"q0 = .*nan.*a vector of finite joint values"),
-        (([0, 0], [1, 1, 1], 10), "qf has 3 joints.*Allowed: 2, as q0"),
+        (([0, 0], [1, 1, 1], 10), "qf has 3 joints.*Allowed: 2, the number of joints of q0"),
         (([0], [1], 1), "t = 1 sample.*2 or more"),
         (([0], [1], [0.0, 0.0]), "finite ascending times that start at 0"),
         (([0], [1], [1.0, 2.0]), "finite ascending times that start at 0"),

@@ -86,7 +86,9 @@ def test_figures_are_written_as_svg_and_png(tmp_path: Path) -> None:
 
 
 def test_a_trajectory_of_another_robot_is_refused() -> None:
-    with pytest.raises(InputError, match=r"the trajectory has 2 joints.*1, as the robot 'slider'"):
+    with pytest.raises(
+        InputError, match=r"the trajectory has 2 joints.*1, the number of joints of robot 'slider'"
+    ):
         ab.trajectory_report(slider(), ab.jtraj([0, 0], [1, 1], 5))
 
 
@@ -100,9 +102,9 @@ def test_a_report_names_the_first_contact() -> None:
     assert (contact.first, contact.second) == ("link2", "lamp")
     assert f"collisions: first contact of link2 and lamp at {contact.contact:.4f}"[:45] in str(report)
     free = ab.trajectory_report(arm, motion, obstacles=[ab.Plane(point=(0, 0, -1))])
-    assert "collisions: no contact, least distance" in str(free)
+    assert "collisions: no contact, minimum distance" in str(free)
     alone = ab.trajectory_report(arm, motion, obstacles=())
-    assert "collisions: no contact, least distance 0.7095 m" in str(alone)  # of base and link2
+    assert "collisions: no contact, minimum distance 0.7095 m" in str(alone)  # of base and link2
     nothing = ab.collisions(arm, [0.0, 0.0], ignore=[("base", "link2")])
     assert nothing.summary == "no pair of bodies is compared" and not nothing.collides
     assert ab.trajectory_report(arm, motion).collisions is None

@@ -81,8 +81,8 @@ def test_rows_of_numbers_stay_on_one_line() -> None:
         ("[" + "1" * 5000 + "]", "too large"),
         ("[" + "1" * 30 + "]", "the integer 1+ is too long"),
         ('{"a": 1,\n"a": 2}', r"a\.json:2: the key 'a' occurs twice in one object"),
-        ('{"a":\n "\\ud800"}', r"a\.json:2, a: a text is not valid Unicode"),
-        ('{"\\udfff": 1}', "a text is not valid Unicode"),
+        ('{"a":\n "\\ud800"}', r"a\.json:2, a: a string is not valid Unicode"),
+        ('{"\\udfff": 1}', "a string is not valid Unicode"),
         ("[" * 70 + "]" * 70, "objects and arrays are nested too deeply. Allowed: 64 levels"),
         ("[" * 900, "objects and arrays are nested too deeply"),
         (b"\n\xff", r"a\.json:2: the file is not UTF-8 text"),
@@ -114,7 +114,7 @@ def test_a_document_above_the_size_limit_is_refused() -> None:
         ([math.inf], r"\[0\]: the number inf cannot be written"),
         ({1: 2}, "a key is not text"),
         ({"a": object()}, "a object cannot be written"),
-        ("\ud800", "a text cannot be written, as it is not valid Unicode"),
+        ("\ud800", "a string cannot be written, as it is not valid Unicode"),
     ],
 )
 def test_values_without_a_json_form_are_refused(value: object, message: str) -> None:

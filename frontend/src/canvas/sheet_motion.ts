@@ -41,7 +41,7 @@ export function useSheetMotion(
   return motion
 }
 
-/** Dispatch an event of the pointer at the element that is now at its position, if this is another one. */
+/** Dispatch a pointer event again at the element below the pointer, if this is not the event's target. */
 function redirect(event: MouseEvent): void {
   const target = document.elementFromPoint(event.clientX, event.clientY)
   if (!event.isTrusted || !target || target === event.target) return
@@ -154,7 +154,7 @@ export class SheetMotion {
     requestAnimationFrame(() => requestAnimationFrame(endIfUnchanged))
   }
 
-  /** Move the layer; a picture replaces the sheet, unless the user types a text on the sheet. */
+  /** Move the layer; a picture replaces the sheet, unless the user types text on the sheet. */
   private move(): void {
     const { x, y, zoom } = this.view
     this.layer!.style.transform = `translate(${x}px,${y}px) scale(${zoom})`

@@ -14,14 +14,15 @@ export type WireEdgeType = Edge<
   {
     path: readonly Point[]
     dots: readonly Point[]
+    /** The number of axes of the signal: 0 scalar, 1 vector, 2 matrix; 3 for a bus. */
     rank: number
-    /** Whether it is a frame line. */
+    /** Whether the line connects frame ports. */
     frame: boolean
     label: string
     bent: boolean
     /** Whether the server has not routed the wire yet. */
     pending: boolean
-    /** The labels at its ports, if it has no line. */
+    /** The labels at the ports of a wire without a line. */
     tags: readonly WireTag[]
     /**
      * The complete route from the source; `path` is its last part if the wire branches from another wire.

@@ -72,7 +72,7 @@ function SaveAs() {
           </Text>
         )}
         {exists && (
-          <Alert color="yellow" title={`${path} exists already`}>
+          <Alert color="yellow" title={`${path} already exists`}>
             Its content will be replaced by this diagram.
           </Alert>
         )}

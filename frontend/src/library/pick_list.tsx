@@ -44,7 +44,7 @@ export function PickList({
   const listElement = useRef<HTMLDivElement>(null)
   useEffect(() => setActiveIndex(0), [typed, opened])
   useEffect(() => {
-    // A block: in new browsers the result is a promise, which is not a cleanup function of the effect.
+    // The effect returns nothing: in new browsers the result of the call is a promise.
     listElement.current?.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: 'nearest' })
   }, [activeIndex])
   const pick = (index: number) => {

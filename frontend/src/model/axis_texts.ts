@@ -1,6 +1,6 @@
 /** Mean width of a letter of the labels of axes, px. */
 const LETTER_WIDTH = 6
-/** Least number of letters of a name that is cut off. */
+/** Minimum number of letters of a name that is cut off. */
 const MIN_LETTERS = 3
 
 /** The label of an axis, cut off before its unit if it is longer than `length`, px. */

@@ -5,7 +5,7 @@ export type Corner = readonly [x: -1 | 1, y: -1 | 1]
 
 const GRID = 5
 const MIN_SIZE = 20
-/** Distance of ports, px. */
+/** Distance between ports, px. */
 const PORT_PITCH = 10
 
 /** A block whose corner was dragged by a distance; the opposite corner stays, sizes are on the grid. */

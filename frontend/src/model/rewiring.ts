@@ -19,9 +19,8 @@ export function isInsertable(block: SheetBlock, wires: Wire[]): boolean {
 }
 
 /**
- * The wires without the wires between some blocks and all other blocks. For a single block with one input and
- * one
- * output, its two neighbours are connected.
+ * The wires without the wires between some blocks and all other blocks. The two neighbours of a single block
+ * with one input and one output are connected.
  */
 export function disconnectBlocks(blocks: SheetBlock[], wires: Wire[]): Wire[] {
   const names = new Set(blocks.map(({ name }) => name))

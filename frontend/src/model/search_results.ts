@@ -20,9 +20,8 @@ export interface SearchResult<Document> {
 export const MAX_FOUND = 50
 
 /**
- * The results of all documents, document by document; results of the document in front are first. One
- * document
- * has no headings.
+ * The results of all documents, document by document; results of the document in front are first. The
+ * results of a single document have no headings.
  */
 export function groupedResults<Document>(
   searched: readonly SearchedDocument<Document>[],

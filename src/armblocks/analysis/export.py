@@ -53,7 +53,7 @@ def to_control(system: StateSpaceModel) -> Any:
 def save(system: StateSpaceModel, path: str | PathLike[str]) -> None:
     """Write a linear system to a file. The suffix is its format: ``.json``, ``.npz`` or ``.mat``.
 
-    Raises ``UnknownNameError`` for another suffix, and ``FormatError`` if the file cannot be written.
+    Raises ``UnknownNameError`` for an unsupported suffix, and ``FormatError`` if the file cannot be written.
     """
     target = Path(path)
     writers = {".json": _json, ".npz": _npz, ".mat": _mat}

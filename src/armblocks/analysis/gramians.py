@@ -42,7 +42,7 @@ def gramians(system: StateSpaceModel) -> tuple[Array, Array]:
     """
     if not is_stable(system):
         raise InputError(
-            "the system is not stable and has no gramians",
+            "the system is not stable and has no Gramians",
             where=system.name,
             allowed="a stable system, because the integrals diverge for others",
             fix="use controllability() and observability()",

@@ -2,7 +2,7 @@
 
 The parameter follows the last dot before ``=``. A value is a formula of numbers
 (:mod:`armblocks.matlab.formula`), ``2``, ``3*pi/4`` or ``[1 2; 3 4]``; a row without brackets,
-``1,2,3``; ``true`` or ``false``; or a text in quotes, or a single word.
+``1,2,3``; ``true`` or ``false``; or a string in quotes, or a single word.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def parse_value(text: str, where: str = "--set") -> Value:
             error.what,
             where=where,
             allowed=_ALLOWED,
-            fix="correct it, or put quotes around a text",
+            fix="correct it, or put quotes around a string",
         ) from error
     is_row = row or (text.startswith("[") and text.endswith("]"))
     return [value] if is_row and not isinstance(value, list) else value

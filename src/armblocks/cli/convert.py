@@ -65,7 +65,7 @@ def convert(
         )
     if target.exists() and not force:
         raise FormatError(
-            "the file exists already",
+            "the file already exists",
             where=str(target),
             allowed="a new file",
             fix="choose another name, or replace the file with --force",

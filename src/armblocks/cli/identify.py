@@ -21,7 +21,7 @@ NOT_DETERMINED = 1
 OTHER_COLUMNS = 64
 """Width of the columns between the names and the sums of parameters."""
 LEAST_SUM = 30
-"""Least width of the column of sums, which narrower terminals do not show."""
+"""Minimum width of the column of sums, which narrower terminals do not show."""
 
 
 def identify(
@@ -55,7 +55,7 @@ def identify(
     ] = None,
     decimate: Annotated[int, typer.Option(help="Filter and keep every K-th sample.", metavar="K")] = 1,
     min_speed: Annotated[
-        float, typer.Option(help="Least speed of a joint at samples that are used, rad/s or m/s.")
+        float, typer.Option(help="Minimum speed of a joint at samples that are used, rad/s or m/s.")
     ] = 0.0,
     robust: Annotated[bool, typer.Option("--robust", help="Huber's weights, for outliers.")] = False,
     validate: Annotated[

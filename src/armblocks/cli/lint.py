@@ -108,7 +108,7 @@ def _target(source: Path, output: Path | None, *, in_place: bool, force: bool) -
         )
     if target.exists() and not force:
         raise FormatError(
-            "the file exists already",
+            "the file already exists",
             where=str(target),
             allowed="a new file",
             fix="choose another name with --output, or replace the file with --force",

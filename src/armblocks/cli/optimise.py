@@ -1,4 +1,4 @@
-"""``armblocks optimise``: finds parameters of a diagram with the least objective within constraints."""
+"""``armblocks optimise``: finds parameter values that minimise an objective under constraints."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def optimise(
     plot: Annotated[Path | None, typer.Option(help="Write the history of the search, .svg or .png.")] = None,
     trust: Trust = False,
 ) -> None:
-    """Find parameters of a diagram with the least objective within constraints.
+    """Find the parameter values of a diagram that minimise an objective under constraints.
 
     Prints the variables, the active constraints with multipliers, and why the search ended. Ctrl-C ends the
     search with the best values so far.

@@ -101,11 +101,11 @@ class FitProgress(RunProgress):
 
 
 class SearchProgress(RunProgress):
-    """Displays the progress of an optimisation: called with the number of evaluated points and the least
+    """Displays the progress of an optimisation: called with the number of evaluated points and the smallest
     objective so far, NaN before a point satisfies the constraints."""
 
     def __call__(self, evaluations: float, objective: float, _: float = 0.0) -> None:
-        value = f"least objective {objective:.6g}" if objective == objective else "no valid point"
+        value = f"smallest objective {objective:.6g}" if objective == objective else "no valid point"
         self._show(f"evaluation {evaluations:.0f}, {value}", 0.0)
 
 

@@ -70,7 +70,8 @@ def run(
         typer.Option(help="Write all recorded samples to this .parquet or .csv file during the run."),
     ] = None,
     log_signals: Annotated[
-        str | None, typer.Option(help="Only these signals, separated by commas.", show_default="all")
+        str | None,
+        typer.Option(help="Signals in the file of --log, separated by commas.", show_default="all"),
     ] = None,
     film: FilmFile = None,
     out: ReportFolder = None,

@@ -42,7 +42,7 @@ class UnknownContentError(Exception):
 
 
 def function_parts(function: Callable[..., object]) -> list[object]:
-    """Values that identify the function: numbers, lists, arrays and texts.
+    """Values that identify the function: numbers, lists, arrays and strings.
 
     The values cover code, default values, closure variables, and the content of the global names that it
     uses, including functions. Raises ``UnknownContentError`` where the content of a name cannot be

@@ -61,7 +61,7 @@ class BlockLibrary(Mapping[str, type[Block]], metaclass=ArgumentErrors):
     def with_kinds(self, family: str, kinds: Iterable[type[Block]]) -> BlockLibrary:
         """This library with further types of one family.
 
-        Raises ``DiagramError`` for a type name that exists already.
+        Raises ``DiagramError`` for a type name that already exists.
         """
         added = tuple(kinds)
         for kind in added:

@@ -58,7 +58,7 @@ def _rule(rules: Sequence[Parameter], path: str, known: Sequence[str], where: st
         raise DiagramError(
             f"'{path}' is a {rule.kind.value}",
             where=where,
-            allowed="parameters that are numbers, arrays, choices or texts",
+            allowed="parameters that are numbers, arrays, choices or strings",
             fix="remove it from the parameter set",
         )
     return rule

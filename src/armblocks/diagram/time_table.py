@@ -15,8 +15,8 @@ from armblocks.errors import ArmblocksError, InputError
 class TimeTable:
     """``rows (n, 1 + m)``: a time (s) and the values at that time; at least two rows, times ascending.
 
-    Two rows with the same time are a jump: the left limits, then the values. The time of the first row is
-    stored as the next smaller double.
+    Two rows with the same time are a jump: the left limits, then the values. The time of the first of
+    these rows is stored as the next smaller double.
 
     Tables are compared and hashed by ``rows`` only. ``names`` and ``units`` describe the m columns.
     ``source`` is the file of the table, and ``shown`` its path in user interfaces. ``time`` is the column of

@@ -29,7 +29,7 @@ def draw_diagram(
 ) -> Path:
     """Write a sheet as ``….svg``, ``….png`` or ``….pdf``, atomically; returns the path.
 
-    See :func:`drawing_bytes` for the arguments. Raises UnknownNameError for another suffix or sheet.
+    See :func:`drawing_bytes` for the arguments. Raises UnknownNameError for an unsupported suffix or sheet.
     """
     target = Path(path)
     kind = target.suffix.removeprefix(".").lower()

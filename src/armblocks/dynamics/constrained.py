@@ -253,7 +253,7 @@ def constrained_motion(
 
 
 def check_no_prescribed_motion(robot: Robot) -> None:
-    """Raise RobotError for a robot with prescribed motions, whose accelerations torques do not determine."""
+    """Raise RobotError for a robot with prescribed motions: torques do not determine its accelerations."""
     if robot.prescribed_joints:
         raise RobotError(
             f"the motion of joint '{robot.prescribed_joints[0]}' is prescribed: torques do not determine it",

@@ -38,7 +38,7 @@ INERTIAS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
 @dataclass(frozen=True, kw_only=True)
 class Values:
-    """The values that replace numbers of a robot: texts of formulas, and numbers.
+    """The values that replace numbers of a robot: formulas as strings, and numbers.
 
     ``lengths``: by the name of a link and ``"a"`` or ``"d"`` of its D-H row, m. ``masses``, kg. ``centres``
     (3), m. ``inertias`` (6): xx yy zz xy yz xz about the centre of mass, kg m2. ``gravity`` (3), m/s2.
@@ -278,8 +278,8 @@ def trace_symbolic(
 ) -> TracedFunction:
     """A function of ``FUNCTIONS``; its last input are the symbols (k,) with these ``names``, if any.
 
-    ``formulas``: from the column of symbols to the values of texts. Raises RobotError for torques of robots
-    with closed loops.
+    ``formulas``: from the column of symbols to the values of the formulas. Raises RobotError for torques of
+    robots with closed loops.
     """
     function = FUNCTIONS[name]
     if robot.closures and function.output == "tau":

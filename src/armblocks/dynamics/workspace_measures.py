@@ -206,7 +206,7 @@ def payload_capacity(robot: Robot, q: SX, loads: Sequence[SX], frame: str | None
 
 
 def _limit_margin(robot: Robot, q: SX) -> SX:
-    """The least distance to a joint limit as a fraction of half the range: 1 in the middle, 0 at a limit."""
+    """The distance to the nearest joint limit, divided by half the range: 1 in the middle, 0 at a limit."""
     margin = SX(1.0)
     ranges = [(entry, *ends) for entry, ends in zip(entries(q), robot.qlim.tolist())]
     for value, low, high in (*ranges, *_dependent_ranges(robot, q)):

@@ -297,7 +297,7 @@ class Arm(NativeFunctions):
         ``"light"``, ``"dark"``, or by default the theme of the viewer. ``size``: width and height, px (files,
         widgets). ``view``: azimuth and elevation of the camera of a file, degrees.
 
-        Raises InputError for a wrong shape of ``q``, UnknownNameError for another suffix.
+        Raises InputError for a wrong shape of ``q``, UnknownNameError for an unsupported suffix.
         """
         from armblocks.face import arm_views
 

@@ -49,7 +49,7 @@ def confidence_intervals(values: Array, covariance: Array, degrees_of_freedom: i
 
 
 def cell(value: float | str, digits: int) -> str:
-    """A number in a table; empty for texts and for numbers that are not finite."""
+    """A number in a table; empty for strings and for numbers that are not finite."""
     return table_number(value, digits) if isinstance(value, float) and np.isfinite(value) else ""
 
 

@@ -21,11 +21,11 @@ from armblocks.face.trajectory_arguments import positive
 Array = NDArray[np.float64]
 
 _SAMPLES_A_WAVE = 4
-"""Least number of samples in a period of the last harmonic: fewer do not describe the motion."""
+"""Minimum number of samples in a period of the last harmonic: fewer do not describe the motion."""
 _SAMPLES = 200
-"""Least number of samples of a motion in the search."""
+"""Minimum number of samples of a motion in the search."""
 _SEARCH_SAMPLES_A_WAVE = 20
-"""Least number of samples in a period of the last harmonic, so that limits also hold between samples."""
+"""Minimum number of samples in a period of the last harmonic, so that limits also hold between samples."""
 _FILL = 0.9
 """Share of the ranges of positions, speeds and accelerations that a motion uses at most."""
 _RANDOM = 0.2
@@ -73,7 +73,7 @@ def excitation(
     seeded random search minimises the condition number of the regressor of the base parameters, friction
     included. ``progress(evaluations, condition)`` is called at each improvement; Ctrl-C ends the search with
     the best motion so far. ``dt`` (s): about the time between samples, a fraction of the duration. Collisions
-    are not checked: look at ``arm.animate`` first.
+    are not checked: view the motion with ``arm.animate`` first.
 
     The motion has a limited spectrum, ``harmonics / duration`` Hz, so that it can be filtered exactly, and
     repeated, so that periods can be averaged. Source: Swevers et al., *Optimal robot excitation and

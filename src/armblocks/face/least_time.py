@@ -86,7 +86,7 @@ def least_time(
         raise InputError(
             f"the points have {counted(via.shape[1], 'joint')}",
             where=where,
-            allowed=f"{arm.n}, as the robot '{robot.name}'",
+            allowed=f"{arm.n}, the number of joints of robot '{robot.name}'",
             fix="give one number for each joint",
         )
     limits = motion_limits(arm, where, speed, acceleration, torque)

@@ -95,7 +95,7 @@ def _drive(row: dict[str | Any, str | Any], where: str) -> Drive:
             "the row has more cells than the first line",
             where=where,
             allowed="as many cells as names of columns",
-            fix="put texts with commas into quotation marks",
+            fix="put entries with commas into quotation marks",
         )
     for column, text in row.items():
         cell = (text or "").strip()

@@ -1,4 +1,4 @@
-"""``optimise``: values of a diagram's parameters with the least objective within constraints."""
+"""``optimise``: parameter values of a diagram that minimise an objective under constraints."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from armblocks.sweeps.measures import Measure
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, float], None]
-"""A function of the number of evaluated points, and of the least objective so far (NaN: none is valid)."""
+"""A function of the number of evaluated points, and of the smallest objective so far (NaN: none is valid)."""
 
 METHODS = ("auto", GRADIENT, SEARCH)
 

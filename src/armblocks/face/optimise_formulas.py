@@ -40,7 +40,7 @@ class Condition:
 
 
 def conditions(given: object, where: str) -> list[Condition]:
-    """The constraints of an argument: texts, or triples of a function or measure, a low and a high limit.
+    """The constraints of an argument: strings, or triples of a function or measure, a low and a high limit.
 
     Raises ``InputError``.
     """
@@ -77,7 +77,7 @@ def _unsuitable(entry: object, where: str) -> InputError:
     return InputError(
         f"the constraint {entry!r:.60} is not suitable",
         where=where,
-        allowed=f"a text {_ALLOWED}; or (function or measure, low, high)",
+        allowed=f"a string {_ALLOWED}; or (function or measure, low, high)",
         fix="write for example 'overshoot(plant/y, final=1) <= 5'",
     )
 
@@ -160,7 +160,7 @@ def _divided(text: str) -> tuple[list[str], list[str]]:
 
 
 def _number(text: str, where: str) -> float | None:
-    """The value of a text without measures and variables; ``None`` for other texts."""
+    """The value of a string without measures and variables; ``None`` for other strings."""
     if "{" in text or any(word in KINDS for word in _WORD.findall(text)):
         return None
     try:
@@ -174,13 +174,13 @@ class Formulas:
     """The objective and the constraints as functions of the measures ``m (nm,)`` and variables ``x (n,)``."""
 
     def __init__(self, targets: Sequence[Target], variables: Sequence[str], where: str) -> None:
-        """Raises ``InputError`` and ``UnknownNameError`` for texts that are no formulas of these names."""
+        """Raises ``InputError`` and ``UnknownNameError`` for strings that are not formulas of these names."""
         self._variables, self._where = list(variables), where
         self._measures: dict[str, Measure] = {}
         self._functions: dict[str, PythonFunction] = {}
         x = SX.sym("x", len(variables))
         values = [self._traced(target, x) for target in targets]
-        # The symbols of the measures are known when all texts are read.
+        # The symbols of the measures are known when all strings are read.
         names = [*self._measures, *self._functions]
         m = SX.sym("m", len(names))
         column = vertcat(

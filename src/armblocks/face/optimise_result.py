@@ -38,8 +38,8 @@ class OptimisedConstraint(metaclass=ArgumentErrors):
     """A constraint at the end of an optimisation: ``low <= value <= high``.
 
     ``value``: in the scenario that is nearest to a limit. ``start``: the same at the start. ``multiplier``:
-    minus the derivative of the least objective by the limit; positive for the upper limit, negative for the
-    lower one, 0 if neither is active, NaN if the method does not determine it.
+    minus the derivative of the minimum with respect to the limit; positive for the upper limit, negative for
+    the lower one, 0 if neither is active, NaN if the method does not determine it.
     """
 
     name: str

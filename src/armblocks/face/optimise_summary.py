@@ -1,4 +1,4 @@
-"""The result of an optimisation from the end of its search."""
+"""The result of an optimisation, from the outcome of its search."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def summarised(
     design: Design | None,
     options: SimulationOptions,
 ) -> OptimisationResult:
-    """The result: the runs at the start and at the end, without derivatives, determine all values."""
+    """The result. Its values are those of runs without derivatives, at the start and at the best values."""
     v = problem.variables
     points = np.stack([v.start, outcome.values])
     measures = problem.runs.measured(points).values
@@ -88,7 +88,7 @@ def _constraint(
     """A constraint with its values ``(2, S)`` at the start and at the end."""
     rows = statistics.rows(values[..., np.newaxis], [condition])
     limits = [limit for limit in (condition.high, condition.low) if np.isfinite(limit)]
-    # Of the rows of both limits, the one that is nearest to its limit.
+    # A condition with two limits has two rows. The row that is nearest to its limit counts.
     signs = [1.0 if limit == condition.high and k == 0 else -1.0 for k, limit in enumerate(limits)]
     excess = np.array(
         [[sign * (value - limit) for sign, value, limit in zip(signs, row, limits)] for row in rows]

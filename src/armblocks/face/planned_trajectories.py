@@ -73,7 +73,7 @@ def point_to_point(
             raise InputError(
                 f"the duration is {wanted:g} s",
                 where=where,
-                allowed=f"{profile.duration:g} s or more, the least duration under these limits",
+                allowed=f"{profile.duration:g} s or more, the shortest duration within these limits",
                 fix="lengthen the duration or raise the limits",
             )
         profile = profile.stretched(wanted / profile.duration)

@@ -62,7 +62,7 @@ class SizingReport(metaclass=ArgumentErrors):
 
     @property
     def suggested(self) -> dict[str, DriveLoad | None]:
-        """For each joint the valid candidate with the least stall torque times speed, or ``None``."""
+        """For each joint the valid candidate with the smallest stall torque times speed, or ``None``."""
         found: dict[str, DriveLoad | None] = {}
         for load in self.loads:
             best = found.setdefault(load.joint, None)

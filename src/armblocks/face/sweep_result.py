@@ -279,7 +279,7 @@ class SweepResult(metaclass=ArgumentErrors):
     def save(self, path: str | PathLike[str]) -> None:
         """Write the table to a ``.parquet`` or ``.csv`` file, atomically; without kept samples.
 
-        Raises ``UnknownNameError`` for another suffix, ``FormatError``.
+        Raises ``UnknownNameError`` for an unsupported suffix, ``FormatError``.
         """
         write_table(Path(path), self._all())
 

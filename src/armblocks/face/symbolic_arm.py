@@ -145,9 +145,9 @@ def symbolic_dh(
 
     ``rows``: for each joint the keywords of :func:`standard_dh` or :func:`modified_dh` (``alpha``, ``a``,
     ``d``, ``theta``, ``sigma``, ``offset``, ``mass`` …) and ``name``, by default q1, q2 …: the name of its
-    coordinate. ``a``, ``d``, ``mass``, ``centre_of_mass`` and ``inertia`` may have texts such as ``"l1"`` or
-    ``"-l1/2"``; angles are numbers (rad). ``convention``: ``"standard"`` or ``"modified"``. ``gravity`` (3):
-    m/s2, for example ``(0, "-g", 0)``.
+    coordinate. ``a``, ``d``, ``mass``, ``centre_of_mass`` and ``inertia`` may have strings such as ``"l1"``
+    or ``"-l1/2"``; angles are numbers (rad). ``convention``: ``"standard"`` or ``"modified"``. ``gravity``
+    (3): m/s2, for example ``(0, "-g", 0)``.
     """
     conventions = {known.value: known for known in DhConvention}
     if isinstance(convention, str):

@@ -167,7 +167,7 @@ def _entry(value: object, where: str) -> Entry:
         return float(cast("float", value))
     except (TypeError, ValueError):
         raise InputError(
-            f"{value!r} is neither a number nor a text",
+            f"{value!r} is neither a number nor a string",
             where=where,
             allowed="a number, or a formula such as 'l1' or '-l1/2'",
             fix="write the name of the symbol in quotes",

@@ -43,7 +43,7 @@ def check_same_length(start: Array, vectors: Mapping[str, Array | None], where: 
             raise InputError(
                 f"{name} has {counted(vector.size, 'joint')}",
                 where=where,
-                allowed=f"{start.size}, as {of}",
+                allowed=f"{start.size}, the number of joints of {of}",
                 fix=f"give {name} as many numbers as {of}",
             )
 

@@ -93,7 +93,7 @@ class TrajectoryReport(metaclass=ArgumentErrors):
 
     @property
     def position_margin(self) -> Array:
-        """Least distance (n,) of each joint to the nearer end of its range, negative beyond it."""
+        """Minimum distance (n,) of each joint to the nearer end of its range, negative beyond it."""
         low, high = self.position_limits.T
         return np.minimum(self.q - low, high - self.q).min(axis=0)
 
@@ -274,7 +274,7 @@ def motion_with_torques(
         raise InputError(
             f"the trajectory has {counted(trajectory.n, 'joint')}",
             where=where,
-            allowed=f"{arm.n}, as the robot '{arm.name}'",
+            allowed=f"{arm.n}, the number of joints of robot '{arm.name}'",
             fix="use a trajectory of this robot",
         )
     rows = trajectory.rows()

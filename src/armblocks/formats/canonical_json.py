@@ -18,11 +18,11 @@ from armblocks.formats.json_document import MAX_DEPTH, KeyPath, path_text
 def canonical_bytes(
     value: object, *, one_line: Callable[[KeyPath], bool] = lambda path: False, max_depth: int = MAX_DEPTH
 ) -> bytes:
-    """The canonical text of a document of dicts, lists, texts, numbers, booleans and ``None``.
+    """The canonical text of a document of dicts, lists, strings, numbers, booleans and ``None``.
 
     ``one_line`` returns for the path of an object or array whether it is written on one line. ``max_depth``:
-    the maximum nesting. Raises ``FormatError`` for numbers that are not finite, texts that are not valid
-    Unicode, keys that are not texts, and unsupported types.
+    the maximum nesting. Raises ``FormatError`` for numbers that are not finite, strings that are not valid
+    Unicode, keys that are not strings, and unsupported types.
     """
     parts: list[str] = []
     _check_depth(value, max_depth)
@@ -31,7 +31,7 @@ def canonical_bytes(
         return ("".join(parts) + "\n").encode("utf-8")
     except UnicodeEncodeError as error:
         raise FormatError(
-            "a text cannot be written, as it is not valid Unicode",
+            "a string cannot be written, as it is not valid Unicode",
             fix="correct the text",
             where="JSON document",
         ) from error
@@ -72,8 +72,8 @@ def _write(
                 raise FormatError(
                     "a key is not text",
                     where=path_text(path),
-                    allowed="texts as keys",
-                    fix="use texts as keys",
+                    allowed="strings as keys",
+                    fix="use strings as keys",
                 )
             flat = one_line(path)
             _write_group(
@@ -134,6 +134,6 @@ def _scalar(value: object, path: KeyPath) -> str:
             raise FormatError(
                 f"a {type(value).__name__} cannot be written",
                 where=path_text(path),
-                allowed="null, booleans, numbers, texts, arrays and objects",
-                fix="convert it to numbers, texts, lists and objects",
+                allowed="null, booleans, numbers, strings, arrays and objects",
+                fix="convert it to numbers, strings, lists and objects",
             )

@@ -1,6 +1,6 @@
 """Diagrams as canonical JSON: small differences in a diagram are small differences in its file.
 
-Blocks are keyed by name and sorted. Connections are sorted texts (``"jtraj/q -> fkine/q"``). The layout is
+Blocks are keyed by name and sorted. Connections are sorted strings (``"jtraj/q -> fkine/q"``). The layout is
 separate from the content. No derived values, ids or times are written. A changed parameter is one line, a
 moved block is one line of the layout, and additions of different blocks do not conflict in version control.
 The layout also has user-drawn routes, under the text of the connection, and notes, under names that begin
@@ -16,7 +16,7 @@ with ``/``, which block names cannot::
       "settings": {"stop_time": 10, …}
     }
 
-``frame_lines`` has the lines between frame ports, sorted texts without direction: ``"hinge/F -- rod/R"``.
+``frame_lines`` has the lines between frame ports, sorted strings without direction: ``"hinge/F -- rod/R"``.
 
 A diagram may declare parameters, its ``mask``; a block's ``formulas`` of them are beside its parameters, and
 their values are not written. The values of mask parameters are among the parameters of the subsystem block,
@@ -38,9 +38,9 @@ A subsystem block has its inner diagram under ``diagram``, with the same keys, e
 ``robots``, which occur once, and without empty settings and layout.
 
 Unknown keys (of another program, or a newer armblocks) are stored in ``Diagram.extras`` and written again. A
-key similar to a known one, and an unknown parameter, are errors. Infinite parameters are the texts ``"inf"``
-and ``"-inf"``; NaN is an error. References to robots: see :mod:`armblocks.formats.robot_references`. The JSON
-Schema is ``formats/schema/diagram.schema.json``.
+key similar to a known one, and an unknown parameter, are errors. Infinite parameters are the strings
+``"inf"`` and ``"-inf"``; NaN is an error. References to robots: see
+:mod:`armblocks.formats.robot_references`. The JSON Schema is ``formats/schema/diagram.schema.json``.
 """
 
 from __future__ import annotations

@@ -312,7 +312,7 @@ def _check_text(root: Node) -> None:
         for text in texts:
             if any("\ud800" <= character <= "\udfff" for character in text):
                 raise node.error(
-                    "a text is not valid Unicode (half of a surrogate pair)", allowed="whole characters"
+                    "a string is not valid Unicode (half of a surrogate pair)", allowed="whole characters"
                 )
 
 

@@ -23,7 +23,7 @@ class Script:
     """The results of a script, by the names of its variables.
 
     ``robots``: in the order in which the variables first appeared, without copies of an earlier robot.
-    ``variables``: texts, and matrices (rows, columns) in the units of the script.
+    ``variables``: strings, and matrices (rows, columns) in the units of the script.
     """
 
     robots: Mapping[str, Robot]

@@ -1,6 +1,6 @@
-"""Values of parameters as JSON: numbers, arrays and texts; references to robots, functions and tables.
+"""Values of parameters as JSON: numbers, arrays and strings; references to robots, functions and tables.
 
-Infinite numbers are the texts ``"inf"`` and ``"-inf"``.
+Infinite numbers are the strings ``"inf"`` and ``"-inf"``.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def plain_value(node: Node) -> object:
     if isinstance(node.value, list):
         return tuple(plain_value(element) for element in node.elements())
     if not isinstance(node.value, bool | int | float | str):
-        raise node.error("the value is not a number or an array", allowed="numbers, arrays and texts")
+        raise node.error("the value is not a number or an array", allowed="numbers, arrays and strings")
     return node.value
 
 
@@ -56,7 +56,7 @@ def with_infinities(rule: Parameter, value: object) -> object:
 
 
 def plain_parameter(value: object) -> object:
-    """The JSON form of a number, an array or a text."""
+    """The JSON form of a number, an array or a string."""
     return _infinities_as_text(value)
 
 

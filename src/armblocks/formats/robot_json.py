@@ -1,11 +1,11 @@
 """Robots as canonical JSON, ``robot.json``: every field of a ``Robot``, in SI units.
 
-Angles may be texts such as ``"90 deg"``, and angular speeds such as ``"105 deg/s"``. The writer uses degrees
-where they have few digits and read back exactly. A link with a ``dh`` row takes its joint and transforms from
-it. Unknown keys are errors that suggest the nearest known key, because ignoring a misspelt key would give a
-wrong robot. ``notes`` is a comment; :mod:`armblocks.formats.robot_facts` reads ``facts``. Neither
-is preserved. ``configurations`` is a list of objects with ``name`` and ``q``, because keys are sorted; older
-files name it ``poses``.
+Angles may be strings such as ``"90 deg"``, and angular speeds such as ``"105 deg/s"``. The writer uses
+degrees where they have few digits and read back exactly. A link with a ``dh`` row takes its joint and
+transforms from it. Unknown keys are errors that suggest the nearest known key, because ignoring a misspelt
+key would give a wrong robot. ``notes`` is a comment; :mod:`armblocks.formats.robot_facts` reads ``facts``.
+Neither is preserved. ``configurations`` is a list of objects with ``name`` and ``q``, because keys are
+sorted; older files name it ``poses``.
 
 The JSON Schema is ``formats/schema/robot.schema.json``.
 """
@@ -119,7 +119,7 @@ def write_robot(robot: Robot) -> bytes:
 
 
 def is_one_line(path: KeyPath) -> bool:
-    """Whether a list of a robot document, with angles as texts, is written on one line."""
+    """Whether a list of a robot document, with angles as strings, is written on one line."""
     return path[-1:] in (("position",), ("q",))
 
 

@@ -1,4 +1,4 @@
-"""Angles, vectors and transforms of robot documents, in SI units or, for angles, as texts in degrees."""
+"""Angles, vectors and transforms of robot documents, in SI units or, for angles, as strings in degrees."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class Values(Protocol[V]):
         ...
 
     def text(self, location: Location, value: str) -> V:
-        """A text in quotes."""
+        """A string in quotes."""
         ...
 
     def negative(self, location: Location, value: V) -> V:

@@ -1,4 +1,4 @@
-"""Values of expressions as numbers: arrays with two axes and texts, as in MATLAB."""
+"""Values of expressions as numbers: arrays with two axes, and strings, as in MATLAB."""
 
 from __future__ import annotations
 
@@ -176,7 +176,7 @@ class Numbers:
         return scalar(value)
 
     def text(self, location: Location, value: str) -> NumberOrText:
-        """A text in quotes."""
+        """A string in quotes."""
         return value
 
     def negative(self, location: Location, value: object) -> Array:
@@ -211,7 +211,7 @@ class Numbers:
         return cast("Array", result)
 
     def matrix(self, location: Location, rows: Sequence[Sequence[object]]) -> NumberOrText:
-        """``[a b; c d]`` of arrays, or of texts in one row."""
+        """``[a b; c d]`` of arrays, or of strings in one row."""
         flat = [value for row in rows for value in row]
         texts = [value for value in flat if isinstance(value, str)]
         if texts and len(texts) == len(flat) and len(rows) == 1:

@@ -203,7 +203,7 @@ class Symbols:
         return SX(value)
 
     def text(self, location: Location, value: str) -> Symbol:
-        """A text in quotes."""
+        """A string in quotes."""
         return value
 
     def negative(self, location: Location, value: Symbol) -> Symbol:

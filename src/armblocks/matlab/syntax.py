@@ -23,7 +23,7 @@ class Number:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A text in quotes: ``'standard'``."""
+    """A string in quotes: ``'standard'``."""
 
     value: str
     at: Position

@@ -59,7 +59,7 @@ def exact_rate(path: str | Path, rate: float) -> float:
 def check_film(path: str | Path, count: int, size: tuple[int, int]) -> None:
     """Check the libraries, number of frames and size (width, height) in pixels before the first frame.
 
-    Raises ``MissingLibraryError``, ``InputError``, and ``UnknownNameError`` for another suffix.
+    Raises ``MissingLibraryError``, ``InputError``, and ``UnknownNameError`` for an unsupported suffix.
     """
     suffix = film_suffix(path)
     with from_extra("film", f"{suffix[1:].upper()} videos"):

@@ -303,7 +303,7 @@ class DriveLoad(metaclass=ArgumentErrors):
 
     @property
     def tightest(self) -> LimitCheck:
-        """The limit with the least margin."""
+        """The limit with the smallest margin."""
         return min(self.checks, key=lambda check: check.margin)
 
     def used(self, name: str) -> float:

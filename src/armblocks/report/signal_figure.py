@@ -35,7 +35,7 @@ class SignalFigure:
         """Write a ``.svg``, ``.png`` or ``.pdf`` file atomically; returns the path.
 
         ``theme``: by default the theme of the viewer for SVG, light for the other formats. Raises
-        UnknownNameError for another suffix, MissingLibraryError without the extra ``figures``.
+        UnknownNameError for an unsupported suffix, MissingLibraryError without the extra ``figures``.
         """
         target = Path(path)
         match target.suffix.lower():

@@ -40,7 +40,7 @@ class Robot(metaclass=ArgumentErrors):
     has the name of the link. ``springs``: at joints and between two points. The joint coordinates q (nq,) and
     speeds qd (nv,) are in the order of the moving links. A joint has the name of its link.
     ``configurations``: named coordinates, rad or m; also a mapping such as ``{"ready": (0.0, 1.5)}``. In a
-    copy with other links, by ``dataclasses.replace``, they follow the joints by name.
+    copy with other links (``dataclasses.replace``), each joint keeps its coordinates by name.
 
     Robots are values: two robots are equal and have the same hash if all their numbers and names are equal.
     ``source`` (the origin of the numbers) is not compared.
@@ -230,7 +230,7 @@ class Robot(metaclass=ArgumentErrors):
     def qlim(self) -> NDArray[np.float64]:
         """Lowest and highest coordinates, a new (nq, 2) array, rad or m; infinite without a limit.
 
-        Limits of joints that couplings make depend on a coordinate are included; see :attr:`limits`.
+        The limits of coupled joints that depend on one coordinate are included; see :attr:`limits`.
         """
         rows: list[tuple[float, float]] = []
         limits = iter(self.limits)

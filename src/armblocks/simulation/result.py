@@ -48,7 +48,8 @@ class SimulationResult(RunData):
         The rows are the same as in :meth:`with_jumps`, two rows with the same time for each jump. Without
         ``jumps`` the file has the samples only.
 
-        Raises ``UnknownNameError`` for another suffix and ``FormatError`` if the file cannot be written.
+        Raises ``UnknownNameError`` for an unsupported suffix and ``FormatError`` if the file cannot be
+        written.
         """
         save(self, path, jumps=jumps)
 

@@ -1,6 +1,6 @@
 """Distances of convex bodies, many pairs at once: the algorithm of Gilbert, Johnson and Keerthi.
 
-A body is the convex hull of points, enlarged by a radius: a ball is one point, a capsule two, a box eight.
+A body is the convex hull of points, enlarged by a radius: a sphere is one point, a capsule two, a box eight.
 The distance of two hulls is the length of the shortest vector v in their difference. Each iteration adds the
 point of the difference that is farthest in the direction -v to a simplex of at most four points, and v
 becomes the shortest vector in the simplex. Source: Gilbert, Johnson, Keerthi, IEEE J. Robotics and Automation

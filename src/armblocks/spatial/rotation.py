@@ -26,8 +26,7 @@ IDENTITY3: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 SINGULAR = 2.2e-15
 """Cosine of the middle of three angles below which the orientation is singular: ten rounding errors.
 
-At a
-singular orientation only the sum or the difference of the other two angles is determined.
+At a singular orientation only the sum or the difference of the other two angles is determined.
 """
 
 

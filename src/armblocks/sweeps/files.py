@@ -42,7 +42,7 @@ def _arrow() -> tuple[Any, Any, Any]:
 
 
 def check_suffix(path: Path) -> None:
-    """Raise ``UnknownNameError`` for another suffix, ``MissingLibraryError`` without pyarrow."""
+    """Raise ``UnknownNameError`` for an unsupported suffix, ``MissingLibraryError`` without pyarrow."""
     if path.suffix.lower() not in SUFFIXES:
         raise UnknownNameError("file type", path.suffix or path.name, SUFFIXES, where=str(path))
     if not installed("pyarrow"):
@@ -53,9 +53,9 @@ class SweepFile:
     """The files of one sweep at ``path``, with its ``identity``: digests of model, design, measures …"""
 
     def __init__(self, path: Path, identity: Mapping[str, str], texts: Collection[str] = ()) -> None:
-        """``texts``: the names of the columns with texts.
+        """``texts``: the names of the columns with strings.
 
-        Raises ``InputError`` if the path has the results of another sweep, and the errors of
+        Raises ``InputError`` if the path contains the results of another sweep, and the errors of
         :func:`check_suffix`.
         """
         check_suffix(path)
@@ -87,7 +87,7 @@ class SweepFile:
         different = [name for name, digest in self._identity.items() if stored.get(name) != digest]
         if different:
             raise InputError(
-                f"the file has the results of another sweep: {', '.join(different)} "
+                f"the file contains the results of another sweep: {', '.join(different)} "
                 f"{'differs' if len(different) == 1 else 'differ'}",
                 where=str(where),
                 allowed="the results of the same model, settings, design and measures",
@@ -193,7 +193,7 @@ def _stored_identity(path: Path) -> Mapping[str, str]:
         return _parsed(identity, str(path))
     except FormatError:
         raise FormatError(
-            "this file has no results of a sweep",
+            "this file contains no results of a sweep",
             where=str(path),
             allowed="a file that a sweep has written, or a new file",
             fix="give another path",

@@ -39,7 +39,7 @@ def test_save_as_asks_before_it_overwrites(page: Page, studio: Studio) -> None:
     (folder / "theirs.json").write_text("{}")
     page.keyboard.press("Control+Shift+S")
     page.get_by_role("combobox", name="File").fill("theirs.json")
-    expect(page.get_by_text("theirs.json exists already")).to_be_visible()
+    expect(page.get_by_text("theirs.json already exists")).to_be_visible()
     page.get_by_role("button", name="Cancel").click()
     assert (folder / "theirs.json").read_text() == "{}"
     page.keyboard.press("Control+Shift+S")

@@ -145,7 +145,7 @@ def enter(page: Page, text: str, *, by_key: bool) -> None:
 
 
 def choose_by_keys(page: Page, field: Locator, entry: str) -> None:
-    """Type an entry of a list. On a loaded machine again: the browser forgets the typed letters after 1 s."""
+    """Type an entry of a list; on a loaded machine again, because a pause of 1 s ends the typed word."""
 
     def is_chosen() -> bool:
         page.keyboard.type(entry)

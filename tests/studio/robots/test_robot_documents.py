@@ -134,7 +134,7 @@ def test_the_script_of_the_paper_is_dropped_edited_undone_saved_and_reopened(tmp
         assert "changed on the disk" in await client.refused("save", document=key)
         await client.ask("save", document=key, overwrite=True)
         (tmp_path / "other.json").write_text("{}")
-        assert "the file exists already" in await client.refused("save", document=key, path="other.json")
+        assert "the file already exists" in await client.refused("save", document=key, path="other.json")
 
     run_scenario(tmp_path, scenario)
     (saved,) = read_robots((tmp_path / "arms" / "mine.json").read_bytes(), "mine.json").values()

@@ -72,7 +72,7 @@ def test_a_file_changed_on_disk_is_not_overwritten_without_confirmation(tmp_path
             await ask("save", document=key)
         assert (tmp_path / "a.json").read_text() == "{}"
         (tmp_path / "b.json").write_text("{}")
-        with pytest.raises(ArmblocksError, match="the file exists already"):
+        with pytest.raises(ArmblocksError, match="the file already exists"):
             await ask("save", document=key, path="b.json")
         await ask("save", document=key, path="b.json", overwrite=True)
         await ask("save", document=key)

@@ -85,7 +85,7 @@ def test_pasting_used_names_or_invalid_text_is_refused() -> None:
     with pytest.raises(DiagramError, match="a block is already named 'PID'"):
         document.edit(PasteBlocks(text=copy(document.diagram, "PID")))
     document = Document(diagram_with_note, load_robot)
-    with pytest.raises(DiagramError, match="a note with this name exists already"):
+    with pytest.raises(DiagramError, match="a note with this name already exists"):
         document.edit(PasteBlocks(text=copy(diagram_with_note, notes=("/1",))))
     document.edit(PasteBlocks(text=copy(diagram_with_note, notes=("/1",)), names={"/1": "/2"}, shift=5.0))
     assert document.diagram.notes["/2"] == Note(x=5, y=5, text="a")

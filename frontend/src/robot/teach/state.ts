@@ -34,7 +34,7 @@ interface Teaching {
   /** Names of poses that the motion omits, by the keys of the documents. */
   omitted: Record<string, string[]>
   course: Course
-  /** The typed duration, s; empty for the least duration. */
+  /** The typed duration, s; empty for the shortest duration. */
   duration: string
   motion: ShownMotion | null
   fault: string
@@ -212,7 +212,7 @@ function passed(robot: OpenRobot, omitted: string[] = []): string[] {
 
 // -- the motion --------------------------------------------------------------------------------------------
 
-/** The typed duration: null for the least one, undefined if it is not valid. */
+/** The typed duration: null for the shortest duration, undefined if it is not valid. */
 function typedDuration(): number | null | undefined {
   const text = useTeaching.getState().duration.trim()
   if (!text) return null

@@ -151,7 +151,7 @@ class Product(Block):
                 f"the value is '{self.operators}'",
                 where="Product.operators",
                 allowed="* and /, at least one",
-                fix="write one sign for each input, such as '*/'",
+                fix="write one operator for each input, such as '*/'",
             )
 
     def input_ports(self) -> tuple[Port, ...]:

@@ -68,10 +68,10 @@ class MotorDrive(Block):
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         shape = self.output_shapes(inputs)["y"]
         docs = {
-            "fast": "1 where the speed reduces the upper limit",
-            "overrun": "1 where the speed forces braking",
+            "fast": "1 where the forward speed reduces the upper limit",
+            "overrun": "1 where the forward speed forces braking",
             "fast_back": "1 where the backward speed raises the lower limit",
-            "overrun_back": "1 where the speed forces braking",
+            "overrun_back": "1 where the backward speed forces braking",
             "above": "1 above the upper limit",
             "below": "1 below the lower limit",
         }

@@ -34,9 +34,9 @@ class Hull(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Body:
-    """The n hulls of a link or obstacle: ``points`` (n, K, 3), ``radii`` (n,), and balls around the hulls.
+    """The n hulls of a link or obstacle: ``points`` (n, K, 3), ``radii`` (n,), and spheres around the hulls.
 
-    Hulls of fewer points repeat their first point. ``centres`` (n, 3) and ``sizes`` (n,): the balls, m.
+    Hulls of fewer points repeat their first point. ``centres`` (n, 3) and ``sizes`` (n,): the spheres, m.
     """
 
     points: Array
@@ -60,7 +60,7 @@ class Body:
         return cls(points=points, radii=radii, centres=centres, sizes=sizes)
 
     def centres_at(self, poses: Array) -> Array:
-        """The centres (N, n, 3) of the balls at poses (N, 4, 4)."""
+        """The centres (N, n, 3) of the spheres at poses (N, 4, 4)."""
         return np.einsum("nij,kj->nki", poses[:, :3, :3], self.centres) + poses[:, None, :3, 3]
 
     def points_at(self, hulls: Indices, poses: Array) -> Array:

@@ -33,14 +33,14 @@ def collisions(
     margin: float = 0.0,
     resolution: float = 0.005,
 ) -> CollisionReport:
-    """The least distance of every two bodies along a motion, and when they first touch.
+    """The minimum distance of every two bodies along a motion, and when they first touch.
 
     Bodies are the base, the links and the ``obstacles`` (:class:`Box`, :class:`Sphere`, :class:`Cylinder`,
     :class:`Plane`). Each shape in the file of a link is replaced by its convex hull. A link without shapes
-    has the castings of its drawing. The bars of ``Rod`` constraints are not bodies. ``motion``: a trajectory,
-    or configurations (nq,) or (N, nq), of which only these are checked. Bodies touch where their distance is
-    at most ``margin`` (m). The hull of a mesh with more than 120 vertices may be too small: it has only those
-    extreme in 120 directions.
+    has the default shapes of its drawing. The bars of ``Rod`` constraints are not bodies. ``motion``: a
+    trajectory, or configurations (nq,) or (N, nq), of which only these are checked. Bodies touch where their
+    distance is at most ``margin`` (m). The hull of a mesh with more than 120 vertices may be too small: it
+    has only those extreme in 120 directions.
 
     Four kinds of pairs are not compared: links that a joint or a closure connects, the base and an obstacle,
     pairs that touch in almost all configurations (such as the links of a wrist), and the pairs of names in
@@ -64,7 +64,7 @@ def collisions(
             raise InputError(
                 f"the trajectory has {counted(motion.n, 'joint')}",
                 where=where,
-                allowed=f"{arm.nq} coordinates, as the robot",
+                allowed=f"{arm.nq} coordinates, as many as q of the robot",
                 fix="use a trajectory of this robot, or configurations (N, nq)",
             )
         time = _times(scene, motion, step)
@@ -95,7 +95,7 @@ def collisions(
 def _result(
     scene: Scene, pair: Pair, time: Array, poses: Array, path: JointTrajectory | None, margin: float
 ) -> CollisionPair:
-    """The least distance of a pair and its first contact, by the poses at the times."""
+    """The minimum distance of a pair and its first contact, by the poses at the times."""
     distance = scene.distances(pair, poses, margin)
     nearest = int(distance.argmin())
     contact: float | None = None

@@ -1,4 +1,4 @@
-"""Simple obstacles: boxes, balls, cylinders, and half-spaces such as the floor."""
+"""Simple obstacles: boxes, spheres, cylinders, and half-spaces such as the floor."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Box(metaclass=ArgumentErrors):
 
 @dataclass(frozen=True, kw_only=True)
 class Sphere(metaclass=ArgumentErrors):
-    """A ball of the ``radius`` (m) about ``centre`` (3,), m in the world."""
+    """A sphere of this ``radius`` (m) about ``centre`` (3,), m in the world."""
 
     radius: float
     centre: Vector3 = (0.0, 0.0, 0.0)

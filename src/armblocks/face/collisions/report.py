@@ -14,7 +14,7 @@ MAX_ROWS = 12
 
 @dataclass(frozen=True, kw_only=True)
 class CollisionPair(metaclass=ArgumentErrors):
-    """Two bodies: their least ``distance`` (m, 0 if they touch) and its ``time``; the first ``contact``.
+    """Two bodies: their minimum ``distance`` (m, 0 if they touch) and its ``time``; the first ``contact``.
 
     Times are in s, or numbers of configurations. ``contact`` is None if the bodies do not touch.
     """
@@ -32,7 +32,7 @@ class CollisionReport(metaclass=ArgumentErrors):
 
     ``samples``: number of checked configurations. ``unit``: of times, s or none. ``excluded``: the pairs that
     are not compared, with reasons, apart from pairs that a joint connects. ``drawn``: links without shapes in
-    their file, whose bodies are the castings of the drawing.
+    their file, whose bodies are the default shapes of the drawing.
     """
 
     name: str
@@ -54,12 +54,12 @@ class CollisionReport(metaclass=ArgumentErrors):
 
     @property
     def clearance(self) -> float:
-        """The least distance of all pairs, m; infinite without pairs."""
+        """The smallest distance of all pairs, m; infinite without pairs."""
         return min((pair.distance for pair in self.pairs), default=float("inf"))
 
     @property
     def summary(self) -> str:
-        """The bodies and the time of the first contact, or the least distance, as a sentence."""
+        """The bodies and the time of the first contact, or the minimum distance, as a sentence."""
         first = self.first_contact
         if first is not None and first.contact is not None:
             when = table_number(first.contact)
@@ -68,7 +68,7 @@ class CollisionReport(metaclass=ArgumentErrors):
         if not self.pairs:
             return "no pair of bodies is compared"
         nearest = min(self.pairs, key=lambda pair: pair.distance)
-        return f"no contact, least distance {table_number(nearest.distance)} m"
+        return f"no contact, minimum distance {table_number(nearest.distance)} m"
 
     def __str__(self) -> str:
         rows = [
@@ -85,5 +85,5 @@ class CollisionReport(metaclass=ArgumentErrors):
             lines.append(f"and {counted(len(self.pairs) - MAX_ROWS, 'more pair')}")
         lines += [f"not compared: {text}" for text in self.excluded]
         if self.drawn:
-            lines.append(f"drawn castings as bodies: {', '.join(self.drawn)}")
+            lines.append(f"bodies from the default drawing: {', '.join(self.drawn)}")
         return "\n".join(lines)

@@ -101,7 +101,7 @@ class Scene:
     def distances(self, pair: Pair, poses: Array, margin: float) -> Array:
         """Distances (N,) for poses (N, L+2, 4, 4), m.
 
-        Where the bodies are farther apart than ``margin`` and not at their least distance, the values are
+        Where the bodies are farther apart than ``margin`` and not at their minimum distance, the values are
         lower bounds. They may be negative where the bodies touch.
         """
         first = poses[:, pair.rows[0]]

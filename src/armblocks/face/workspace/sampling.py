@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 CHUNK = 65_536
 """Samples that are evaluated at once."""
 SAMPLES_PER_CELL = 8
-"""Least number of samples for each cell of the box, by default; few samples leave gaps in the region."""
+"""Minimum number of samples for each cell of the box, by default; few samples leave gaps in the region."""
 CELLS_ACROSS = 60
 """Cells along the longest side of the region, by default at least half of this number."""
 MAX_POINTS = 1_000_000
@@ -74,7 +74,7 @@ def workspace(
     - ``"manipulability"``: Yoshikawa's product of the singular values of the Jacobian;
     - ``"singularity"``: the smallest singular value, which is the distance to the nearest singular Jacobian;
     - ``"condition"``: the smallest divided by the largest singular value;
-    - ``"limits"``: the least distance to a joint limit over half the range, 1 in the middle, 0 at a limit;
+    - ``"limits"``: the minimum distance to a joint limit over half the range, 1 in the middle, 0 at a limit;
     - ``"payload"``: the largest mass (kg) at the frame that the ``torque`` limits (n,) hold, by default those
       of the robot. ``centre`` (3,) m: its position in the axes of the frame. At rest, or with the speeds
       ``qd`` and accelerations ``qdd`` (n,).

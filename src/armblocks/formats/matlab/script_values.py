@@ -1,4 +1,4 @@
-"""Values of the expressions of scripts: numbers and texts, and the toolbox's links and robots."""
+"""Values of the expressions of scripts: numbers, strings, and the toolbox's links and robots."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class ScriptValues:
         return scalar(value)
 
     def text(self, location: Location, value: str) -> Value:
-        """A text in quotes."""
+        """A string in quotes."""
         return value
 
     def negative(self, location: Location, value: Value) -> Value:
@@ -49,7 +49,7 @@ class ScriptValues:
         return self._numbers.logic(location, operator, values)
 
     def matrix(self, location: Location, rows: Sequence[Sequence[Value]]) -> Value:
-        """``[a b; c d]`` of matrices, of texts in one row, or of links."""
+        """``[a b; c d]`` of matrices, of strings in one row, or of links."""
         flat = [value for row in rows for value in row]
         if any(isinstance(value, LinkRecord | LinkArray) for value in flat):
             return join_links(location, flat)

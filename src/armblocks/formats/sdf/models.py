@@ -51,7 +51,8 @@ class Models:
     def world(self, element: Element, source: Source) -> Scope:
         """The models in a ``<world>``, or in the root element of a file without a world.
 
-        If a model of a world cannot be read, a finding has the reason, and the error is added to ``errors``.
+        If a model of a world cannot be read, a finding states the reason, and the error is added to
+        ``errors``.
         """
         scope = Scope()
         scope.frame = Frame(kind="world", name="world", element=element, source=source, scope=scope)

@@ -19,7 +19,7 @@ _NOT_DRAWN = ("empty", "plane")
 
 
 def shapes_of(link: Frame, frames: Frames, material: Material) -> tuple[Shape, ...] | None:
-    """The shapes of a link; ``None`` if it has some, but none that can be shown.
+    """The shapes of a link; ``None`` if it has shapes, but none of them can be shown.
 
     Materials and textures are not used, infinite planes are not drawn.
     """
@@ -81,7 +81,7 @@ def _shapes(
 def _mesh(
     kind: Element, link: Frame, context: FileContext, pose: Transform, material: Material
 ) -> list[Shape]:
-    """The mesh of a file; a finding has the reason if it is not shown."""
+    """The mesh of a file; a finding states why it is not shown, if so."""
     file = text_in(kind, "uri") or text_in(kind, "filename") or kind.attributes.get("filename", "")
     shape: Shape | str = "a part of a mesh file cannot be selected"
     if kind.first("submesh") is None:

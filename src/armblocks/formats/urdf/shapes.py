@@ -15,7 +15,7 @@ from armblocks.spatial import Transform
 
 
 def shapes_of(link: Element, context: FileContext, material: Material) -> tuple[Shape, ...] | None:
-    """The shapes of a link; ``None`` if it has some, but none that can be shown.
+    """The shapes of a link; ``None`` if it has shapes, but none of them can be shown.
 
     Colours and textures are not used.
     """
@@ -63,7 +63,7 @@ def _shapes(element: Element, link: Element, context: FileContext, material: Mat
 def _mesh(
     kind: Element, link: Element, context: FileContext, pose: Transform, material: Material
 ) -> list[Shape]:
-    """The mesh of a file; a finding has the reason if it is not shown."""
+    """The mesh of a file; a finding states why it is not shown, if so."""
     file = kind.attributes.get("filename", "").strip()
     scale = kind.vector("scale", (1.0, 1.0, 1.0))
     shape = mesh_shape(file, scale, material, pose, context)

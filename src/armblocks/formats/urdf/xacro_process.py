@@ -1,7 +1,7 @@
 """Expansion of a xacro file in a separate process: ``python -m armblocks.formats.urdf.xacro_process``.
 
 xacro evaluates Python expressions of the file. Here each expression is checked first: it may contain numbers,
-texts, operators, comprehensions over lists, and calls of the functions that xacro documents, but no lambda
+strings, operators, comprehensions over lists, and calls of the functions that xacro documents, but no lambda
 functions, no names and attributes that begin with an underscore, and no attributes of frames and generators.
 The process has limits of memory and processor time, and the process that started it ends it after a time.
 

@@ -20,7 +20,7 @@ BAR, BAR_SPACE, BOTTOM = 12.0, 74.0, 46.0
 RAMP = np.array([(46, 74, 150), (31, 125, 160), (46, 160, 120), (142, 190, 62), (246, 213, 60)], float)
 """Colours from the smallest to the largest value; their brightness increases."""
 MIN_SIDE, PIXELS = 3, 300
-"""Least number of pixels of a side of a cell, and of the longer side of the map: viewers blur small
+"""Minimum number of pixels of a side of a cell, and of the longer side of the map: viewers blur small
 images."""
 
 

@@ -28,7 +28,7 @@ HIGHEST = 0.1
 """The share of runs with the highest values that parallel coordinates emphasise."""
 PANEL_HEIGHT = 250.0
 CELLS = 120
-"""Maximum number of values of a parameter of which each has cells of its own."""
+"""Maximum number of values of a parameter for one row or column of cells for each value."""
 
 
 def response_chart(parameters: _Columns, name: str, values: _Array) -> Picture:

@@ -64,7 +64,7 @@ def time_chart(
 ) -> Picture:
     """Panels one below the other with a common time axis (s); each line is named at its right end.
 
-    ``height`` is the least height of a panel. Panels with many lines are higher, so that their names do not
+    ``height`` is the minimum height of a panel. Panels with many lines are higher, so that their names do not
     overlap.
     """
     spans = [_value_range(panel) for panel in panels]

@@ -326,7 +326,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         if path != open_file.path:
             if self.folder.exists(path):
                 raise FormatError(
-                    "the file exists already", where=path, fix="overwrite it, or choose another name"
+                    "the file already exists", where=path, fix="overwrite it, or choose another name"
                 )
             return
         open_file.disk, open_file.on_disk = self.folder.compared(path, open_file.on_disk)

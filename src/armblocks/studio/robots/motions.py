@@ -33,9 +33,9 @@ Course = Literal["joint", "line", "spline"]
 LINE_STEPS = 48
 """Number of poses on a straight line between two recorded poses that inverse kinematics solves."""
 LEAST_PIECES = 24
-"""Least number of quintic pieces of a part of given duration."""
+"""Minimum number of quintic pieces of a part of given duration."""
 GRID = 150
-"""Least number of segments of a path on which the least time is computed."""
+"""Minimum number of segments of a path on which the shortest time is computed."""
 SAME = 1e-9
 """Difference of two coordinates, rad or m, up to which they are equal."""
 FRAMES_PER_SECOND = 60
@@ -52,7 +52,7 @@ class Plan(NamedTuple):
 
 
 def plan(arm: Arm, poses: Sequence[Configuration], course: Course, duration: float | None) -> Plan:
-    """The motion from rest to rest through ``poses``, in ``duration`` (s) or in the least time.
+    """The motion from rest to rest through ``poses``, in ``duration`` (s) or in the shortest time.
 
     Raises InputError for fewer than two poses, for equal neighbours, and for a straight line that the arm
     cannot follow; RobotError for robots with ball joints or closed loops.
@@ -79,7 +79,7 @@ def plan(arm: Arm, poses: Sequence[Configuration], course: Course, duration: flo
     is_unlimited = not (np.isfinite(limits.speed).any() or np.isfinite(limits.torque).any())
     if duration is None and is_unlimited:
         raise InputError(
-            "the robot has no limits of speed or torque, so that there is no least time",
+            "the robot has no limits of speed or torque, so that there is no shortest time",
             where=where,
             allowed="a duration in s, or a robot with limits",
             fix="type a duration, or the limits of the joints in the table Dynamics",

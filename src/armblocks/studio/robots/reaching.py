@@ -47,7 +47,7 @@ class Directions(NamedTuple):
 
     @property
     def missing(self) -> list[str]:
-        """The directions that the joints cannot follow, as texts such as "turn about x"."""
+        """The directions that the joints cannot follow, as phrases such as "turn about x"."""
         return [word for word, used in zip(_DIRECTIONS, self.mask) if not used]
 
 

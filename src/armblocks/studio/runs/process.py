@@ -1,7 +1,7 @@
 """A run in a separate process, whose failures do not affect the editor.
 
-This is the side of the hub; the worker is :mod:`armblocks.studio.runs.worker`. They communicate through a
-pipe of bytes. The first byte of a message is ``J`` for JSON or ``S`` for a frame of samples.
+This module runs in the server; :mod:`armblocks.studio.runs.worker` runs in the process. They communicate
+through a pipe of bytes. The first byte of a message is ``J`` for JSON or ``S`` for a frame of samples.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ FINAL_STATES = ("done", "stopped", "failed")
 
 
 class RunProcess:
-    """One run of one document. The hub creates it; ``notify`` receives its events and frames in its loop."""
+    """One run of one document. The hub creates it; ``notify`` receives its events and frames."""
 
     def __init__(self, key: str, document: str, worker: Worker, notify: NotifyRun) -> None:
         self.key = key

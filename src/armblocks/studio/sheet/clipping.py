@@ -82,7 +82,7 @@ def pasted(
     notes = {names.get(name, name): note for name, note in copied.notes.items()}
     if any(name in diagram.notes for name in notes):
         raise DiagramError(
-            "a note with this name exists already",
+            "a note with this name already exists",
             where=where,
             allowed="unique names",
             fix="give the pasted note another name",

@@ -1,7 +1,7 @@
 """Conversion between the text of a parameter's field and the value of the block.
 
 Numbers and arrays may be typed as formulas, ``2*pi``, ``[1 2; 3 4]``, ``45*deg``, in the language of formulas
-and scripts, :mod:`armblocks.matlab`; Python evaluates nothing.
+and scripts, :mod:`armblocks.matlab`. They are never evaluated as Python code.
 """
 
 from __future__ import annotations

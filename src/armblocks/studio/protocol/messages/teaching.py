@@ -93,7 +93,7 @@ class MotionRequest(TeachingRequest[ReplyT], Generic[ReplyT]):
 
     ``poses``: their names; the order is that of the robot, and ``None`` means all poses. ``course``: joint
     motions or straight lines of the tool, with a stop at each pose, or a spline in joint space without stops.
-    ``duration`` s; ``None``: the least duration under the limits of speed and torque.
+    ``duration`` s; ``None``: the shortest duration under the limits of speed and torque.
     """
 
     poses: list[str] | None = Field(default=None, max_length=10_000)
