@@ -32,6 +32,7 @@ from armblocks.blocks import (
     ResettableIntegrator,
     ResettableSubsystem,
     Saturation,
+    SecondOrderIntegratorLimited,
     Sign,
     SignalGenerator,
     SineWave,
@@ -375,6 +376,28 @@ def test_an_event_at_a_breakpoint_does_not_depend_on_the_gain() -> None:
     assert np.allclose(result["x", "limit.upper"], np.maximum(result.time - 1.0, 0.0), atol=1e-9)
 
 
+def test_a_hold_samples_where_a_mode_changes_at_the_same_instant() -> None:
+    """Every sample is proportional to the amplitude of the square wave, above 1 and below -1 in part."""
+    builder = ab.DiagramBuilder("samples")
+    square = builder.add("square", SignalGenerator(waveform="square", amplitude=1.3))
+    total = builder.add("total", Sum(), builder.add("cut", Saturation(lower=-1.0, upper=5.0), square), square)
+    builder.add("line", FirstOrderHold(period=0.25), total)
+    inner = ab.DiagramBuilder("part")
+    inner.add("y", Outport(), inner.add("line", FirstOrderHold(period=0.25), inner.add("u", Inport())))
+    wave = builder.add("wave", SineWave(amplitude=1.3, frequency=3.0, phase=0.3))
+    always = builder.add("always", Constant(value=1.0))
+    builder.add("enabled", EnabledSubsystem(diagram=inner.build()), wave, enable=always)
+    diagram, settings = builder.build(), {"stop_time": 2.0, "sample_time": 0.0625}
+    result = ab.sensitivity(diagram, ("square.amplitude", "wave.amplitude"), ("line", "enabled"), **settings)
+    t, by_wave = result.time, result["enabled", "wave.amplitude"]
+    np.testing.assert_allclose(by_wave, result.run["enabled"] / 1.3, rtol=0.0, atol=1e-12)
+    # The samples have the derivatives -1 (square wave -1.3, cut) and 2 (1.3); the sample before them is 0.
+    samples = np.array([0.0, *np.tile([-1.0, -1.0, 2.0, 2.0], 3)])
+    k = np.floor(4.0 * t).astype(int)
+    expected = samples[k + 1] + (samples[k + 1] - samples[k]) * (4.0 * t - k)
+    np.testing.assert_allclose(result["line", "square.amplitude"], expected, rtol=0.0, atol=1e-12)
+
+
 def test_delays_and_implicit_equations_together_are_refused() -> None:
     builder = ab.DiagramBuilder("both")
     state = builder.add("x", Integrator(initial=0.7))
@@ -403,9 +426,17 @@ def test_events_at_the_start_that_depend_on_the_parameter_are_refused() -> None:
         builder.add("x", Integrator(), builder.add("y", block, builder.add("wave", SineWave())))
         return builder.build()
 
+    def integrated_twice(block: Block) -> ab.Diagram:
+        builder = ab.DiagramBuilder("start")
+        builder.add("y", block, builder.add("fall", Constant(value=-9.81)))
+        return builder.build()
+
     for block, parameter in ((Sign(), "wave.phase"), (PWM(), "y.offset"), (FirstOrderHold(), "y.offset")):
         with pytest.raises(InputError, match=f"event of 'y' at the start moves with .* '{parameter}'"):
             ab.sensitivity(integrated(block), parameter, "x")
+    ball = SecondOrderIntegratorLimited(lower=0.0)
+    with pytest.raises(InputError, match=r"event of 'y' at the start moves with .* 'y.lower'"):
+        ab.sensitivity(integrated_twice(ball), "y.lower", "y/x")
     # The absolute value has a kink at the start but no jump: dx/dphase = |sin(t)|.
     result = ab.sensitivity(integrated(Abs()), "wave.phase", "x", **TIGHT)
     assert np.allclose(result["x", "wave.phase"], np.sin(result.time), atol=1e-9)

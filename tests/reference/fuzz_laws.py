@@ -30,7 +30,9 @@ from armblocks.blocks import BLOCKS, DirectLookup, VariableTransportDelay
 from armblocks.blocks.external_resets import LEVELS
 from armblocks.diagram import Diagram, flat_diagram, infer_shapes
 from armblocks.diagram.controls import EnableControl, TriggerControl
-from armblocks.errors import ArmblocksError, SimulationError
+from armblocks.errors import ArmblocksError, InputError, SimulationError
+from armblocks.face.linearizing import resolved_diagram
+from armblocks.face.model import compile_diagram
 from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_robot
 from armblocks.formats.diagram_python import diagram_to_python
 
@@ -613,6 +615,57 @@ def later(node: Node) -> Node:
     return replace(node, kind=kind, parameters=shifted, inside=tuple(map(later, node.inside)))
 
 
+CHANGE = 1e-6
+"""The change of a parameter for a difference of runs, relative to 1 plus its value."""
+
+
+def sensitivities_agree_with_differences(case: Case) -> Iterator[str]:
+    """The exact derivatives with respect to one parameter agree with differences of runs."""
+    system = compile_diagram(case.diagram).system
+    numbers = [slot.name for slot in system.parameters.slots if slot.shape == ()]
+    random = np.random.default_rng(
+        len(case.recipe.nodes) + round(1e6 * abs(sum(map(np.sum, case.run.values()))))
+    )
+    if not numbers:
+        raise InconclusiveError("no parameter is a number")
+    for name in random.choice(numbers, min(2, len(numbers)), replace=False).tolist():
+        value = float(system.parameter_values[system.parameters.range_of(name)][0])
+        settings = {**case.settings, "rtol": 1e-10, "atol": 1e-13}
+        names = [signal for signal in case.run if not signal.endswith("/last")]
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                found = ab.sensitivity(case.diagram, name, names, **settings)
+                runs = [
+                    ab.simulate(resolved_diagram(case.diagram, {name: value + shift}), **settings)
+                    for shift in CHANGE * (1.0 + abs(value)) * np.array([-2.0, -1.0, 1.0, 2.0])
+                ]
+        except (InputError, SimulationError) as error:
+            raise InconclusiveError(f"refused: {error}") from None
+        step = CHANGE * (1.0 + abs(value))
+        for signal in names:
+            rows = [run[signal] for run in runs]
+            if any(len(values) != len(case.times) for values in rows):
+                break
+            # Where the left, the right and the central differences differ, a jump lies between the runs.
+            left, right, wide = (
+                (rows[1] - rows[0]) / step,
+                (rows[3] - rows[2]) / step,
+                (rows[3] - rows[0]) / (4.0 * step),
+            )
+            central, size = (rows[2] - rows[1]) / (2.0 * step), 1.0 + np.abs(wide).max(initial=0.0)
+            spread = np.max([rows_of(other, central) for other in (left, right, wide)], axis=0)
+            smooth = spread < 1e-3 * size
+            wrong = smooth & (rows_of(found[signal, name], central) > 1e-2 * size)
+            if wrong.sum() > 2 and size < 1e5:
+                row = int(np.argmax(wrong))
+                derivative = np.ravel(found[signal, name][row])
+                yield (
+                    f"d '{signal}' / d '{name}' is {derivative} at row {row}; the differences of runs give "
+                    f"{np.ravel(central[row])} ({wrong.sum()} rows differ)"
+                )
+
+
 LAWS: Mapping[str, Callable[[Case], Iterator[str]]] = {
     "reference": agrees_with_reference,
     "formulas": obeys_formulas,
@@ -624,6 +677,7 @@ LAWS: Mapping[str, Callable[[Case], Iterator[str]]] = {
     "continuation": continues,
     "invariance": is_invariant,
     "later start": starts_at_any_time,
+    "sensitivities": sensitivities_agree_with_differences,
 }
 
 

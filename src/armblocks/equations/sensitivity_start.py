@@ -25,6 +25,9 @@ ZERO_TOLERANCE = 1e-8
 DERIVATIVE_TOLERANCE = 1e-9
 """Relative tolerance of equal derivatives of states and signals."""
 
+KINK_STEP, KINK = 1e-6, 1e-2
+"""The relative change of a parameter on both sides, and the smallest difference of both derivatives."""
+
 
 def refuse_moving_start(system: HybridSystem, parameters: Sequence[str]) -> None:
     """Raise ``InputError`` if an event is at the start, depends on a parameter, and its two sides differ.
@@ -37,7 +40,7 @@ def refuse_moving_start(system: HybridSystem, parameters: Sequence[str]) -> None
     for name in parameters:
         entries = system.parameters.range_of(name)
         guards = [system.guard_names[guard] for guard in start.moving_guards(entries)]
-        for block in [*guards, *start.held_states(entries)]:
+        for block in [*guards, *start.held_states(entries), *start.kinks(entries)]:
             raise InputError(
                 f"an event of '{block}' at the start moves with the parameter '{name}'",
                 where=system.name,
@@ -102,6 +105,25 @@ class _Start:
         largest = np.abs(np.array(values)).max(axis=0)
         names = [element for slot in system.states for element in slot.elements]
         return [names[index].rpartition("/")[0] for index in np.flatnonzero(largest > ZERO_TOLERANCE)]
+
+    def kinks(self, entries: slice) -> list[str]:
+        """The blocks with initial states that have different derivatives to the left and to the right of a
+        parameter, for example an initial value equal to a limit."""
+        found: set[str] = set()
+        for index in range(entries.start, entries.stop):
+            step = KINK_STEP * (1.0 + abs(self.p[index]))
+            sides = [self.p.copy() for _ in range(3)]
+            for side, shift in zip(sides, (-step, 0.0, step)):
+                side[index] += shift
+            for initial, layout in (
+                (self.system.initial_states, self.system.states),
+                (self.system.initial_discrete, self.system.discrete),
+            ):
+                below, here, above = (initial(side)[0].ravel() for side in sides)
+                curved = np.abs(above - 2.0 * here + below) > KINK * step
+                names = [element for slot in layout.slots for element in slot.elements]
+                found |= {names[k].rpartition("/")[0] for k in np.flatnonzero(curved)}
+        return sorted(found)
 
     def _initial_rates(self, p: SX, entries: slice) -> list[tuple[SX, SX, SX]]:
         """For each parameter entry the derivatives of the initial states and discrete variables, and its unit
