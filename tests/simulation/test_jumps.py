@@ -214,7 +214,7 @@ def test_files_mark_a_jump_by_two_rows_with_the_same_time(tmp_path: Path) -> Non
     assert (tmp_path / "samples.csv").read_text() == "time,step/y\n0,0\n1,0\n2,0\n3,1\n4,1\n"
     assert result.to_dataframe().index.tolist() == result.time.tolist()
     assert result.to_dataframe(jumps=True).index.tolist() == [0.0, 1.0, 2.0, 2.003, 2.003, 3.0, 4.0]
-    part = result.only({"y": "step/y"}, slice(2, 4)).with_jumps()
+    part = result.select({"y": "step/y"}, slice(2, 4)).with_jumps()
     assert part.time.tolist() == [2.0, 2.003, 2.003, 3.0]
 
 
@@ -369,7 +369,7 @@ def test_a_saved_result_with_jumps_can_be_played_back(seed: int, tmp_path: Path)
     case = Case(seed)
     result = run(case)
     names = ("step", "hold", "product")
-    result.only({name: f"{name}/y" for name in names}).save(tmp_path / "rows.csv")
+    result.select({name: f"{name}/y" for name in names}).save(tmp_path / "rows.csv")
     b = DiagramBuilder("playback")
     b.add("file", FromFile(data=ab.load_table(tmp_path / "rows.csv")))
     again = ab.simulate(b.build(), stop_time=case.stop_time, sample_time=0.0123)

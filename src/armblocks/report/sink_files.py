@@ -87,7 +87,7 @@ def write_files(
         count = len(range(0, result.time.size, sink.settings.decimation))
         first = max(0, count - sink.settings.limit) * sink.settings.decimation
         rows = slice(first, None, sink.settings.decimation)
-        result.only({sink.variable: f"{sink.block}/{sink.signal}"}, rows).save(
+        result.select({sink.variable: f"{sink.block}/{sink.signal}"}, rows).save(
             path, jumps=sink.settings.decimation == 1
         )
         written_paths.append(path)

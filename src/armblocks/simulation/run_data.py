@@ -143,8 +143,8 @@ class RunData(metaclass=ArgumentErrors):
     def __contains__(self, name: object) -> bool:
         return name in self.signals_layout.ranges or name in self.aliases
 
-    def only(self, names: Mapping[str, str], rows: slice = slice(None)) -> Self:
-        """The result with selected signals, ``{new name: path}``, and selected samples.
+    def select(self, names: Mapping[str, str], rows: slice = slice(None)) -> Self:
+        """A result with some signals, ``{new name: path}``, and a slice of the samples.
 
         Raises ``UnknownNameError`` for a path that does not exist.
         """
