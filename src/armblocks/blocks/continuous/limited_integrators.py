@@ -324,8 +324,9 @@ def _limited(x: Signals, p: Signals, e: Signals) -> dict[str, SX]:
         logic_and(x["mode"] > 0.0, e["falls"] < 0.0), logic_and(x["mode"] < 0.0, e["rises"] > 0.0)
     )
     inner = if_else(leaves, 0.0, x["mode"])
+    # A state slightly beyond a limit is set to the limit.
+    within = fmin(fmax(x["x"], p["lower"]), p["upper"])
     return {
         "mode": if_else(upper, 1.0, if_else(lower, -1.0, inner)),
-        # A state slightly beyond a limit is set to the limit.
-        "x": fmin(fmax(x["x"], p["lower"]), p["upper"]),
+        "x": if_else(upper, p["upper"], if_else(lower, p["lower"], within)),
     }

@@ -245,6 +245,7 @@ class SecondOrderIntegratorLimited(Block):
         side = if_else(hits, if_else(logic_and(stops, presses), if_else(at_upper, 1.0, -1.0), 0.0), side)
         rests = if_else(pushed_up, 1.0, if_else(pushed_down, -1.0, side))
         speed = if_else(logic_or(pushed_up, pushed_down), 0.0, speed)
+        position = if_else(pushed_up, p["upper"], if_else(pushed_down, p["lower"], position))
         fast, fast_back = e["upper_speed"] > 0.0, e["lower_speed"] < 0.0
         pushed = logic_and(e["rises"] > 0.0, x["dx"] >= p["upper_speed"])
         pushed_back = logic_and(e["falls"] < 0.0, x["dx"] <= p["lower_speed"])
