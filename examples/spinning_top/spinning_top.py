@@ -5,11 +5,11 @@
 simulates three motions of one top and writes a report of each into the folder OUT (``slow/report.html``,
 ``fast/report.html``, ``released/report.html``), and with ``--film`` the video ``top.mp4`` (extra ``film``):
 
-- ``slow`` and ``fast``: the two steady precessions. The tilt θ is constant and the axis turns about the
-  vertical at a rate Ω, which satisfies A cos(θ) Ω² - C s Ω + m g l = 0 with the spin s about the axis,
-  and the moments of inertia A (across, about the tip) and C (about the axis).
-- ``released``: the spinning top is released at rest. Its axis nods: cos(θ) is an elliptic function of the
-  time (E. T. Whittaker, A Treatise on the Analytical Dynamics, section 72).
+- ``slow`` and ``fast``: the two steady precessions. The tilt θ is constant and the axis rotates about the
+  vertical at a rate Ω, which satisfies A cos(θ) Ω² - C s Ω + m g l = 0. Here s is the spin about the axis;
+  the moments of inertia are A (perpendicular to the axis, about the tip) and C (about the axis).
+- ``released``: the spinning top is released at rest. Its axis oscillates (nutation): cos(θ) is an elliptic
+  function of the time (E. T. Whittaker, A Treatise on the Analytical Dynamics, section 72).
 """
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ def compose_message(what: str, where: str = "", allowed: str = "", fix: str = ""
 
 
 def counted(count: int, singular: str, plural: str = "") -> str:
-    """A number of things as text: ``1 argument``, ``2 arguments``. The default plural has an ``s``."""
+    """A count with its noun: ``1 argument``, ``2 arguments``. The default plural has an ``s``."""
     return f"{count} {singular if count == 1 else plural or singular + 's'}"
 
 

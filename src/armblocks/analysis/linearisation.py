@@ -6,9 +6,10 @@ Between ticks the implicit function theorem eliminates the unknowns::
 
 Without clocks ``dz = 0``: modes are constant. With clocks the system is sampled once a period, the least
 common multiple of the periods of all clocks. Its state is ``x`` and the part of ``z`` that clocks update,
-just before the first tick of the period. The inputs are held over the period. Each tick multiplies by the
-derivatives of ``update`` and each interval between ticks by a matrix exponential, so that the map over one
-period is exact (Franklin, Powell, Workman, Digital Control of Dynamic Systems, 3rd ed., 4.3, for one clock).
+just before the first tick of the period. The inputs are held over the period. The map over one period is a
+product: the derivatives of ``update`` for each tick, and a matrix exponential for each interval between
+ticks. The map is therefore exact. Source, for one clock: Franklin, Powell, Workman, Digital Control of
+Dynamic Systems, 3rd ed., 4.3.
 """
 
 from __future__ import annotations

@@ -83,8 +83,8 @@ def polynomial(roots: Complex, letter: str, factor: float = 1.0) -> str:
 
     Coefficients that are only rounding errors of the roots are omitted. The k-th coefficient is the
     sum of all products of k roots. If each root has a relative error of at most ``e``, the coefficient
-    changes by at most ``e k`` times the sum of the magnitudes of these products, which is the coefficient of
-    the polynomial whose roots are the negative magnitudes.
+    changes by at most ``e k`` times the sum of the magnitudes of these products. This sum is a coefficient of
+    the polynomial whose roots are the negative magnitudes of the roots.
     """
     coefficients = _multiplied_out(roots)
     magnitudes = _multiplied_out(-np.abs(roots).astype(np.complex128))

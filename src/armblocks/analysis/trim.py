@@ -53,10 +53,12 @@ MAX_NAMED_EQUATIONS = 6
 class TrimProblem:
     """The definition of a trim problem.
 
-    ``start`` is the first guess. The others are indices: ``free_states`` of the states in ``x`` that may
-    change, ``resting`` of the states whose derivative must be 0, ``free_parameters`` in ``p``, ``rows`` of
-    the signals in ``y`` that must have the values ``targets``. ``bounds``: lower and upper bound by the name
-    of an unknown scalar.
+    - ``start``: the first guess.
+    - ``free_states``: the indices in ``x`` of the states that may change.
+    - ``resting``: the indices of the states whose derivative must be 0.
+    - ``free_parameters``: the indices in ``p`` of the parameters that may change.
+    - ``rows``: the indices in ``y`` of the signals that must have the values ``targets``.
+    - ``bounds``: lower and upper bound by the name of an unknown scalar.
     """
 
     system: HybridSystem

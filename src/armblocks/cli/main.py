@@ -1,9 +1,13 @@
 """The entry point of the command line: commands, and handling of errors, warnings and Ctrl-C.
 
 Exit codes: 0 done, 1 a defect of armblocks (with a traceback), 2 invalid input (a message, no traceback), 130
-interrupted with Ctrl-C. ``diff`` also exits with 1 if its diagrams differ, ``lint`` if it has findings,
-``size`` if a joint has no candidate drive within all limits, ``identify`` and ``fit`` if the data do not
-determine some parameters, and ``optimise`` if it does not find a minimum.
+interrupted with Ctrl-C. Some commands also exit with 1:
+
+- ``diff`` if the diagrams differ,
+- ``lint`` if there are findings,
+- ``size`` if a joint has no candidate drive within all limits,
+- ``identify`` and ``fit`` if the data do not determine some parameters,
+- ``optimise`` if no minimum was found.
 """
 
 from __future__ import annotations

@@ -1,11 +1,12 @@
 """Calling a kernel from Python: a CPython builtin whose code is part of the kernel's LLVM module.
 
 A call through ``ctypes`` takes several times as long as a whole robot model. The builtin has the signature of
-``METH_FASTCALL | METH_KEYWORDS``. It checks its arguments. When each is a plain C-contiguous float64 array of
-the slot's shape (a float for a scalar slot), with or without the samples' axis, it allocates the result, or
-takes the array of ``out=``, and calls the evaluation: no Python code runs. Other calls (lists, subclasses, a
-wrong shape, ``out=`` that shares memory with an input, two threads) go to a Python callable, which handles
-them or raises the error. No C compiler is involved, so the wheel is pure Python.
+``METH_FASTCALL | METH_KEYWORDS``. It checks its arguments. If they are plain C-contiguous float64
+arrays of the slots' shapes (floats for scalar slots), with or without the axis of the samples, no Python code
+runs: the builtin allocates the result, or takes the array of ``out=``, and calls the evaluation. Other calls
+(lists, subclasses, a wrong shape, ``out=`` that shares memory with an input, two threads) go to a Python
+callable, which handles them or raises the error. No C compiler is involved, so the wheel is pure
+Python.
 
 Batches have separate machine code, which is compiled at the first batch. The first batch therefore goes to
 the Python callable; the kernel then stores the address in :data:`BATCHES`.

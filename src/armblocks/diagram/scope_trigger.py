@@ -19,13 +19,13 @@ MAX_ELEMENT = 1_000_000
 
 @dataclass(frozen=True, kw_only=True)
 class ScopeTrigger(metaclass=ArgumentErrors):
-    """The time scopes show a window about a time at which a signal crosses a level.
+    """A trigger of the scopes: they show a window about a time at which a signal crosses a level.
 
     ``signal`` is the path of an output, ``"controller/error/y"``, and ``element`` the index of an entry of
     this signal, from 0. The signal may be missing: the trigger then waits. ``level`` has the SI unit of the
-    signal. ``span`` is the width of the window (s), ``position`` the part of it before the trigger (0 to 1),
-    and ``hold_off`` the time after a trigger during which further crossings are ignored (s). ``on`` is false
-    for a trigger that is switched off and keeps its settings. Raises ``DiagramError``.
+    signal. ``span`` is the width of the window (s), and ``position`` the part of it before the trigger (0 to
+    1). ``hold_off`` is the time after a trigger during which further crossings are ignored (s). ``on`` is
+    false for a trigger that is switched off and keeps its settings. Raises ``DiagramError``.
     """
 
     on: bool = True

@@ -1,9 +1,9 @@
 """The equations of ball joints: quaternions, and speeds that are not rates of coordinates.
 
 In the tree of bodies a ball joint is a series of three bodies (:class:`armblocks.robot.tree.Body`). The first
-one has the rotation of the whole joint. The angular velocities about its own x axis, about the y axis of the
-second and about the z axis of the third body add up to the angular velocity (wx wy wz) of the joint. The
-algorithms treat each axis as fixed in the body before it, but all three are fixed in the last body. The
+body has the rotation of the whole joint. The angular velocity (wx wy wz) of the joint is the sum of three
+angular velocities: about the x axis of the first, the y axis of the second and the z axis of the third body.
+The algorithms treat each axis as fixed in the body before it, but all three are fixed in the last body. The
 velocities do not depend on this difference; the angular accelerations do, see :func:`axis_accelerations`.
 
 Source: Featherstone, *Rigid Body Dynamics Algorithms*, 4.4 and 4.5 (quaternions, ``q̇ ≠ qd``).

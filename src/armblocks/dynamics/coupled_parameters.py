@@ -2,9 +2,9 @@
 
 In a parallelogram the rods have the angular velocity of the links beside them. Parameters of different bodies
 then have the same effect on the independent coordinates, although no joint is between these bodies. Such
-groups follow from the geometry of the whole mechanism. They are found numerically: the torque is linear in
-the parameters, and a column of the matrix of their effects at random states that depends on columns before it
-belongs to a parameter that can be replaced.
+groups follow from the geometry of the whole mechanism. They are found numerically. The torque is linear in
+the parameters: it is the product of a matrix, here at random states, and the vector of the parameters. If a
+column of this matrix depends linearly on the columns before it, its parameter can be replaced.
 
 All operations have a fixed order and are defined by IEEE 754, so that the parameters have the same bits on
 every machine.

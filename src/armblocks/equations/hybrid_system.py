@@ -71,9 +71,10 @@ class EventRanks:
     ``k``.
 
     ``guards``, ``hysteresis_modes``, ``recaptured_states``: the ranks of the entries of the fields of
-    :class:`HybridSystem` with these names. ``controls``: for each control of a conditional subsystem, the
-    index in ``z`` of the mode with the sign of its signal, of the value of this mode at its last event, and
-    its rank. While events of a lower rank are processed, the mode has its old value.
+    :class:`HybridSystem` with these names. ``controls``: for each control of a conditional subsystem, two
+    indices in ``z`` and a rank. The first index is that of the mode with the sign of the control signal, the
+    second that of the value of this mode at its last event. While events of a lower rank are processed, the
+    mode has its old value.
     """
 
     before_ticks: tuple[int, ...]
@@ -95,24 +96,29 @@ class HybridSystem:
     ``block/state``, a parameter ``block.parameter``; signals are in evaluation order, so the first non-finite
     signal causes all others.
 
-    All functions have flat inputs and outputs. ``derivative``, ``signals``, ``residual``,
-    ``residual_jacobian`` and ``guards``: inputs ``t ()``, ``x (nx,)``, ``z (nz,)``, ``w (nw,)``, ``p (np,)``;
-    one output ``xd (nx,)``, ``y (ny,)``, ``r (nw,)``, ``J (nw, nw)``, ``g (ng,)``. ``update``: the additional
-    input ``m (nclocks,)``; output ``z (nz,)``: the new z at an instant at which the clocks with ``m[k] = 1``
-    tick. If ticks have several levels, a clock with ``m[k] = 2 + j`` ticks for the outputs and discrete
-    states of level ``j`` only. If ``captures`` is true, it is also evaluated without a ticking clock just
-    before every instant, at a time one unit in the last place earlier: z then stores left limits. ``reset``:
-    the additional input ``e (ng,)``, +1 or -1 where a guard fired upwards or downwards, else 0; outputs ``x
-    (nx,)`` and ``z (nz,)``. With all ``e`` zero it gives the consistent modes (for example of a limiter that
-    starts beyond its limit) and the resulting states. A run makes this call at the start, before each level
-    of ticks that follows events and after the ticks, and whenever no guard fires and a mode is inconsistent.
-    At a breakpoint, as at a tick, the signs of guards before and after the instant are compared.
-    ``contradictions``: the inputs of ``guards``; output ``c (nm,)``, not 0 where the mode ``z[modes[k]]`` is
-    not consistent with the present values. ``initial_states``, ``initial_discrete``, ``initial_algebraic``:
-    input ``p``; output ``x0``, ``z0``, ``w0``. At the start all clocks without an offset tick, before the
-    first derivative. ``breakpoints``: input ``p``; output ``times (nb,)``: known times at which signals jump
-    (a step source). Signals are right-continuous: at a breakpoint, a tick or an event they have their new
-    values.
+    All functions have flat inputs and outputs:
+
+    - ``derivative``, ``signals``, ``residual``, ``residual_jacobian`` and ``guards``: inputs ``t ()``, ``x
+      (nx,)``, ``z (nz,)``, ``w (nw,)``, ``p (np,)``; one output ``xd (nx,)``, ``y (ny,)``, ``r (nw,)``, ``J
+      (nw, nw)``, ``g (ng,)``. At a breakpoint, as at a tick, the signs of guards before and after the instant
+      are compared.
+    - ``update``: the additional input ``m (nclocks,)``; output ``z (nz,)``: the new z at an instant at which
+      the clocks with ``m[k] = 1`` tick. If ticks have several levels, a clock with ``m[k] = 2 + j`` ticks for
+      the outputs and discrete states of level ``j`` only. If ``captures`` is true, ``update`` is also
+      evaluated without a ticking clock just before every instant, at a time one unit in the last place
+      earlier: z then stores left limits.
+    - ``reset``: the additional input ``e (ng,)``, +1 or -1 where a guard fired upwards or downwards, else 0;
+      outputs ``x (nx,)`` and ``z (nz,)``. With all ``e`` zero it gives the consistent modes (for example of a
+      limiter that starts beyond its limit) and the resulting states. A run makes this call at the start,
+      before each level of ticks that follows events and after the ticks, and whenever no guard fires and a
+      mode is inconsistent.
+    - ``contradictions``: the inputs of ``guards``; output ``c (nm,)``, not 0 where the mode ``z[modes[k]]``
+      is not consistent with the present values.
+    - ``initial_states``, ``initial_discrete``, ``initial_algebraic``: input ``p``; output ``x0``, ``z0``,
+      ``w0``. At the start all clocks without an offset tick, before the first derivative.
+    - ``breakpoints``: input ``p``; output ``times (nb,)``: known times at which signals jump (a step source).
+
+    Signals are right-continuous: at a breakpoint, a tick or an event they have their new values.
     """
 
     name: str

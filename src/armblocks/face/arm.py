@@ -218,12 +218,12 @@ class Arm(NativeFunctions):
     ) -> IkineBranches:
         """Find all coordinates q (nq,) with ``fkine(q) = T`` in closed form, for one pose or for N.
 
-        The closed form exists for arms with six joints and a spherical wrist or three parallel axes, arms
-        with only parallel axes (SCARA, planar), palletisers, and arms with three to five joints of these
-        types. Every branch is checked by forward kinematics to ``tolerance`` (m and rad, of the tool). ``T``
-        and ``limits`` as for :meth:`ikine`; angles are shifted by full turns into the limits if possible,
-        else to the value nearest to zero. ``frame``: fixed to the link of the tool. Raises RobotError with
-        the reason for other arms.
+        The closed form exists for arms with six joints and a spherical wrist or three parallel axes, for arms
+        with only parallel axes (SCARA, planar), and for palletisers. It also exists for arms of these types
+        with three to five joints. Every branch is checked by forward kinematics to ``tolerance`` (m and rad,
+        of the tool). ``T`` and ``limits`` as for :meth:`ikine`; angles are shifted by full turns into the
+        limits if possible, else to the value nearest to zero. ``frame``: fixed to the link of the tool.
+        Raises RobotError with the reason for other arms.
         """
         return self._inverse.branches(T, limits, frame, tolerance, threads)
 

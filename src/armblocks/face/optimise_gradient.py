@@ -1,9 +1,10 @@
 """The nonlinear program of an optimisation with exact derivatives.
 
-Its unknowns are the coordinates ``u (n,)`` of the variables, and bounds of largest values: an extreme measure
-``m`` (peak, overshoot …) becomes an unknown ``s`` with ``value <= s`` for the largest value of each part of
-the run, and the worst scenario becomes an unknown ``worst`` with ``objective <= worst`` for each scenario.
-These functions are smooth, also where several largest values are equal, which is typical of a minimum.
+Its unknowns are the coordinates ``u (n,)`` of the variables, and bounds of largest values. A measure of a
+largest value (peak, overshoot …) becomes an unknown ``s``, with a constraint ``value <= s`` for the largest
+value of each part of the run. The worst scenario becomes an unknown ``worst``, with a constraint ``objective
+<= worst`` for each scenario. These functions are smooth, also where several largest values are equal, which
+is typical of a minimum.
 """
 
 from __future__ import annotations

@@ -93,9 +93,9 @@ def spline_trajectory(
 ) -> JointTrajectory:
     """A spline through ``points`` (K, n), at rest at both ends or with the end speeds ``qd0``, ``qd1`` (n,).
 
-    ``times`` (K,), ascending, in s: when each point is passed. Without them, the times between points are
-    proportional to the largest joint motion relative to its ``speed``, and the whole motion is scaled in time
-    so that some joint reaches its ``speed`` or ``acceleration`` limit (numbers or (n,)). ``kind``:
+    ``times`` (K,), ascending, in s: when each point is passed. Without ``times``, the time between two points
+    is proportional to the largest joint motion relative to its ``speed``. The whole motion is then scaled in
+    time so that one joint reaches its ``speed`` or ``acceleration`` limit (numbers or (n,)). ``kind``:
     ``"cubic"`` has continuous accelerations, ``"quintic"`` also continuous jerk and no acceleration at the
     ends. ``dt``: time between samples, s.
     """

@@ -48,11 +48,16 @@ class SweepSource:
 class SweepResult(metaclass=ArgumentErrors):
     """The table of a sweep, from :func:`armblocks.sweep`. ``result["name"]`` is a column, ``(runs,)``.
 
-    Columns: ``run`` (the number from 0), the varied parameters, ``status`` (``completed``, ``stopped`` by a
-    block, ``failed``, ``step limit``), ``message`` (for a run that was not completed), the measures (NaN for
-    runs that failed or reached the limit), ``steps``, ``events`` and ``end_time`` (s). ``kept`` names the
-    signals whose samples are kept: ``result[name]`` is ``(runs, N)`` at ``time (N,)`` s, NaN after the end of
-    a run.
+    Columns:
+
+    - ``run``: the number from 0; then the varied parameters.
+    - ``status``: ``completed``, ``stopped`` by a block, ``failed`` or ``step limit``.
+    - ``message``: the reason why a run was not completed.
+    - The measures; NaN for runs that failed or reached the step limit.
+    - ``steps``, ``events`` and ``end_time`` (s).
+
+    ``kept`` names the signals whose samples are kept: ``result[name]`` is ``(runs, N)`` at ``time (N,)`` s,
+    NaN after the end of a run.
 
     ``complete``: whether all runs were computed; Ctrl-C ends a sweep early. ``planned``: the number of runs
     of the design. ``remark``: the number of runs that the native loop did not compute, the reason for this,
@@ -215,14 +220,20 @@ class SweepResult(metaclass=ArgumentErrors):
     ) -> Picture:
         """A picture of the table. ``name``: a column, by default the first measure.
 
-        ``kind``: ``response`` (the column over each parameter, with median and bands of the percentiles 25 to
-        75 and 5 to 95), ``tornado`` (medians in the runs with the lowest and the highest tenth of each
-        parameter), ``scatter`` (matrix of the parameters and the column), ``parallel`` (parallel
-        coordinates; the tenth of the runs with the highest values in colour), ``map`` (the column over two
-        parameters, in colours; ``limit`` draws a line around the cells above it), or ``bands`` (the same
-        percentiles of a kept signal over time; ``name`` is by default the first one). ``parameters``: by
-        default those with the strongest rank correlation. ``save``: the ``.svg`` or ``.png`` file to write.
-        Raises ``UnknownNameError`` and ``InputError``.
+        ``kind``:
+
+        - ``response``: the column over each parameter, with the median and the bands of the percentiles 25
+          to 75 and 5 to 95.
+        - ``tornado``: medians in the runs with the lowest and the highest tenth of each parameter.
+        - ``scatter``: a matrix of the parameters and the column.
+        - ``parallel``: parallel coordinates; the tenth of the runs with the highest values is in colour.
+        - ``map``: the column over two parameters, in colours; ``limit`` draws a line around the cells above
+          it.
+        - ``bands``: the same percentiles of a kept signal over time; ``name`` is by default the first kept
+          signal.
+
+        ``parameters``: by default those with the strongest rank correlation. ``save``: the ``.svg`` or
+        ``.png`` file to write. Raises ``UnknownNameError`` and ``InputError``.
         """
         picture = sweep_picture(self, kind, name, parameters, limit)
         if save is not None:

@@ -38,7 +38,7 @@ def load_robot(
     are the values of the arguments of a xacro file. The robot's ``source`` is the shipped name or the path.
 
     Raises ``UnknownNameError`` for a name that is not shipped and for a ``name`` or ``tip`` that is not in
-    the file, ``FormatError`` for a file that is missing, has no known format or cannot be read. Issues
+    the file. Raises ``FormatError`` for a file that is missing, has no known format or cannot be read. Issues
     warnings for physically impossible inertias (``InertiaWarning``), for numbers with a probably wrong unit
     or sign and for parts of the file that are not read. For shipped robots, ``armblocks show`` prints them.
     """

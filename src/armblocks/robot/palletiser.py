@@ -100,9 +100,14 @@ def palletiser(
     ``shoulder_height``: of axis 2 above the floor. ``shoulder_offset``: of axis 2 from axis 1.
     ``wrist_offset``, ``flange_drop``: of the flange from the wrist, forward and down.
 
-    The angles of the axes are φ1 of the turret about the vertical, φ2 of the lower arm from the vertical,
-    positive forward, φ3 of the upper arm from the horizontal, positive down, and φ4 of the flange about its
-    axis, which points down. ``axes`` has zeros and signs of the published joint angles q. With
+    The angles of the axes are:
+
+    - φ1: turret about the vertical,
+    - φ2: lower arm from the vertical, positive forward,
+    - φ3: upper arm from the horizontal, positive down,
+    - φ4: flange about its axis, which points down.
+
+    ``axes`` has zeros and signs of the published joint angles q. With
     ``upper_arm_angle="absolute"`` q3 gives φ3; the motor of axis 3 is on the drive lever. With ``"relative"``
     q3 gives ``φ3 - φ2``, the angle between the arms, and the motor is on the elbow.
 

@@ -45,10 +45,14 @@ class Robot(metaclass=ArgumentErrors):
     Robots are values: two robots are equal and have the same hash if all their numbers and names are equal.
     ``source`` (the origin of the numbers) is not compared.
 
-    Raises RobotError that names robot, link and field for no or too many links, names that occur twice,
-    unknown or circular parents, numbers that are not finite, zero axes, reversed limits, a gear ratio of
-    zero, a negative mass, a D-H row that disagrees with the transforms, configurations of
-    another length. Warns if friction accelerates a joint. Physically impossible inertias are accepted,
+    Raises RobotError that names robot, link and field:
+
+    - for no or too many links, names that occur twice, unknown or circular parents,
+    - for numbers that are not finite, axes of length zero, reversed limits, a gear ratio of zero, a negative
+      mass,
+    - for a D-H row that disagrees with the transforms, and configurations of another length than q.
+
+    Warns if friction accelerates a joint. Physically impossible inertias are accepted,
     because some published models have them; :func:`armblocks.robot.inertia_findings` lists them.
     """
 

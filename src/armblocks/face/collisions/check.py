@@ -51,14 +51,14 @@ def collisions(
     Raises UnknownNameError for an unknown name in ``ignore``, InputError for motions of another robot.
     """
     where = f"{WHERE} of robot '{arm.name}'"
-    things = _named(obstacles, where)
+    named_obstacles = _named(obstacles, where)
     clearance = float(as_array(margin)) if as_array(margin).ndim == 0 else math.nan
     if not 0.0 <= clearance < math.inf:
         raise InputError(
             f"margin = {margin!r}", where=where, allowed="0 or more, in m", fix="give the clearance in m"
         )
     step = positive("resolution", resolution, "m", where)
-    scene = Scene.of(arm, things, ignore, where)
+    scene = Scene.of(arm, named_obstacles, ignore, where)
     if isinstance(motion, JointTrajectory):
         if motion.n != arm.n or arm.nq != arm.n:
             raise InputError(
@@ -115,14 +115,14 @@ def _result(
 
 def _named(obstacles: Sequence[Obstacle], where: str) -> dict[str, Obstacle]:
     """The obstacles by name; equal names get a number."""
-    things: dict[str, Obstacle] = {}
+    named_obstacles: dict[str, Obstacle] = {}
     for obstacle in obstacles:
         check_type(obstacle, (Box, Sphere, Cylinder, Plane), "a Box, Sphere, Cylinder or Plane", where=where)
         name, number = obstacle.name, 2
-        while name in things:
+        while name in named_obstacles:
             name, number = f"{obstacle.name} {number}", number + 1
-        things[name] = obstacle
-    return things
+        named_obstacles[name] = obstacle
+    return named_obstacles
 
 
 def _times(scene: Scene, path: JointTrajectory, step: float) -> Array:

@@ -1,10 +1,10 @@
 """MJCF text of a robot.
 
 A body has the frame of the link at the coordinate 0: its pose in the parent is ``before motion(offset)
-after``, and its joint is at the pose ``after`` inverse in the body. A link without mass, inertia and shapes
-that only carries the joint of the next link becomes an additional joint of that link's body, because MuJoCo
-does not accept moving bodies without mass. The pose of the base is included in the poses of the first bodies.
-The tool becomes the last body, so that ``fkine`` does not change.
+after``, and its joint is at the pose ``after`` inverse in the body. MuJoCo does not accept moving bodies
+without mass. A link without mass, inertia and shapes that only carries the joint of the next link therefore
+becomes an additional joint of the body of that link. The pose of the base is included in the poses of the
+first bodies. The tool becomes the last body, so that ``fkine`` does not change.
 """
 
 from __future__ import annotations

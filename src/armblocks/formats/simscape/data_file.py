@@ -4,10 +4,9 @@ They assign the numbers of the model's blocks to the fields of tables in a struc
 and joints. Nothing is evaluated: only assignments of literals to these fields are read.
 
 The names of the transforms contain the topology: ``B[a:-:b]`` is the pose of the joint between a and b in a,
-``F[a:-:b]`` its pose in b, ``AssemblyGround[s:a]`` the pose of the grounded
-part a in the subassembly s, and ``RootGround[a]`` that in the world; ``SixDofRigidTransform[a]`` is the pose
-of a part that moves freely. A table of joints such as ``RevoluteJoint`` has the names ``[a:-:b]`` of its
-joints; welds have no table.
+``F[a:-:b]`` its pose in b. ``AssemblyGround[s:a]`` is the pose of the grounded part a in the subassembly s,
+``RootGround[a]`` its pose in the world. ``SixDofRigidTransform[a]`` is the pose of a part that moves freely.
+A table of joints such as ``RevoluteJoint`` has the names ``[a:-:b]`` of its joints; welds have no table.
 
 Sources: MathWorks, *Simscape Multibody: smimport*, and the fields of published files.
 """

@@ -49,9 +49,9 @@ _TOLERANCE = 1e-6
 def read_assembly(data: bytes, file: str, context: FileContext) -> Assembly:
     """The assembly of a file. Findings are added to the context.
 
-    Raises ``FormatError`` with file and line for XML that cannot be read, for unknown instances, parts and
-    units, and for joints and mates that leave other degrees of freedom than one rotation or one
-    translation.
+    Raises ``FormatError`` with file and line for XML that cannot be read, and for unknown instances, parts
+    and units. Joints and mates that leave other degrees of freedom than one rotation or one translation raise
+    it, too.
     """
     root = read_elements(data, file)
     name = root.tag.rpartition(":")[2]

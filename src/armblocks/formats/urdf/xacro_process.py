@@ -1,8 +1,9 @@
 """Expansion of a xacro file in a separate process: ``python -m armblocks.formats.urdf.xacro_process``.
 
-xacro evaluates Python expressions of the file. Here each expression is checked first: it may contain numbers,
-strings, operators, comprehensions over lists, and calls of the functions that xacro documents, but no lambda
-functions, no names and attributes that begin with an underscore, and no attributes of frames and generators.
+xacro evaluates Python expressions of the file. Here each expression is checked first. It may contain numbers,
+strings, operators, comprehensions over lists, and calls of the functions that xacro documents. Lambda
+functions, names and attributes that begin with an underscore, and attributes of frames and generators are
+refused.
 The process has limits of memory and processor time, and the process that started it ends it after a time.
 
 Files are included from ``$(find package)``, ``package://`` and paths relative to the file, inside the root of

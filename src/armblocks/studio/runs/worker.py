@@ -1,10 +1,16 @@
 """The worker process of one run: started in advance, given one job, ended with the run.
 
-A job is JSON: ``diagram`` (a canonical document), ``folder`` (for files of the project), ``trusted`` (paths
-and digests of Python files whose code may run), ``run`` and ``document`` (keys), ``speed``
-(simulated seconds per second, ``null`` for as fast as possible), ``tuned`` (tried values of tunable
-parameters). Commands are the requests of :mod:`armblocks.studio.protocol.messages`;
-the worker executes them between two parts of the run.
+A job is JSON with these keys:
+
+- ``diagram``: a canonical document.
+- ``folder``: the folder of the project.
+- ``trusted``: paths and digests of Python files whose code may run.
+- ``run``, ``document``: keys.
+- ``speed``: simulated seconds per second; ``null`` for as fast as possible.
+- ``tuned``: tried values of tunable parameters.
+
+Commands are the requests of :mod:`armblocks.studio.protocol.messages`. The worker executes them between two
+parts of the run.
 """
 
 from __future__ import annotations

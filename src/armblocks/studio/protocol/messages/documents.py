@@ -110,9 +110,9 @@ class New(Request[str]):
 class Attach(Request[str]):
     """Show a document again: after a reload, after a lost connection, or in a second client.
 
-    A server that was restarted and does not have the document open recovers it from its journal, or else
-    opens the file ``path`` or the shipped ``origin``, under the same key, so that edits that the client sends
-    again are applied to this document. ``inside`` is the path of the displayed sheet of a diagram.
+    If the server does not have the document open after a restart, it recovers the document from its journal,
+    or opens the file ``path`` or the shipped ``origin``. The document keeps its key, so that edits that the
+    client sends again are applied to it. ``inside`` is the path of the displayed sheet of a diagram.
     """
 
     kind: Literal["attach"] = "attach"
