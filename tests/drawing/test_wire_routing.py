@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import combinations, pairwise
 
 import pytest
 from wire_reader import AmbiguousError, Block, Drawing, Port, read
@@ -13,6 +14,8 @@ from armblocks.drawing.wire_routing import Routing, route
 from armblocks.drawing.wires import Net, Obstacle, RoutedNet, WireEnd, drawn_path
 
 Path = tuple[tuple[float, float], ...]
+MIN_DISTANCE = 4.0
+"""Minimum distance of parallel segments of different nets, px."""
 SIDES = {"left": (-1, 0), "right": (1, 0), "top": (0, -1), "bottom": (0, 1)}
 
 
@@ -103,6 +106,21 @@ def drawing(model: SheetModel, routed: Mapping[str, RoutedNet]) -> Drawing:
 def check_connections(model: SheetModel, routed: Mapping[str, RoutedNet]) -> None:
     expected = {f"{b}/u{k}": f"{d}/y{j}" for (b, k), (d, j) in model.drivers.items()}
     assert read(drawing(model, routed)) == expected
+    check_distances(routed)
+
+
+def check_distances(routed: Mapping[str, RoutedNet]) -> None:
+    """Parallel segments of different nets are apart by more than the width of a line."""
+    segments = [
+        (key, int(a[0] != b[0]), *sorted((a, b)))
+        for key, net in routed.items()
+        for path in net.paths
+        for a, b in pairwise(path)
+    ]
+    for (one, axis, a, b), (other, other_axis, c, d) in combinations(segments, 2):
+        along = 1 - axis
+        if one != other and axis == other_axis and max(a[along], c[along]) <= min(b[along], d[along]):
+            assert abs(a[axis] - c[axis]) >= MIN_DISTANCE, (one, other, (a, b), (c, d))
 
 
 def random_model(draw: random.Random) -> SheetModel:
@@ -137,12 +155,28 @@ def random_model(draw: random.Random) -> SheetModel:
         for k in range(block.inputs)
         if outputs and draw.random() < 0.85
     }
-    bends = {
-        end: tuple(float(draw.randint(-50, 500)) for _ in range(draw.randint(1, 4)))
-        for end in drivers
-        if draw.random() < 0.15
+    model = SheetModel(blocks, drivers, {})
+    return replace(model, bends=random_bends(draw, model))
+
+
+def random_bends(draw: random.Random, model: SheetModel) -> dict[tuple[str, int], tuple[float, ...]]:
+    """Random user-drawn routes, on many sheets beside ports and beside each other."""
+    share, is_close = draw.choice([(0.15, False), (0.15, False), (0.6, True)])
+    ports = model.ports().values()
+    near = [float(draw.choice([port.x, port.y])) for port in draw.sample(list(ports), min(len(ports), 3))]
+
+    def bend() -> float:
+        if is_close and near and draw.random() < 0.7:
+            return draw.choice(near) + draw.randint(-6, 6)
+        value = float(draw.randint(-50, 500))
+        near.append(value)
+        return value
+
+    return {
+        end: tuple(bend() for _ in range(draw.randint(1, 4)))
+        for end in model.drivers
+        if draw.random() < share
     }
-    return SheetModel(blocks, drivers, bends)
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -223,6 +257,19 @@ def test_an_illegal_user_drawn_route_is_replaced(source: float, bend: float) -> 
     (path,) = routed_net.paths
     assert path != drawn_path(start, (bend,), end)
     assert path[0] == (start.x, start.y) and path[-1] == (end.x, end.y)
+
+
+def test_a_user_drawn_route_that_runs_beside_itself_or_its_net_is_replaced() -> None:
+    """The two lines would look like one thick line."""
+    source, target, other = WireEnd(61, 159, 1, 0), WireEnd(337, 42, 1, 0), WireEnd(337, 120, 1, 0)
+    (beside_itself,) = route([], [Net(source, (target,), ((245.0, 43.0, 45.0),))])
+    assert beside_itself.paths != (drawn_path(source, (245.0, 43.0, 45.0), target),)
+    step = (245.0, 43.0, 300.0)  # both horizontal segments lead to the right
+    assert route([], [Net(source, (target,), (step,))])[0].paths == (drawn_path(source, step, target),)
+    for bend, is_kept in ((245.0, True), (246.0, False), (248.0, False), (255.0, True)):
+        (net,) = route([], [Net(source, (target, other), ((245.0,), (bend,)))])
+        assert net.paths[0] == drawn_path(source, (245.0,), target)
+        assert (net.paths[1][-2][0] == bend) is is_kept
 
 
 # -- the reader ----------------------------------------------------------------------------------------------

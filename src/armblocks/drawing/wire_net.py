@@ -127,7 +127,7 @@ class NetRouter:
         source, level = self._net.source, LEVELS[-1]
         if not (_is_along(path[0], path[1], source) and _is_along(path[-2], path[-1], target)):
             return ()
-        if _touches_itself(path):
+        if _meets_itself(path, level.gap):
             return ()
         surroundings = self._space.around(extent, self._number)
         for k, (a, b) in enumerate(pairwise(path)):
@@ -139,7 +139,11 @@ class NetRouter:
             if not surroundings.is_legal((*a, *b), level, ends):
                 return ()
         path = self._after_tree(path)
-        if len(path) < 2 or (self._tree and not surroundings.may_bend(path[0], level)):
+        if len(path) < 2:
+            return ()
+        if self._tree and not (
+            surroundings.may_bend(path[0], level) and self._is_apart_from_tree(path, level.gap)
+        ):
             return ()
         self._add(path)
         return path
@@ -154,6 +158,15 @@ class NetRouter:
                 last = min(touched, key=lambda point: _distance(point, path[k + 1]))
                 return corners([last, *path[k + 1 :]])
         return path
+
+    def _is_apart_from_tree(self, path: Sequence[Point], gap: float) -> bool:
+        """Whether a path that starts on the tree has the distance ``gap`` to all other points of the tree."""
+        return all(
+            (k == 0 and path[0] in _contacts(segment, (path[0], path[0])))
+            or _separation((a, b), segment) >= gap
+            for k, (a, b) in enumerate(pairwise(path))
+            for segment in self._tree
+        )
 
     def _add(self, path: tuple[Point, ...]) -> None:
         if self._tree:
@@ -179,9 +192,33 @@ def _is_along(a: Point, b: Point, end: WireEnd) -> bool:
     return (b[0] - a[0]) * end.dx + (b[1] - a[1]) * end.dy >= LEVELS[-1].stub
 
 
-def _touches_itself(path: Sequence[Point]) -> bool:
+def _meets_itself(path: Sequence[Point], gap: float) -> bool:
+    """Whether segments of a path without a common corner are closer than ``gap``.
+
+    A short step between two segments in the same direction is legal: the line does not run back.
+    """
     segments = list(pairwise(path))
-    return any(_contacts(segments[i], segments[j]) for j in range(len(segments)) for i in range(j - 1))
+    return any(
+        _separation(segments[i], segments[j]) < gap
+        and not (j == i + 2 and _have_same_direction(segments[i], segments[j]))
+        for j in range(len(segments))
+        for i in range(j - 1)
+    )
+
+
+def _have_same_direction(one: tuple[Point, Point], other: tuple[Point, Point]) -> bool:
+    (ax, ay), (bx, by) = one
+    (cx, cy), (dx, dy) = other
+    return (bx - ax) * (dx - cx) + (by - ay) * (dy - cy) > 0
+
+
+def _separation(one: tuple[Point, Point], other: tuple[Point, Point]) -> float:
+    """The maximum norm of the distance of two segments, each horizontal or vertical."""
+    return max(
+        max(min(one[0][k], one[1][k]), min(other[0][k], other[1][k]))
+        - min(max(one[0][k], one[1][k]), max(other[0][k], other[1][k]))
+        for k in (0, 1)
+    )
 
 
 def _cut_loops(path: tuple[Point, ...]) -> tuple[Point, ...]:
