@@ -146,7 +146,7 @@ def test_a_loop_through_an_extrapolating_hold_is_solved_at_each_sample_time(run:
 
 
 def test_a_loop_through_an_extrapolating_hold_with_a_gain_above_1_is_refused() -> None:
-    with pytest.raises(ArmblocksError, match=r"is inf at 0\.25 s"):
+    with pytest.raises(ArmblocksError, match=r"break the loop through .hold. with"):
         native("rk45")(loop_through_a_hold(-2.0), 1.0)
 
 
