@@ -7,7 +7,7 @@ import {
 } from '@mantine/core'
 import { create } from 'zustand'
 
-/** The chosen theme, which the browser keeps. */
+/** The chosen theme, which the browser stores. */
 export const themeManager = localStorageColorSchemeManager({ key: 'armblocks-theme' })
 
 const useTheme = create<{ set: (scheme: MantineColorScheme) => void }>(() => ({ set: () => {} }))

@@ -7,7 +7,7 @@ const THEMES: [MantineColorScheme, string, typeof IconSun][] = [
   ['auto', 'System', IconDeviceDesktop],
 ]
 
-/** The choice of the theme, which the browser keeps. */
+/** The choice of the theme, which the browser stores. */
 export function ThemeSwitch() {
   const { colorScheme, setColorScheme } = useMantineColorScheme()
   const [, name, Icon] = THEMES.find(([theme]) => theme === colorScheme)!

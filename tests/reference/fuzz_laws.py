@@ -48,7 +48,7 @@ SLOW_NEIGHBOURS = 100.0
 
 
 class InconclusiveError(Exception):
-    """A case that cannot be judged, with the reason."""
+    """A case that cannot be checked, with the reason."""
 
 
 class Case:
@@ -73,7 +73,7 @@ class Case:
             for port in block.input_ports() if isinstance(block, DirectLookup) else ():
                 index = self.result[f"{name}/{port.name}"]
                 if (np.abs(index - np.rint(index)) < 1e-9)[index != np.rint(index)].any():
-                    raise InconclusiveError(f"rounding decides the entry that '{name}' reads")
+                    raise InconclusiveError(f"rounding determines the entry that '{name}' reads")
             if getattr(block, "external_reset", "none") in LEVELS and not block.sampled:
                 level = np.ravel(self.result[f"{name}/reset"])
                 if level[0] == 0.0 != level[1]:
@@ -187,7 +187,7 @@ def expect_well_posed(case: Case, run: Signals) -> None:
     If a signal stays at a switching value, or reaches it exactly at a tick, rounding errors decide the
     result. The neighbours are changed diagrams. In some of them, ``PERTURBATION`` with a random sign is added
     to the signals of all connections. In the others, it is added to one signal only, because changes of all
-    signals may cause events without end. Rounding also decides whether a signal that passes through 0 is
+    signals may cause events without end. Rounding also determines whether a signal that passes through 0 is
     exactly 0 at an instant. The first neighbour is therefore the unchanged diagram, in a run in which every
     such signal is 0 for a moment. A signal that touches a switching value may cross it for less than a step
     of the reference. Then the native run of a neighbour agrees with the reference.

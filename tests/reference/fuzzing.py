@@ -44,7 +44,7 @@ class Finding:
         return f"seed {self.seed}, law '{self.law}', stop_time {self.recipe.stop}\n{self.text}\n\n{script}"
 
 
-def judged(recipe: Recipe, laws: Sequence[str]) -> Found:
+def checked(recipe: Recipe, laws: Sequence[str]) -> Found:
     """Return contradictions by law. A refused diagram has none; every other exception is a finding."""
     try:
         return findings(recipe, laws)
@@ -56,14 +56,14 @@ def judged(recipe: Recipe, laws: Sequence[str]) -> Found:
         return {"error": [f"{error!r}\n{traceback.format_exc(limit=-4)}"]}
 
 
-class Judge:
+class CheckProcess:
     """A process that checks the laws, replaced if a diagram takes ``seconds`` of processor time."""
 
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds
         self.process: Any = None
 
-    def __enter__(self) -> Judge:
+    def __enter__(self) -> CheckProcess:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -75,11 +75,13 @@ class Judge:
             self.process.join()
             self.process = None
 
-    def judge(self, recipe: Recipe, laws: Sequence[str]) -> Found:
+    def check(self, recipe: Recipe, laws: Sequence[str]) -> Found:
         if self.process is None:
             context = multiprocessing.get_context("fork")
             self.parent_end, self.child_end = context.Pipe()
-            self.process = context.Process(target=_judging, args=(self.child_end, self.seconds), daemon=True)
+            self.process = context.Process(
+                target=_check_requests, args=(self.child_end, self.seconds), daemon=True
+            )
             self.process.start()
         self.parent_end.send((recipe, laws))
         self.child_end.close()  # only the process holds this end: if it dies, ``recv`` raises EOFError
@@ -94,12 +96,12 @@ class Judge:
         return {"crash": [f"the process died with exit code {code}"]}
 
 
-def _judging(pipe: Connection, seconds: float) -> None:
+def _check_requests(pipe: Connection, seconds: float) -> None:
     signal.signal(signal.SIGPROF, signal.SIG_DFL)  # the signal ends the process in any state
     while True:
         recipe, laws = pipe.recv()
         signal.setitimer(signal.ITIMER_PROF, seconds)
-        pipe.send(judged(recipe, laws))
+        pipe.send(checked(recipe, laws))
 
 
 NO_FINDING = ("inconclusive", "refused")
@@ -112,7 +114,7 @@ def kind_of(reason: str) -> str:
 
 
 def reduced(
-    judge: Callable[[Recipe, Sequence[str]], Found], recipe: Recipe, law: str, until: float
+    check: Callable[[Recipe, Sequence[str]], Found], recipe: Recipe, law: str, until: float
 ) -> tuple[Recipe, str]:
     """Return the smallest diagram found that still contradicts the law, and the text of the contradiction."""
     laws = [law] if law in LAWS else list(LAWS)[:1]
@@ -123,7 +125,7 @@ def reduced(
         for smaller in reductions(recipe):
             if time.monotonic() > until:
                 break
-            findings = judge(smaller, laws)
+            findings = check(smaller, laws)
             if law in findings:
                 recipe, text, progress = smaller, findings[law][0], True
                 break
@@ -139,10 +141,10 @@ def fuzz(
     reduce_for: float = 180.0,
 ) -> Iterator[Finding]:
     """Yield one finding per seed and contradicted law; ``counts`` collects the outcomes."""
-    with Judge(seconds) as judge:
+    with CheckProcess(seconds) as process:
         for seed in seeds:
             recipe = random_recipe(seed)
-            findings = judge.judge(recipe, laws)
+            findings = process.check(recipe, laws)
             counts["diagrams"] += 1
             counts["blocks"] += len(recipe.nodes)
             for law, texts in findings.items():
@@ -150,5 +152,5 @@ def fuzz(
                 if law in NO_FINDING:
                     counts[f"{law}: {kind_of(texts[0])}"] += 1
                 if law not in NO_FINDING:
-                    smaller, text = reduced(judge.judge, recipe, law, time.monotonic() + reduce_for)
+                    smaller, text = reduced(process.check, recipe, law, time.monotonic() + reduce_for)
                     yield Finding(seed, law, text or texts[0], smaller)

@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 from fuzz_laws import LAWS, InconclusiveError, findings
-from fuzzing import NO_FINDING, judged, reduced
+from fuzzing import NO_FINDING, checked, reduced
 from random_diagrams import Node, Recipe, random_recipe
 
 BASIC_LAWS = ("reference", "formulas", "equations")
@@ -22,10 +22,10 @@ def test_a_random_diagram_obeys_the_laws(number: int) -> None:
     """
     other_laws = (OTHER_LAWS[number % len(OTHER_LAWS)], OTHER_LAWS[(3 * number + 1) % len(OTHER_LAWS)])
     laws = (*BASIC_LAWS, *dict.fromkeys(other_laws))
-    judgements = (judged(random_recipe(seed), laws) for seed in range(10 * number, 10 * number + 10))
+    outcomes = (checked(random_recipe(seed), laws) for seed in range(10 * number, 10 * number + 10))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        contradictions = next(found for found in judgements if not found.keys() & set(NO_FINDING))
+        contradictions = next(found for found in outcomes if not found.keys() & set(NO_FINDING))
     assert contradictions == {}
 
 
@@ -40,8 +40,8 @@ def test_a_finding_is_reduced_to_the_necessary_block() -> None:
     recipe = next(
         recipe for recipe in map(random_recipe, range(100)) if contains_kind(recipe.nodes, "SineWave")
     )
-    judge = lambda smaller, laws: {"law": ["a sine"]} if contains_kind(smaller.nodes, "SineWave") else {}  # noqa: E731
-    smallest, text = reduced(judge, recipe, "law", until=np.inf)
+    check = lambda smaller, laws: {"law": ["a sine"]} if contains_kind(smaller.nodes, "SineWave") else {}  # noqa: E731
+    smallest, text = reduced(check, recipe, "law", until=np.inf)
     assert [node.kind for node in smallest.nodes] == ["SineWave"]
     assert text == "a sine"
 

@@ -25,7 +25,7 @@ def unit_points(design: str, count: int, dimensions: int, seed: int) -> Array:
     fill the cube evenly. ``latin``: a Latin hypercube, with one point in each of ``count`` slices of each
     coordinate. The points depend on the ``seed`` and on the versions of NumPy and SciPy.
 
-    Source: ``scipy.stats.qmc``. Raises ``UnknownNameError`` for another design.
+    Source: ``scipy.stats.qmc``. Raises ``UnknownNameError`` for an unknown design.
     """
     if design not in DESIGNS:
         raise UnknownNameError("design", design, DESIGNS, where="sweep")

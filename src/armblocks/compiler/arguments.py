@@ -58,7 +58,7 @@ def in_order(
 def read_input(name: str, slot: Slot, value: ArrayLike) -> Array:
     """``value`` as a float64 array of the slot's shape, or with a leading sample axis.
 
-    Strides are kept. Raises :class:`InputError` for another shape or dtype (complex, text, objects,
+    Strides are kept. Raises :class:`InputError` for a wrong shape or dtype (complex, text, objects,
     booleans).
     """
     try:

@@ -72,7 +72,7 @@ def load_code(key: Sequence[str], write: Callable[[], str], effort: Effort = Eff
 
     ``key`` identifies the module: the name of the variant, tape digests, options, everything that the text
     depends on. Target and versions are added here. If the disk cache contains the key, ``write`` is not
-    called. ``ARMBLOCKS_EFFORT=little`` limits the effort. Raises ``InputError`` for another value of this
+    called. ``ARMBLOCKS_EFFORT=little`` limits the effort. Raises ``InputError`` for any other value of this
     variable.
     """
     target, effort = host_target(), Effort(min(effort.value, allowed_effort().value))

@@ -29,7 +29,8 @@ def draw_diagram(
 ) -> Path:
     """Write a sheet as ``….svg``, ``….png`` or ``….pdf``, atomically; returns the path.
 
-    See :func:`drawing_bytes` for the arguments. Raises UnknownNameError for an unsupported suffix or sheet.
+    See :func:`drawing_bytes` for the arguments. Raises UnknownNameError for an unsupported suffix or an
+    unknown sheet.
     """
     target = Path(path)
     kind = target.suffix.removeprefix(".").lower()
@@ -51,7 +52,7 @@ def drawing_bytes(
     ``sheet``: the path of a subsystem, ``""`` is the top level. ``result``: the data that sinks show.
     ``rates``: clocks in colours, with a legend. ``theme`` ``None``: SVG follows the viewer's preference,
     other formats are light. Incomplete diagrams with unconnected inputs are drawn, too. Raises
-    UnknownNameError for another format or sheet.
+    UnknownNameError for an unsupported format or an unknown sheet.
     """
     if kind not in DRAWING_FORMATS:
         raise UnknownNameError("drawing format", kind, DRAWING_FORMATS)

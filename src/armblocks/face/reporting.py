@@ -27,7 +27,7 @@ def write_report(
 
     ``formats`` of the figures: svg, png. ``data``: csv, parquet, npz, mat. The default is svg and csv, also
     png if matplotlib is installed, and parquet if pyarrow is installed. The files of To File blocks are
-    written to the same folder. Returns the paths. Raises UnknownNameError for another format,
+    written to the same folder. Returns the paths. Raises UnknownNameError for an unsupported format,
     MissingLibraryError for a format whose library is not installed, DiagramError if two blocks write the same
     file, FormatError if the folder cannot be written.
     """

@@ -100,7 +100,7 @@ class Node:
         return tuple(element.number() for element in elements)
 
     def choice(self, choices: Iterable[str]) -> str:
-        """A text, which must be one of ``choices``."""
+        """A string, which must be one of ``choices``."""
         word, words = self.text(), list(choices)
         if word not in words:
             raise self.error(
@@ -119,7 +119,7 @@ def read_document(data: bytes, name: str, max_bytes: int, max_depth: int = MAX_D
 
     ``max_bytes`` and ``max_depth`` limit the size of the document and the nesting of objects and arrays.
 
-    Raises ``FormatError`` for a text that is not strict JSON or exceeds the limits.
+    Raises ``FormatError`` for data that are not strict JSON or exceeds the limits.
     """
     if len(data) > max_bytes:
         raise FormatError(

@@ -75,8 +75,8 @@ def motions(diagram: Diagram, result: SimulationResult) -> tuple[Motion, ...]:
 def moving_arms(diagram: Diagram, result: SimulationResult) -> tuple[MovingArm, ...]:
     """The arms of a diagram and their signals, which are the same for every run.
 
-    The motion of a simulated arm is one arm, also if other blocks with its ``q`` have a robot with other
-    masses or drives, for instance the model of a controller.
+    Blocks that read the ``q`` of a simulated arm are the same arm, also if their robots have other masses or
+    drives. An example is a controller with a model of the arm.
     """
     diagram = flat_diagram(diagram)
     groups: dict[tuple[Robot, str], list[str]] = {}

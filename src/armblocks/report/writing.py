@@ -52,9 +52,9 @@ def write_report(
 
     The folder is created if absent. ``formats`` of the figures: svg, png. ``data``: csv, parquet, npz, mat.
     The default is svg and csv, also png if matplotlib is installed, and parquet if pyarrow is installed. Each
-    file is written atomically, the page last. Raises UnknownNameError for another format, MissingLibraryError
-    for a format whose library is not installed, DiagramError if two blocks write the same file, and
-    FormatError if the folder cannot be written.
+    file is written atomically, the page last. Raises UnknownNameError for an unsupported format,
+    MissingLibraryError for a format whose library is not installed, DiagramError if two blocks write the same
+    file, and FormatError if the folder cannot be written.
     """
     formats = usable_figure_formats() if formats is None else formats
     data = usable_data_formats() if data is None else data

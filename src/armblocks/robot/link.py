@@ -130,7 +130,7 @@ class Link(metaclass=ArgumentErrors):
 def inertia_matrix(value: ArrayLike, *, link: str = "") -> Matrix3:
     """A (3, 3) array, or Ixx Iyy Izz, or Ixx Iyy Izz Ixy Iyz Ixz, as a symmetric matrix.
 
-    Raises RobotError that names ``link`` for another shape or an asymmetric matrix.
+    Raises RobotError that names ``link`` for a wrong shape or an asymmetric matrix.
     """
     where = f"inertia of link '{link}'" if link else "inertia"
     entries = numbers(value, where=where)

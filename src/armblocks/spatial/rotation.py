@@ -46,7 +46,7 @@ Ry(pitch) Rx(yaw), which releases 8 and 9 call ``zyx``.
 
 
 def vector3(value: ArrayLike, *, where: str = "") -> Vector3:
-    """Three numbers in any array shape of size 3 as a tuple; raises InputError for another count."""
+    """Three numbers in any array shape of size 3 as a tuple; raises InputError for a wrong count."""
     array = _numbers(value, where)
     if array.size != 3:
         raise InputError(
@@ -60,7 +60,7 @@ def vector3(value: ArrayLike, *, where: str = "") -> Vector3:
 
 
 def matrix3(value: ArrayLike, *, where: str = "") -> Matrix3:
-    """A (3, 3) array as three rows of floats; raises InputError for another shape."""
+    """A (3, 3) array as three rows of floats; raises InputError for a wrong shape."""
     array = _numbers(value, where)
     if array.shape != (3, 3):
         raise InputError(

@@ -37,7 +37,7 @@ def added(edit: AddBookmark, sheet: Diagram, _context: object) -> Diagram:
 
 
 def renamed(edit: RenameBookmark, sheet: Diagram, _context: object) -> Diagram:
-    """Return the sheet with another name of a bookmark."""
+    """Return the sheet with a renamed bookmark."""
     _check_exists(edit.name, sheet)
     part, name = sheet.bookmarks[edit.name], edit.to.strip()
     others = _without(edit.name, sheet)

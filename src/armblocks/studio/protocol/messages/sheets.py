@@ -31,7 +31,8 @@ class SheetPort(Message):
     dx: int
     dy: int
     frame: bool = False
-    """Whether it is a frame port, which is among the inputs and the outputs. Its lines have no direction."""
+    """Whether the port is a frame port. It is then among the inputs and the outputs, and its lines have no
+    direction."""
 
 
 class Outline(Message):
@@ -163,7 +164,7 @@ class WireKind(Message):
     shape: list[int]
     unit: str
     bus: bool = False
-    """Whether it is a bus."""
+    """Whether the signal is a bus."""
 
 
 class BlockType(Message):
