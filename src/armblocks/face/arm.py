@@ -188,22 +188,25 @@ class Arm(NativeFunctions):
     ) -> IkineResult:
         """Find coordinates q (nq,) with ``fkine(q) = T`` by iteration, for one pose or for N.
 
-        ``T``: the pose of the tool in the world, m: a :class:`Transform`, (4, 4), (N, 4, 4), a list of
-        Transforms, or an SE3 of spatialmath. ``q0`` (nq,) or (N, nq): the first start; angles of the solution
-        are shifted by full turns to the values nearest to ``q0``. Without ``q0`` and after a failure, the
-        search starts from ``restarts`` configurations of a random table, in the order of the distance of
-        their poses from the target. ``seed`` selects the table. The result of a pose is identical alone and
-        in any batch.
+        - ``T``: the pose of the tool in the world, m: a :class:`Transform`, (4, 4), (N, 4, 4), a list of
+          Transforms, or an SE3 of spatialmath.
+        - ``q0`` (nq,) or (N, nq): the first start; angles of the solution are shifted by full turns to the
+          values nearest to ``q0``.
+        - ``restarts``, ``seed``: without ``q0`` and after a failure, the search starts from ``restarts``
+          configurations of a random table, in the order of the distance of their poses from the target.
+          ``seed`` selects the table.
+        - ``mask``: six numbers; 0 for a direction in which the pose may differ: x, y, z, then rotations about
+          x, y, z, in the ``axes`` of the ``"tool"`` at the target, or of the ``"world"``. Without a mask, an
+          arm with fewer than six joints has solutions only for poses whose six components it reaches; for
+          other poses the result is the nearest pose.
+        - ``limits``: whether solutions satisfy the limits of the joints.
+        - ``frame``: as for ``fkine``.
+        - ``tolerance``: the largest error of a solution in m and in rad.
 
-        ``mask``: six numbers; 0 for a direction in which the pose may differ: x, y, z, then rotations about
-        x, y, z, in the ``axes`` of the ``"tool"`` at the target, or of the ``"world"``. Without a mask, an
-        arm with fewer than six joints has solutions only for poses whose six components it reaches; for other
-        poses the result is the nearest pose. ``limits``: whether solutions satisfy the limits of the joints.
-        ``frame``: as for ``fkine``. ``tolerance``: the largest error of a solution in m and in rad.
-
-        The result has the reason if there is no solution: :class:`IkineResult`. Method: damped least squares
-        with an active set of joint limits (Chan and Lawrence 1988; Sugihara, IEEE T-RO 27, 2011). For closed
-        loops, pose and constraints are solved together. Raises InputError for targets that are not poses.
+        The result of a pose is identical alone and in any batch. If there is no solution, the result states
+        the reason: :class:`IkineResult`. Method: damped least squares with an active set of joint limits
+        (Chan and Lawrence 1988; Sugihara, IEEE T-RO 27, 2011). For closed loops, pose and constraints are
+        solved together. Raises InputError for targets that are not poses.
         """
         return self._inverse.call(mask, limits, frame, axes, tolerance, restarts, seed)(T, q0, threads)
 

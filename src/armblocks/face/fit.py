@@ -47,17 +47,19 @@ def fit(
 ) -> FitResult:
     """Find the values of ``parameters`` with which the signals of a diagram are nearest to measured ones.
 
-    ``parameters``: the names of :func:`sensitivity`: ``"plant.mass"``, one entry ``"g.gain[1]"``, a parameter
-    of a mask; initial values of states are parameters as well. The search begins at the values of the
-    diagram, or at ``start``. ``data``: a dictionary ``{"t": times, "plant/y": values}``, a data frame or a
-    file with a column for each measured signal; an :class:`Experiment`, which has parameters of its own
-    such as its input; or a list of several experiments, which are fitted together. The times (s) need not be
-    equally spaced; NaN are missing values, and two rows with one time are both sides of a jump.
-
-    ``bounds``: lowest and highest values by name, by default the bounds of the block or mask. ``noise``:
-    known standard deviations of signals by name; otherwise each signal has unknown noise, which is estimated
-    and determines its weight. ``values``: other values of further parameters. ``progress(evaluations,
-    squares)`` is called after every evaluation. Ctrl-C ends the search with the best values so far.
+    - ``parameters``: the names of :func:`sensitivity`: ``"plant.mass"``, one entry ``"g.gain[1]"``, a
+      parameter of a mask; initial values of states are parameters as well. The search begins at the values of
+      the diagram, or at ``start``.
+    - ``data``: a dictionary ``{"t": times, "plant/y": values}``, a data frame or a file with a column for
+      each measured signal. The times (s) need not be equally spaced; NaN are missing values, and two rows
+      with one time are both sides of a jump. ``data`` may also be an :class:`Experiment`, which has its own
+      parameters such as its input, or a list of several experiments, which are fitted together.
+    - ``bounds``: lowest and highest values by name, by default the bounds of the block or mask.
+    - ``noise``: known standard deviations of signals by name; otherwise each signal has unknown noise, which
+      is estimated and determines its weight.
+    - ``values``: values of parameters that are not fitted.
+    - ``progress(evaluations, squares)`` is called after every evaluation. Ctrl-C ends the search with the
+      best values so far.
 
     Method: nonlinear least squares within bounds (SciPy's trust-region reflective method), with the exact
     derivatives of :func:`sensitivity`. Parameters without an exact derivative are differentiated by

@@ -54,28 +54,30 @@ def identify(
 ) -> IdentificationResult:
     """Estimate the parameters of an arm from logged motions and torques.
 
-    ``data``: a log, or a list of logs of several experiments. A log is a dictionary with ``t`` (N,) s, ``q``
-    (N, nq) rad or m, ``qd``, ``qdd`` (N, n) and ``tau`` (N, n) N m or N at the joints; the result of
-    ``arm.fdyn``; a data frame or a file (``.csv``, ``.npz``, ``.mat``, ``.parquet``) with the columns t, q1
-    …, qd1 …, qdd1 …, tau1 …. NaN are missing values; their rows are omitted. ``qd`` and ``qdd`` may be
-    missing: they are computed from equally spaced positions by a low-pass filter without phase shift and
-    central differences. ``cutoff`` (Hz) is the filter of the motion; by default complete logs are not
-    filtered, and for other logs the cut-off follows from the spectrum. ``decimate=k`` filters torques and
-    regressor alike and keeps every k-th sample, so that the noise of the kept samples is independent and
-    the standard errors are right.
-
     The estimates are *base parameters*: the combinations of the parameters that have an effect on the
-    torques. ``links``: only these links have unknown mass, centre and inertia (all links by default).
-    ``friction``: ``"asymmetric"`` estimates viscous friction B and Coulomb friction Tc+ and Tc- of each
-    joint, ``"coulomb"`` B and a symmetric Tc, ``"viscous"`` B; ``"none"`` keeps the friction of the
-    description. ``rotor_inertia``: whether the inertia of the rotors is estimated. ``payload``: a known body
-    at the tool during the measurement, a :class:`Payload` or kg. Samples of a joint that moves with less than
-    ``min_speed`` (rad/s or m/s) have no effect, because static friction is not in the model. If Coulomb
-    friction is estimated, samples at rest (speed 0) of a joint that also moves have no effect either.
+    torques. Springs and gravity are taken from the description. The torque of each joint has its own unknown
+    noise, from which the weights follow (iterated weighted least squares).
 
-    The torque of each joint has its own unknown noise, from which the weights follow (iterated weighted least
-    squares). ``robust``: Huber's weights, for torques with outliers. Springs and gravity are taken from the
-    description.
+    - ``data``: a log, or a list of logs of several experiments. A log is a dictionary with ``t`` (N,) s,
+      ``q`` (N, nq) rad or m, ``qd``, ``qdd`` (N, n) and ``tau`` (N, n) N m or N at the joints, or the result
+      of ``arm.fdyn``. It may also be a data frame or a file (``.csv``, ``.npz``, ``.mat``, ``.parquet``) with
+      the columns t, q1 …, qd1 …, qdd1 …, tau1 …. NaN are missing values; their rows are omitted. ``qd`` and
+      ``qdd`` may be missing: they are computed from equally spaced positions by a low-pass filter without
+      phase shift and central differences.
+    - ``cutoff`` (Hz): the filter of the motion. By default complete logs are not filtered, and for other logs
+      the cut-off follows from the spectrum.
+    - ``decimate=k`` filters torques and regressor alike and keeps every k-th sample, so that the noise of the
+      kept samples is independent and the standard errors are right.
+    - ``links``: only these links have unknown mass, centre and inertia (all links by default).
+    - ``friction``: ``"asymmetric"`` estimates viscous friction B and Coulomb friction Tc+ and Tc- of each
+      joint, ``"coulomb"`` B and a symmetric Tc, ``"viscous"`` B; ``"none"`` keeps the friction of the
+      description.
+    - ``rotor_inertia``: whether the inertia of the rotors is estimated.
+    - ``payload``: a known body at the tool during the measurement, a :class:`Payload` or kg.
+    - ``min_speed`` (rad/s or m/s): slower samples of a joint have no effect, because static friction is not
+      in the model. If Coulomb friction is estimated, samples at rest (speed 0) of a joint that also moves
+      have no effect either.
+    - ``robust``: Huber's weights, for torques with outliers.
 
     Raises InputError for unsuitable data, UnknownNameError for unknown links and columns, RobotError for
     robots with closed loops.

@@ -65,8 +65,8 @@ def least_time(
     parabolas at the inner points. A parabola replaces this fraction (0 to 0.5) of the shorter adjacent line.
     ``speed``, ``acceleration``, ``torque``: greatest magnitudes, numbers or (n,), in rad or m, s, N m or N.
     By default speeds and torques have the limits of the robot, and accelerations have none. ``payload``: a
-    :class:`Payload`, or a mass (kg) at the tool. ``grid``: least number of segments of the path; ``dt``: time
-    between samples, s.
+    :class:`Payload`, or a mass (kg) at the tool. ``grid``: minimum number of segments of the path; ``dt``:
+    time between samples, s.
 
     Torques are computed as by ``arm.rne``: rigid bodies, payload, rotor inertia, gravity, viscous and Coulomb
     friction of the motion. Source: Pham and Pham, A new approach to time-optimal path parameterization based

@@ -79,18 +79,19 @@ def linearize(
 ) -> LinearSystem | tuple[LinearSystem, ...]:
     """The exact linear system of a diagram about an operating point, by differentiating its equations.
 
-    ``inputs``: perturbed signals. ``"step"`` or ``"step/y"`` adds a perturbation to that output,
-    ``"plant/u"`` to that input only; ``"const.value"`` perturbs a tunable parameter, also of a mask.
-    ``outputs``: signal names as in a result. The value of an output port excludes a perturbation that is
-    added at this port; the value of an input port includes it. ``open``: loop openings. The signal after an
-    opening is constant at its value at the operating point, plus the perturbation of an input at the same
-    port. With ``inputs="e", outputs="e", open="e"`` the result is the loop transfer function, signs included.
-
-    ``at``: a time of a run (0: the start), several times (one system each), the final state of a run
-    (``result.final_state``) or the operating point of ``trim``. ``delay_order``: number of states of the Padé
-    approximation of each dead time; required if there is dead time. (:func:`frequency_response` is exact.)
-    ``parameters``: other values of parameters. ``settings``: settings of the run up to ``at``, as in
-    :func:`simulate`.
+    - ``inputs``: perturbed signals. ``"step"`` or ``"step/y"`` adds a perturbation to that output,
+      ``"plant/u"`` to that input only; ``"const.value"`` perturbs a tunable parameter, also of a mask.
+    - ``outputs``: signal names as in a result. The value of an output port excludes a perturbation that is
+      added at this port; the value of an input port includes it.
+    - ``open``: loop openings. The signal after an opening is constant at its value at the operating point,
+      plus the perturbation of an input at the same port. With ``inputs="e", outputs="e", open="e"`` the
+      result is the loop transfer function, signs included.
+    - ``at``: a time of a run (0: the start), several times (one system each), the final state of a run
+      (``result.final_state``) or the operating point of ``trim``.
+    - ``delay_order``: number of states of the Padé approximation of each dead time; required if there is dead
+      time. (:func:`frequency_response` is exact.)
+    - ``parameters``: other values of parameters.
+    - ``settings``: settings of the run up to ``at``, as in :func:`simulate`.
 
     Modes (a limiter at its limit) are constant. A diagram with sample times gives a discrete system with the
     common period of all clocks and a zero-order hold at the inputs. The time t in equations is constant.

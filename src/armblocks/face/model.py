@@ -174,16 +174,18 @@ def simulate(
 ) -> SimulationResult:
     """Run a diagram and return its recorded signals.
 
-    ``diagram``: an object, a shipped example's name or a path. ``stop_time``, ``solver``, ``step``,
-    ``sample_time``, ``max_step``, ``rtol`` and ``atol`` override the settings of the diagram, see
-    :class:`SimulationOptions`. ``parameters`` changes parameters of blocks, ``{"jtraj.tmax": 5.0}``; tunable
-    parameters need no new compilation. ``progress(time, fraction, real_time_factor)`` is called repeatedly
-    during a long run. ``initial_state``: another run's ``final_state``, or the file that its ``save`` wrote;
-    the run continues from there to ``stop_time``. Without other changes the result equals the result of one
-    longer run exactly. An operating point, such as the result of ``trim``, is also valid: the run begins at
-    its time. ``log``: a ``.parquet`` or ``.csv`` file to which all signals, or the ``log_signals``, are
-    written during the run. Memory use is then independent of the duration, and the result holds a subset of
-    rows with all extremes.
+    - ``diagram``: an object, a shipped example's name or a path.
+    - ``stop_time``, ``solver``, ``step``, ``sample_time``, ``max_step``, ``rtol`` and ``atol`` override the
+      settings of the diagram, see :class:`SimulationOptions`.
+    - ``parameters`` changes parameters of blocks, ``{"jtraj.tmax": 5.0}``; tunable parameters need no new
+      compilation.
+    - ``progress(time, fraction, real_time_factor)`` is called repeatedly during a long run.
+    - ``initial_state``: another run's ``final_state``, or the file that its ``save`` wrote. The run continues
+      from there to ``stop_time``. Without other changes the result equals the result of one longer run
+      exactly. An operating point, such as the result of ``trim``, is also valid: the run begins at its time.
+    - ``log``: a ``.parquet`` or ``.csv`` file to which all signals, or the ``log_signals``, are written
+      during the run. Memory use is then independent of the duration, and the result holds a subset of rows
+      with all extremes.
 
     Raises ``InputError`` for a setting out of range, ``UnknownNameError`` for an unknown argument,
     ``SimulationError`` (with the ``partial`` result) if the run fails.

@@ -56,31 +56,31 @@ def optimise(
     progress: Progress | None = None,
     **settings: Unpack[RunSettings],
 ) -> OptimisationResult:
-    """Find the values of ``variables`` with the least ``objective`` among those that satisfy
-    ``constraints``.
+    """Find the values of ``variables`` that minimise ``objective`` and satisfy ``constraints``.
 
-    ``variables``: ``{"pid.P": (0.1, 10)}`` with bounds, or a list of names with the bounds of their blocks.
-    Variables are tunable parameters, one entry ``"g.gain[1]"``, start values, and parameters of masks.
-    ``ab.loguniform(low, high)`` instead of bounds selects a logarithmic scale. The search begins at the
-    values of the diagram, or at ``start``.
-
-    ``objective``: a formula of measures, ``"itae({ref/y} - {plant/y}) + 0.1 * rms(pid/y)"``. The measures are
-    those of :func:`sweep`. Variables in braces are numbers, ``"{pid.P}^2"``. ``constraints``: a text
-    ``"overshoot(plant/y, final=1) <= 5"``, ``"0.2 <= {pid.P}/{pid.I}"``, or a list of texts. A Python
-    function of the result is an objective, too; as a constraint it is ``(function, low, high)``.
-
-    ``over``: a design of uncertain parameters, as ``vary`` of :func:`sweep`, with ``runs``, ``design`` and
-    ``seed``. The objective is then the ``statistic`` over these scenarios: ``"mean"``, ``"worst"``, or the
-    quantile of a probability, ``0.9``. The constraints hold in the ``share`` of the scenarios, by default in
-    all.
-
-    ``method``: ``gradient`` is the interior-point method Ipopt with the exact derivatives of
-    :func:`sensitivity`, from ``starts`` different points; the others are the best of a sweep over the bounds.
-    ``search`` needs no derivatives: differential evolution over the bounds, then COBYQA. ``auto`` uses
-    ``gradient`` if all derivatives exist; the result has the reason. ``evaluations``: the largest number of
-    evaluated points. ``allow_stops``: whether runs that a block ends count with their measures until then;
-    otherwise they count as failed. ``parameters``: values of other parameters. ``progress(evaluations,
-    objective)`` is called after each step. Ctrl-C ends the search with the best values so far.
+    - ``variables``: ``{"pid.P": (0.1, 10)}`` with bounds, or a list of names with the bounds of their blocks.
+      Variables are tunable parameters, one entry ``"g.gain[1]"``, start values, and parameters of masks.
+      ``ab.loguniform(low, high)`` instead of bounds selects a logarithmic scale. The search begins at the
+      values of the diagram, or at ``start``.
+    - ``objective``: a formula of measures, ``"itae({ref/y} - {plant/y}) + 0.1 * rms(pid/y)"``, or a Python
+      function of the result. The measures are those of :func:`sweep`. Variables in braces are numbers,
+      ``"{pid.P}^2"``.
+    - ``constraints``: a string ``"overshoot(plant/y, final=1) <= 5"``, ``"0.2 <= {pid.P}/{pid.I}"``, a tuple
+      ``(function, low, high)`` with a Python function of the result, or a list of these.
+    - ``over``: a design of uncertain parameters, as ``vary`` of :func:`sweep`, with ``runs``, ``design`` and
+      ``seed``. The objective is then the ``statistic`` over these scenarios: ``"mean"``, ``"worst"``, or the
+      quantile of a probability, ``0.9``. The constraints hold in the ``share`` of the scenarios, by default
+      in all.
+    - ``method``: ``gradient`` is the interior-point method Ipopt with the exact derivatives of
+      :func:`sensitivity`. It begins at ``starts`` points; all but the first are the best points of a sweep
+      over the bounds. ``search`` needs no derivatives: differential evolution over the bounds, then COBYQA.
+      ``auto`` uses ``gradient`` if all derivatives exist; the result states the reason.
+    - ``evaluations``: the largest number of evaluated points.
+    - ``allow_stops``: whether runs that a block ends count with their measures until then; otherwise they
+      count as failed.
+    - ``parameters``: values of other parameters.
+    - ``progress(evaluations, objective)`` is called after each step. Ctrl-C ends the search with the best
+      values so far.
 
     Raises ``UnknownNameError`` and ``InputError`` for invalid arguments, also where ``gradient`` is not
     possible; ``SimulationError`` if no run has a value; ``MissingLibraryError`` without the extra

@@ -74,23 +74,23 @@ def sweep(
     arrays are ``block.parameter[k]``. Parameters that are constants of the equations, such as robots and
     sample times, are compiled for each combination.
 
-    ``measures``: each name with a :class:`Measure`, the text of one, such as ``"overshoot(motor/speed,
-    final=1)"``, or a Python function of the result that returns a number. ``keep``: signals whose samples are
-    kept in memory or in the file. ``parameters``: parameter values for all runs. ``max_steps``: the maximum
-    number of steps of a run. ``threads``: by default the number of cores. ``lanes``: whether each thread
-    computes several runs at a time in the lanes of vector registers, if the model and the solver allow it
-    (otherwise ``remark`` has the reason); by default for 500 runs or more. ``scheduler``: the address of a
-    Dask scheduler, or a client of ``dask.distributed``, whose workers compute the runs. ``settings``: as
-    for :func:`simulate`.
-
-    ``out``: a ``.parquet`` or ``.csv`` file. The results are written during the sweep, so that the memory
-    does not grow with the number of runs. If the sweep is interrupted, another call with the same arguments
-    continues it. ``progress(done, runs, rate, remaining)`` is called about ten times a second. After Ctrl-C
-    the function returns the completed runs.
+    - ``measures``: a mapping of names to measures. A measure is a :class:`Measure`, a string such as
+      ``"overshoot(motor/speed, final=1)"``, or a Python function of the result that returns a number.
+    - ``keep``: signals whose samples are kept in memory or in the file.
+    - ``parameters``: parameter values for all runs. ``settings``: as for :func:`simulate`.
+    - ``max_steps``: the maximum number of steps of a run. ``threads``: by default the number of cores.
+    - ``lanes``: whether each thread computes several runs at a time in the lanes of vector registers, by
+      default for 500 runs or more. ``remark`` states the reason if this is not possible.
+    - ``scheduler``: the address of a Dask scheduler, or a client of ``dask.distributed``, whose workers
+      compute the runs.
+    - ``out``: a ``.parquet`` or ``.csv`` file, which is written during the sweep, so that the memory does not
+      grow with the number of runs. Another call with the same arguments continues an interrupted sweep.
+    - ``progress(done, runs, rate, remaining)`` is called about ten times a second. After Ctrl-C the function
+      returns the completed runs.
 
     Each run is bit-identical to :func:`simulate`, for any number of threads. A failed run is a row with its
     message. Raises ``UnknownNameError``, ``DiagramError`` and ``InputError`` for invalid arguments, also if
-    ``out`` has the results of another sweep.
+    ``out`` contains the results of another sweep.
     """
     check_settings(settings, sweep)
     model = diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)

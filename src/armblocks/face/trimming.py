@@ -42,13 +42,16 @@ def trim(
 ) -> TrimResult:
     """Find an equilibrium operating point of a diagram.
 
-    The unknowns are all states except the states with given values in ``states``. The derivatives of all
-    states except the ``moving`` states must be zero. ``free``: tunable parameters that are also unknowns,
-    ``"torque.value"`` (or ``"torque"`` for a block with one tunable parameter), or an entry,
-    ``"map.table[3]"``. ``outputs``: required values of signals; NaN leaves an entry free. ``bounds``:
-    ``(lower, upper)`` of states and free parameters. The search starts at the state of the run at time ``at``
-    (0: its start), with the values of ``guess``; time-dependent signals have their values at that time. A
-    state is named ``block/state``, or by its block if the block has one state only.
+    A state is named ``block/state``, or by its block if the block has one state only.
+
+    - ``states``: given values of states; all other states are unknowns.
+    - ``moving``: states whose derivatives need not be zero.
+    - ``free``: tunable parameters that are also unknowns, ``"torque.value"`` (or ``"torque"`` for a block
+      with one tunable parameter), or an entry, ``"map.table[3]"``.
+    - ``outputs``: required values of signals; NaN leaves an entry free.
+    - ``bounds``: ``(lower, upper)`` of states and free parameters.
+    - ``at``, ``guess``: the search starts at the state of the run at time ``at`` (0: its start), with the
+      values of ``guess``. Time-dependent signals have their values at that time.
 
     Sampled blocks are in equilibrium if a tick changes no state. The residual of every equation is below
     ``tolerance`` in the unit of the equation, or below the rounding errors of its terms if these are larger.

@@ -22,9 +22,11 @@ ZERO3: Matrix3 = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 class Motor(metaclass=ArgumentErrors):
     """A motor and its gear, all numbers at the motor's side of the gear.
 
-    ``inertia`` Jm of the rotor, kg m2; ``gear_ratio`` G, motor turns per joint turn (motor rad per m of a
-    prismatic joint), negative if motor and joint turn in opposite directions; ``viscous_friction`` B, N m
-    s/rad; ``coulomb_friction`` (Tc+, Tc-), N m, Tc- negative. A single number t means (t, -t).
+    - ``inertia``: Jm, inertia of the rotor, kg m2.
+    - ``gear_ratio``: G, motor turns per joint turn (motor rad per m of a prismatic joint); negative if motor
+      and joint turn in opposite directions.
+    - ``viscous_friction``: B, N m s/rad.
+    - ``coulomb_friction``: (Tc+, Tc-), N m, Tc- negative. A single number t means (t, -t).
     """
 
     inertia: float = 0.0
@@ -56,16 +58,18 @@ class Motor(metaclass=ArgumentErrors):
 class Link(metaclass=ArgumentErrors):
     """A rigid body, and the joint that connects it to ``parent``.
 
-    ``parent`` is the name of a link; ``None`` is the robot's base. Pose in the parent's frame:
-    ``T_parent_link = before joint.motion(q) after``. ``dh`` is the Denavit-Hartenberg row from which
-    ``before``, ``joint`` and ``after`` were computed, if there is one, and must agree with them
-    (:func:`armblocks.robot.dh.standard_dh` builds all four).
-
-    ``mass`` kg; ``centre_of_mass`` m in the link's frame; ``inertia`` kg m2 about the centre of mass in the
-    link's axes: a (3, 3) array, or Ixx Iyy Izz, or Ixx Iyy Izz Ixy Iyz Ixz. These are the matrix entries, so
-    Ixy is minus the integral of x y dm. ``motor`` drives the link's joint; a joint with several degrees of
-    freedom has such a motor for each of them. ``geometry`` are the shapes of the drawing; ``None``: they are
-    derived from the kinematics.
+    - ``parent``: the name of a link; ``None`` is the robot's base.
+    - ``before``, ``joint``, ``after``: the pose in the parent's frame is ``T_parent_link = before
+      joint.motion(q) after``.
+    - ``dh``: the Denavit-Hartenberg row from which ``before``, ``joint`` and ``after`` were computed, if
+      there is one. It must agree with them; :func:`armblocks.robot.dh.standard_dh` builds all four.
+    - ``mass``: kg.
+    - ``centre_of_mass``: (3,) m, in the link's frame.
+    - ``inertia``: kg m2, about the centre of mass in the link's axes: a (3, 3) array, or Ixx Iyy Izz, or Ixx
+      Iyy Izz Ixy Iyz Ixz. These are the matrix entries, so Ixy is minus the integral of x y dm.
+    - ``motor``: drives the link's joint; a joint with several degrees of freedom has such a motor for each of
+      them.
+    - ``geometry``: the shapes of the drawing; ``None``: they are derived from the kinematics.
 
     Raises RobotError for wrong shapes. :class:`armblocks.robot.Robot` checks the values, because its messages
     name the robot and the link.

@@ -32,15 +32,21 @@ STANDARD_GRAVITY: Vector3 = (0.0, 0.0, -9.81)
 class Robot(metaclass=ArgumentErrors):
     """Links that form a chain or a tree on one base.
 
-    ``base`` pose of the base frame in the world; ``tool`` pose of the tool in the frame of the tip, which is
-    the last link; both accept a (4, 4) matrix. ``gravity`` m/s2 in the world frame, the acceleration
-    of a falling body (toolbox files have the opposite sign); ``friction_model`` see :class:`FrictionModel`.
-    ``constraints``: equations in addition to the joints of the tree, such as the closures of loops and the
-    couplings of joints. ``frames``: named frames on the links, such as end effectors; each link's own frame
-    has the name of the link. ``springs``: at joints and between two points. The joint coordinates q (nq,) and
-    speeds qd (nv,) are in the order of the moving links. A joint has the name of its link.
-    ``configurations``: named coordinates, rad or m; also a mapping such as ``{"ready": (0.0, 1.5)}``. In a
-    copy with other links (``dataclasses.replace``), each joint keeps its coordinates by name.
+    The joint coordinates q (nq,) and speeds qd (nv,) are in the order of the moving links. A joint has the
+    name of its link.
+
+    - ``base``: pose of the base frame in the world. ``tool``: pose of the tool in the frame of the tip, which
+      is the last link. Both accept a (4, 4) matrix.
+    - ``gravity``: m/s2 in the world frame, the acceleration of a falling body (toolbox files have the
+      opposite sign).
+    - ``friction_model``: see :class:`FrictionModel`.
+    - ``constraints``: equations in addition to the joints of the tree, such as the closures of loops and the
+      couplings of joints.
+    - ``frames``: named frames on the links, such as end effectors; each link's own frame has the name of the
+      link.
+    - ``springs``: at joints and between two points.
+    - ``configurations``: named coordinates, rad or m; also a mapping such as ``{"ready": (0.0, 1.5)}``. In a
+      copy with other links (``dataclasses.replace``), each joint keeps its coordinates by name.
 
     Robots are values: two robots are equal and have the same hash if all their numbers and names are equal.
     ``source`` (the origin of the numbers) is not compared.

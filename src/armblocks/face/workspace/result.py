@@ -15,12 +15,15 @@ from armblocks.pictures.style import Theme
 class Workspace(WorkspaceCells):
     """The reachable region of a frame of an arm. ``print`` shows a summary.
 
-    ``samples``: number of configurations; ``accepted``: those within the limits of joints that couplings
-    determine. ``cell`` (m): side of the cubic cells; ``corner`` (3,) m: the centre of the first cell, in the
-    world; ``counts`` (nx, ny, nz): samples in each cell; ``maps``: the measures by name. ``low``, ``high``
-    (3,) m: the exact bounds of the sampled positions; ``reach`` (m): their largest distance from the origin
-    of the ``base`` (3,). ``points`` (P, 3) m, ``q`` (P, nq) and ``values`` (P,) of each measure: the first P
-    samples. ``axes``: the rows of the Jacobian of the measures. ``notes``: assumed ranges and missing limits.
+    - ``samples``: number of configurations. ``accepted``: number of configurations within the limits of
+      joints that couplings determine.
+    - ``cell`` (m): side of the cubic cells. ``corner`` (3,) m: the centre of the first cell, in the world.
+      ``counts`` (nx, ny, nz): samples in each cell.
+    - ``maps``: the measures by name. ``axes``: the rows of the Jacobian of the measures.
+    - ``low``, ``high`` (3,) m: the exact bounds of the sampled positions. ``reach`` (m): their largest
+      distance from the origin of the ``base`` (3,).
+    - ``points`` (P, 3) m, ``q`` (P, nq) and ``values`` (P,) of each measure: the first P samples.
+    - ``notes``: assumed ranges and missing limits.
 
     A cell without samples may still be reachable in a thin part of the region: use more samples, or larger
     cells.
