@@ -73,7 +73,7 @@ def test_nan_is_parsed_and_left_to_the_check_of_the_parameter() -> None:
 @pytest.mark.parametrize("text", ["__import__('os')", "٣", "2pi", "", "{}", "a b", "2*k", "u.v*2"])
 def test_text_outside_the_grammar_is_refused(text: str) -> None:
     with pytest.raises(
-        InputError, match=r"--set: .*Allowed: a number, a vector.*correct it, or put quotes around a text"
+        InputError, match=r"--set: .*Allowed: a number, a vector.*correct it, or put quotes around a string"
     ):
         parse_value(text)
 
