@@ -133,7 +133,9 @@ from armblocks.blocks.mechanics.bushing_joint import BushingJoint as BushingJoin
 from armblocks.blocks.mechanics.cartesian_joint import CartesianJoint as CartesianJoint
 from armblocks.blocks.mechanics.cylindrical_joint import CylindricalJoint as CylindricalJoint
 from armblocks.blocks.mechanics.cylindrical_solid import CylindricalSolid as CylindricalSolid
+from armblocks.blocks.mechanics.ellipsoidal_solid import EllipsoidalSolid as EllipsoidalSolid
 from armblocks.blocks.mechanics.external_force_and_torque import ExternalForceAndTorque as ExternalForceAndTorque
+from armblocks.blocks.mechanics.extruded_solid import ExtrudedSolid as ExtrudedSolid
 from armblocks.blocks.mechanics.forces_along_a_line import InternalForce as InternalForce
 from armblocks.blocks.mechanics.forces_along_a_line import SpringAndDamperForce as SpringAndDamperForce
 from armblocks.blocks.mechanics.frames import MechanismConfiguration as MechanismConfiguration
@@ -147,6 +149,7 @@ from armblocks.blocks.mechanics.planar_joint import PlanarJoint as PlanarJoint
 from armblocks.blocks.mechanics.prismatic_joint import PrismaticJoint as PrismaticJoint
 from armblocks.blocks.mechanics.rectangular_joint import RectangularJoint as RectangularJoint
 from armblocks.blocks.mechanics.revolute_joint import RevoluteJoint as RevoluteJoint
+from armblocks.blocks.mechanics.revolved_solid import RevolvedSolid as RevolvedSolid
 from armblocks.blocks.mechanics.six_dof_joint import SixDofJoint as SixDofJoint
 from armblocks.blocks.mechanics.spherical_joint import SphericalJoint as SphericalJoint
 from armblocks.blocks.mechanics.spherical_solid import SphericalSolid as SphericalSolid

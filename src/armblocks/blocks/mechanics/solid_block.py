@@ -25,10 +25,11 @@ COLOURS = {
 
 @dataclass(frozen=True, kw_only=True)
 class SolidBlock(Block):
-    """Base class of solids with the frame R at their centre, in the axes of the shape.
+    """Base class of solids. Frame R has the axes of the shape and is at its centre, or where a subclass says.
 
-    The mass is given, or the volume times the density. A subclass gives the volume, the principal moments of
-    inertia for unit mass, and the shape for drawings.
+    The mass is given, or the volume times the density. A subclass gives the volume, the moments of inertia
+    for unit mass, and the shape for drawings; for a shape without symmetry also the centre of mass and the
+    products of inertia.
     """
 
     virtual: ClassVar[bool] = True
@@ -60,7 +61,15 @@ class SolidBlock(Block):
 
     @abstractmethod
     def unit_inertia(self) -> Vector3:
-        """The principal moments of inertia about the centre for a mass of 1 kg, m2."""
+        """The moments of inertia xx, yy, zz about the centre of mass for a mass of 1 kg, m2."""
+
+    def unit_products(self) -> Vector3:
+        """The products of inertia yz, zx, xy about the centre of mass for a mass of 1 kg, m2."""
+        return 0.0, 0.0, 0.0
+
+    def centre(self) -> Vector3:
+        """The centre of mass in frame R, m."""
+        return 0.0, 0.0, 0.0
 
     @abstractmethod
     def shape(self) -> Shape:
@@ -69,8 +78,9 @@ class SolidBlock(Block):
     def part(self) -> BodyPart:
         mass = self.density * self.volume() if self.mass_from == "density" else self.mass
         xx, yy, zz = (mass * moment for moment in self.unit_inertia())
-        inertia = ((xx, 0.0, 0.0), (0.0, yy, 0.0), (0.0, 0.0, zz))
-        return BodyPart(mass=mass, inertia=inertia, shapes=(self.shape(),))
+        yz, zx, xy = (mass * product for product in self.unit_products())
+        inertia = ((xx, xy, zx), (xy, yy, yz), (zx, yz, zz))
+        return BodyPart(mass=mass, centre=self.centre(), inertia=inertia, shapes=(self.shape(),))
 
     def inertia(self, p: Signals) -> RigidInertia:
         """The inertia in frame R for the density or mass of the run."""
