@@ -10,7 +10,16 @@ import pytest
 from numpy.testing import assert_allclose
 
 import armblocks as ab
-from armblocks.blocks import CompareToConstant, Gain, Integrator, Product, Step, StopSimulation, Sum
+from armblocks.blocks import (
+    CompareToConstant,
+    Gain,
+    Integrator,
+    Product,
+    Saturation,
+    Step,
+    StopSimulation,
+    Sum,
+)
 from armblocks.errors import InputError, SimulationError, UnknownNameError
 
 SETTINGS = {"stop_time": 1.0, "sample_time": 0.005, "rtol": 1e-9, "atol": 1e-11}
@@ -169,6 +178,24 @@ def test_python_functions_integers_and_stopped_runs_use_the_search() -> None:
     assert stopped["u.final"] == pytest.approx(5.0) and "a block ends" in stopped.reason
     never = ab.optimise(diagram, {"u.final": (0.1, 0.5)}, "-final(x)", **SETTINGS)
     assert never["u.final"] == pytest.approx(0.5) and never.method == "gradient"
+
+
+def test_a_feasible_problem_is_not_called_infeasible_from_a_start_without_descent() -> None:
+    """The peak of a saturated signal has no derivative: the gradient at the start shows no way out."""
+    builder = ab.DiagramBuilder("saturated")
+    k = builder.add("k", Gain(gain=4.0), builder.add("u", Step(time=0.0, final=1.0)))
+    builder.add("x", Integrator(initial=0.0), builder.add("s", Saturation(lower=-1.0, upper=1.0), k))
+    diagram, limit = builder.build(), "peak(s) <= 0.6"
+    found = ab.optimise(diagram, {"k.gain": (0.0, 5.0)}, "(final(x) - 3)^2", limit, **SETTINGS)
+    assert found.converged and found.feasible and found.method == "gradient"
+    assert_allclose(found["k.gain"], 0.6, rtol=1e-5)
+    assert not found.solutions[0].feasible and len(found.solutions) > 1
+    # Without bounds there is no sweep.
+    alone = ab.optimise(diagram, ["k.gain"], "(final(x) - 3)^2", limit, method="gradient", **SETTINGS)
+    assert not alone.feasible and "not satisfied" in str(alone)
+    budget = {"evaluations": 12, "method": "gradient"}
+    few = ab.optimise(diagram, {"k.gain": (0.0, 5.0)}, "(final(x) - 3)^2", limit, **budget, **SETTINGS)
+    assert len(few.history) <= 14
 
 
 def test_failed_points_are_avoided_and_failed_starts_are_errors() -> None:

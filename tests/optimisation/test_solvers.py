@@ -94,3 +94,46 @@ def test_violations_are_relative_to_the_limits() -> None:
     found = violations(rows, np.array([-np.inf, 0.0]), np.array([4.0, np.inf]))
     assert_allclose(found, [0.2, 3.0, np.inf])
     assert_allclose(violations(np.empty((2, 0)), np.empty(0), np.empty(0)), 0.0)
+
+
+def test_feasible_convex_problems_are_never_called_infeasible() -> None:
+    """Quadratic programs with a known feasible point: dependent equations, also more than unknowns, limits
+    without an interior, and points at the bounds. The oracle is SciPy's SLSQP."""
+    from scipy.optimize import LinearConstraint, minimize
+
+    for seed in range(60):
+        random = np.random.default_rng(seed)
+        n, m = int(random.integers(1, 5)), int(random.integers(0, 7))
+        root = random.normal(size=(n, n))
+        hessian, c = root @ root.T + 0.1 * np.eye(n), random.normal(size=n)
+        inside = random.uniform(size=n)
+        if seed % 3 == 0:
+            inside = np.round(inside)
+        jacobian = random.normal(size=(m, n)) * 10.0 ** random.uniform(-1.0, 2.0, (m, 1))
+        at, slack = jacobian @ inside, random.exponential(size=m) * random.integers(0, 2, m)
+        kind = random.integers(0, 3, m)
+        low, high = np.where(kind == 0, -np.inf, at - slack), np.where(kind == 1, np.inf, at + slack)
+
+        def value(z: Array, hessian: Array = hessian, c: Array = c) -> float:
+            return float(0.5 * z @ hessian @ z + c @ z)
+
+        program = NonlinearProgram(
+            lower=np.zeros(n),
+            upper=np.ones(n),
+            row_lower=low,
+            row_upper=high,
+            values=lambda z, J=jacobian, value=value: (value(z), J @ z),
+            derivatives=lambda z, J=jacobian, hessian=hessian, c=c: (hessian @ z + c, J),
+        )
+        found = minimise(program, random.uniform(size=n))
+        assert found.converged, (seed, found.message)
+        assert violations((jacobian @ found.point)[np.newaxis], low, high)[0] <= 1e-6, seed
+        scale = np.abs(jacobian).max(axis=1, initial=0.0)
+        rows = [
+            LinearConstraint(jacobian[k] / scale[k, None], low[k] / scale[k], high[k] / scale[k])
+            for k in (np.flatnonzero(low == high), np.flatnonzero(low != high))
+            if k.size
+        ]
+        oracle = minimize(value, inside, bounds=[(0, 1)] * n, constraints=rows, method="SLSQP")
+        best = min(float(oracle.fun), value(inside)) if oracle.success else value(inside)
+        assert value(found.point) <= best + 1e-4 * (1.0 + abs(best)), seed

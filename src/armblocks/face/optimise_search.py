@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 GRADIENT, SEARCH = "gradient", "search"
 CANDIDATES = 32
 """Number of points of the sweep from which each further start is chosen."""
+RESTARTS = 3
+"""Maximum number of further starts if no start ends at a feasible point."""
 _EVALUATIONS_OF_A_START, _EVALUATIONS_OF_A_VARIABLE, _LEAST_EVALUATIONS = 300, 500, 1000
 _CTRL_C = "stopped by Ctrl-C"
 
@@ -207,7 +209,8 @@ def _by_gradient(
     v = problem.variables
     found: list[_Local] = []
     message = ""
-    limit = (evaluations or _EVALUATIONS_OF_A_START * starts) + len(problem.history)
+    before = len(problem.history)
+    limit = (evaluations or _EVALUATIONS_OF_A_START * starts) + before
     try:
         for begin in _starts(problem, starts):
             if found and len(problem.history) >= limit:
@@ -215,6 +218,9 @@ def _by_gradient(
             local = _local(problem, program, begin, limit)
             if local is not None:
                 found.append(local)
+        if not any(local.solution.feasible for local in found) and v.bounded:
+            limit = evaluations + before if evaluations else len(problem.history) + _EVALUATIONS_OF_A_START
+            found += _restarted(problem, program, [local.solution.start for local in found], limit)
     except KeyboardInterrupt:
         if problem.best is None:
             raise
@@ -223,9 +229,7 @@ def _by_gradient(
     best = _best(problem)
     valid = [local for local in found if local.solution.feasible]
     chosen = min(valid, key=lambda local: local.solution.objective, default=None)
-    # A point that a search has passed is better only by rounding, except if the search did not converge.
-    slack = 1e-6 * (abs(best[1]) + 1e-12)
-    ends_here = chosen is not None and (best[0] > 0.0 or chosen.solution.objective <= best[1] + slack)
+    ends_here = chosen is not None and not _passed_better(problem, chosen)
     nothing = np.full(len(problem.conditions), np.nan), np.full(v.start.size, np.nan)
     solved = chosen if ends_here else None
     last = solved or (found[-1] if found else None)
@@ -251,18 +255,44 @@ def _end(last: LocalSolution | None, *, ends_here: bool) -> str:
     return "the search passed a better point than its end, because the objective is not smooth there"
 
 
+def _passed_better(problem: Optimisation, end: _Local) -> bool:
+    """Whether a search has passed a feasible point with an objective below that of its end, by more than by
+    rounding or by a violation of the constraints within their tolerance."""
+    history = np.array(problem.history)
+    f, broken, least = history[:, 0], history[:, 1], end.solution.objective
+    sizes = np.array([_size(condition) for condition in problem.conditions])
+    gain = float(np.abs(end.multipliers) @ sizes) * broken
+    valid = np.isfinite(f) & (broken <= FEASIBILITY)
+    scale = float(np.abs(f[valid]).max(initial=0.0))
+    slack = 1e-6 * abs(least) + 1e-9 * scale
+    return bool((valid & (f < least - slack - np.minimum(gain, 1e-3 * abs(least) + 1e-6 * scale))).any())
+
+
+def _size(condition: Condition) -> float:
+    """The size of the limits, to which violations are relative."""
+    return 1.0 + max(abs(limit) for limit in (condition.low, condition.high) if np.isfinite(limit))
+
+
 def _starts(problem: Optimisation, count: int) -> list[Array]:
-    """The first point, and further points of a sweep over the bounds: the best ones far from one another."""
-    v = problem.variables
-    chosen = [v.start]
+    """The first point, and further points of a sweep over the bounds."""
+    start = problem.variables.start
     if count == 1:
-        return chosen
-    v.require_bounds("a choice of several starts", problem.where)
-    points = unit_points(SOBOL, CANDIDATES * count, v.start.size, problem.seed)
+        return [start]
+    problem.variables.require_bounds("a choice of several starts", problem.where)
+    return [start, *_swept(problem, [start], count - 1)]
+
+
+def _swept(problem: Optimisation, tried: list[Array], count: int) -> list[Array]:
+    """The best ``count`` points of a sweep over the bounds that are far from one another and from those
+    tried before: those with the least violation of the constraints, then with the least objective."""
+    v = problem.variables
+    total = count + len(tried)
+    points = unit_points(SOBOL, CANDIDATES * total, v.start.size, problem.seed)
     objectives, rows = problem.evaluate(v.values(points))
     order = np.lexsort((objectives, violation(rows, problem.conditions)))
-    known = [v.coordinates(v.start)]
-    distance = 0.5 * count ** (-1.0 / v.start.size)
+    known = [v.coordinates(point) for point in tried]
+    chosen: list[Array] = []
+    distance = 0.5 * total ** (-1.0 / v.start.size)
     while len(chosen) < count and distance > 1e-6:
         for k in order.tolist():
             far = all(float(np.linalg.norm(points[k] - other)) >= distance for other in known)
@@ -271,6 +301,28 @@ def _starts(problem: Optimisation, count: int) -> list[Array]:
                 chosen.append(v.values(points[k]))
         distance *= 0.5
     return chosen
+
+
+def _restarted(
+    problem: Optimisation, program: GradientProgram, tried: list[Array], limit: int
+) -> list[_Local]:
+    """Searches from further starts until one ends at a feasible point.
+
+    A local search stops at a point where the violation of the constraints has no descent direction, for
+    example where a controller saturates and the peak of its signal does not depend on the variables.
+    """
+    found: list[_Local] = []
+    if len(problem.history) >= limit:
+        return found
+    for begin in _swept(problem, tried, RESTARTS):
+        if len(problem.history) >= limit:
+            break
+        local = _local(problem, program, begin, limit)
+        if local is not None:
+            found.append(local)
+            if local.solution.feasible:
+                break
+    return found
 
 
 def _local(problem: Optimisation, program: GradientProgram, begin: Array, limit: int) -> _Local | None:

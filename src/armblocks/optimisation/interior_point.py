@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 TOLERANCE = 1e-6
 """Tolerance of the optimality conditions after Ipopt's scaling of the functions."""
+EQUATION_SLACK = 1e-8
+"""Relative tolerance of equations if there are more equations than unknowns."""
 _MESSAGES: Mapping[str, tuple[str, bool]] = {
     "Solve_Succeeded": ("converged", True),
     "Solved_To_Acceptable_Level": ("converged with a reduced tolerance", True),
@@ -46,6 +48,7 @@ def minimise(
     """
     calls = _Calls(program, stop)
     n, m = program.lower.size, program.row_lower.size
+    row_lower, row_upper = _row_limits(program)
     functions = _Functions(calls, n, m)
     iteration = _Iteration(calls, n, m)
     z = MX.sym("z", n)
@@ -54,6 +57,7 @@ def minimise(
         "ipopt": {
             "hessian_approximation": "limited-memory",
             "tol": tolerance,
+            "constr_viol_tol": min(1e-4, 0.5 * tolerance * _least_size(program)),
             "acceptable_tol": 100.0 * tolerance,
             "acceptable_iter": 8,
             "max_iter": _MOST_ITERATIONS,
@@ -69,9 +73,7 @@ def minimise(
     }
     solver = nlpsol("solver", "ipopt", {"x": z, "f": f, "g": g}, options)
     try:
-        result = solver(
-            x0=start, lbx=program.lower, ubx=program.upper, lbg=program.row_lower, ubg=program.row_upper
-        )
+        result = solver(x0=start, lbx=program.lower, ubx=program.upper, lbg=row_lower, ubg=row_upper)
     except Exception:
         # CasADi replaces an exception of the functions by its own.
         if calls.error is None:
@@ -91,6 +93,23 @@ def minimise(
         message=calls.reason or message,
         converged=converged,
     )
+
+
+def _least_size(program: NonlinearProgram) -> float:
+    """The least size ``1 + |limit|`` of the rows, to which their violation is relative."""
+    limits = np.abs(np.concatenate([program.row_lower, program.row_upper]))
+    return 1.0 + float(limits[np.isfinite(limits)].min(initial=np.inf))
+
+
+def _row_limits(program: NonlinearProgram) -> tuple[Array, Array]:
+    """The limits of the rows. Ipopt refuses more equations than unknowns, although they may agree with one
+    another: such equations become pairs of limits that differ by less than the tolerance."""
+    low, high = program.row_lower, program.row_upper
+    equal = low == high
+    if int(equal.sum()) <= int((program.lower < program.upper).sum()):
+        return low, high
+    slack = np.where(equal, EQUATION_SLACK * (1.0 + np.abs(np.where(equal, low, 0.0))), 0.0)
+    return low - slack, high + slack
 
 
 class _Calls:
