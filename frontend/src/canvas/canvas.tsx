@@ -197,7 +197,7 @@ function Sheet({ sheetKey }: { sheetKey: string }) {
         <Background variant={BackgroundVariant.Dots} gap={20} size={1} />
         {!empty && <Controls showInteractive={false} fitViewOptions={FIT} />}
         <DragPreview />
-        <WireValues selectedEdge={selectedEdge} />
+        <WireValues selectedEdge={selectedEdge} lines={lines} />
         <SignalNames lines={lines} />
         <MotionContext value={motion}>{motion.isLarge && <LargeSheet />}</MotionContext>
       </ReactFlow>

@@ -3,13 +3,19 @@ import { IconAntennaBars5, IconPinned, IconPinnedOff, IconRoute, IconTag } from 
 import { useStore } from '@xyflow/react'
 import { useEffect, useMemo, useRef, useState } from 'react'
 import { createPortal } from 'react-dom'
-import type { Point } from '../model/wire_lines'
 import type { WireEdgeType } from '../canvas/wire_edge'
-import { nameSignal } from '../canvas/signal_names'
+import { nameSignal, shownName } from '../canvas/signal_names'
 import { nameArea } from '../canvas/sheet_layout'
 import { scheduleFrame, onFrame } from '../frames'
 import type { Rectangle } from '../model/free_place'
-import { fittedValue, labelPosition, WIRE_DISTANCE } from '../model/value_labels'
+import {
+  fittedValue,
+  labelWidth,
+  placeLabels,
+  type PlacedLabel,
+  type ValueLabel,
+} from '../model/value_labels'
+import type { Lines, Point } from '../model/wire_lines'
 import type { SheetPort, SheetBlock } from '../protocol'
 import { samples } from '../samples'
 import { formatNumber, displayUnit, useUnits } from '../scopes/quantity'
@@ -19,8 +25,8 @@ import { useShownValues } from './shown_values'
 
 const MAX_ELEMENTS = 4
 
-/** The display text of a signal's value at a time. */
-function valueAtTime(path: string, time: number, digits: number): string {
+/** The display text of a signal's value at a time in a width, px. */
+function valueText(path: string, time: number, width: number): string {
   const signal = samples.signal(path)
   const index = samples.indexAt(time)
   if (!signal || index < 0) return ''
@@ -28,12 +34,22 @@ function valueAtTime(path: string, time: number, digits: number): string {
   if (channel.shape.length > 1) return channel.shape.join(' × ')
   const values = columns.slice(0, MAX_ELEMENTS).map((column) => column[index] ?? NaN)
   const { factor, unit } = displayUnit(channel.unit, Math.max(...values.map(Math.abs)))
-  const shown = values.map((value) => formatNumber(value * factor, digits)).join(', ')
-  const ellipsis = columns.length > MAX_ELEMENTS ? ', …' : ''
-  return `${columns.length > 1 ? `[${shown}${ellipsis}]` : shown}${unit && ` ${unit}`}`
+  const suffix = unit && ` ${unit}`
+  const text = (digits: number, elements: number) => {
+    const shown = values.slice(0, elements).map((value) => formatNumber(value * factor, digits))
+    if (columns.length > elements) shown.push('…')
+    return columns.length > 1 ? `[${shown.join(', ')}]${suffix}` : shown[0] + suffix
+  }
+  return fittedValue(text, width, values.length)
 }
 
-function outputs(blocks: Record<string, SheetBlock>): { ref: string; block: SheetBlock; port: SheetPort }[] {
+interface Output {
+  ref: string
+  block: SheetBlock
+  port: SheetPort
+}
+
+function outputs(blocks: Record<string, SheetBlock>): Output[] {
   return Object.values(blocks).flatMap((block) =>
     block.outputs
       .filter(({ frame }) => !frame)
@@ -45,13 +61,19 @@ function outputs(blocks: Record<string, SheetBlock>): { ref: string; block: Shee
  * Values on the wires, marks of logged signals, and the tools of the selected wire, drawn on the
  * sheet itself.
  */
-export function WireValues({ selectedEdge }: { selectedEdge: WireEdgeType | undefined }) {
+export function WireValues({
+  selectedEdge,
+  lines,
+}: {
+  selectedEdge: WireEdgeType | undefined
+  lines: Lines
+}) {
   const blocks = useStudio((s) => s.document!.blocks)
   const logged = useStudio((s) => s.document!.logged)
   const pathPrefix = useStudio((s) => s.document!.inside.map((name) => `${name}/`).join(''))
   const views = useStudio((s) => s.run?.views)
   const hasRun = useStudio((s) => s.run !== null)
-  const { all, pinned } = useShownValues()
+  const pinned = useShownValues((s) => s.pinned)
   const flow = useStore((s) => s.domNode)
   // Searched once, because React Flow's portal searches the whole sheet at every change.
   const portal = useMemo(() => flow?.querySelector('.react-flow__viewport-portal'), [flow])
@@ -60,25 +82,17 @@ export function WireValues({ selectedEdge }: { selectedEdge: WireEdgeType | unde
   const hovered = useHovered(flow)
   useValueTexts(layer)
   const outputPorts = outputs(blocks)
-  const shown = hasRun
-    ? outputPorts.filter(({ ref }) => all || ref === hovered || pinned.has(pathPrefix + ref))
-    : []
   const displays = (views ?? []).filter(
     ({ kind, block }) =>
       kind === 'value' && block.startsWith(pathPrefix) && blocks[block.slice(pathPrefix.length)],
   )
-  const obstacles = useMemo(() => (hasRun ? drawnBoxes(blocks) : []), [hasRun, blocks])
   const scale = Math.min(Math.max(1 / zoom, 1), 2.5)
+  const labels = useLabels(hasRun ? outputPorts : [], blocks, hovered, pathPrefix, lines, scale)
   if (!portal) return null
   return createPortal(
     <div ref={layer} className="wire-values" style={{ '--label-scale': scale } as React.CSSProperties}>
-      {shown.map((output) => (
-        <span
-          key={output.ref}
-          className="wire-value numbers"
-          data-path={pathPrefix + output.ref}
-          style={labelStyle(output, output.ref === hovered ? [] : obstacles, scale)}
-        />
+      {labels.map(({ ref, style }) => (
+        <span key={ref} className="wire-value numbers" data-path={pathPrefix + ref} style={style} />
       ))}
       {displays.flatMap(({ block: path, signals }) => {
         const block = blocks[path.slice(pathPrefix.length)]!
@@ -123,27 +137,58 @@ export function WireValues({ selectedEdge }: { selectedEdge: WireEdgeType | unde
 
 /** Height of a label, px. */
 const LABEL_HEIGHT = 14
-/** Minimum width of a label, px. */
+/** Minimum width of a label, and maximum width of the label at the pointer, px. */
 const MIN_LABEL_WIDTH = 24
+const MAX_WIDTH = 400
 
-/** Position and maximum width of the value at an output. */
-function labelStyle(
-  { block, port }: ReturnType<typeof outputs>[number],
-  obstacles: readonly Rectangle[],
+/** The labels of the pinned values, or of all values, and of the value at the pointer. */
+function useLabels(
+  outputPorts: Output[],
+  blocks: Record<string, SheetBlock>,
+  hovered: string,
+  pathPrefix: string,
+  lines: Lines,
   scale: number,
-): React.CSSProperties {
-  const direction = port.dx < 0 ? -1 : 1
-  const [x, y] = [block.place.x + port.x + 6 * direction, block.place.y + port.y]
-  const { below, width } = labelPosition(
-    { x, y },
-    direction,
-    { height: LABEL_HEIGHT * scale, scale },
-    obstacles,
-  )
-  const shift = `translate(${direction < 0 ? '-100%' : '0'}, ${below ? '0' : '-100%'})`
+): { ref: string; style: React.CSSProperties }[] {
+  const { all, pinned } = useShownValues()
+  const obstacles = useMemo(() => [...drawnBoxes(blocks), ...signalNames(lines)], [blocks, lines])
+  const isKept = ({ ref }: Output) => all || pinned.has(pathPrefix + ref)
+  const place = (shown: Output[], around: readonly Rectangle[]) =>
+    placeLabels(
+      shown.map((output) => labelOf(output, pathPrefix, lines)),
+      { height: LABEL_HEIGHT * scale, scale },
+      around,
+    ).map((placed, k) => ({
+      ref: shown[k]!.ref,
+      style: labelStyle(placed, scale, shown[k]!.ref === hovered),
+    }))
+  const pointed = outputPorts.filter((output) => output.ref === hovered && !isKept(output))
+  // The value at the pointer may cover others, and moves no other label.
+  return [...place(outputPorts.filter(isKept), obstacles), ...place(pointed, [])]
+}
+
+/** The label of the value of an output. */
+function labelOf({ ref, block, port }: Output, pathPrefix: string, lines: Lines): ValueLabel {
+  const elements = samples.signal(pathPrefix + ref)?.columns.length ?? 1
   return {
-    maxWidth: Math.max(width / scale, MIN_LABEL_WIDTH),
-    transform: `${labelTransform(x, below ? y + WIRE_DISTANCE : y - WIRE_DISTANCE)} ${shift}`,
+    x: block.place.x + port.x,
+    y: block.place.y + port.y,
+    direction: port.dx < 0 ? -1 : 1,
+    paths: Object.values(lines[ref]?.paths ?? {}),
+    width: labelWidth(Math.min(elements, MAX_ELEMENTS)),
+  }
+}
+
+/** Position and maximum width of a label; the label at the pointer is complete and above all others. */
+function labelStyle(
+  { x, top, direction, width }: PlacedLabel,
+  scale: number,
+  isPointed: boolean,
+): React.CSSProperties {
+  return {
+    maxWidth: isPointed ? MAX_WIDTH : Math.max(width / scale, MIN_LABEL_WIDTH),
+    transform: `${labelTransform(x, top)} translate(${direction < 0 ? '-100%' : '0'}, 0)`,
+    ...(isPointed ? { zIndex: 1 } : {}),
   }
 }
 
@@ -152,6 +197,22 @@ function drawnBoxes(blocks: Record<string, SheetBlock>): Rectangle[] {
   return Object.values(blocks).flatMap((block) => {
     const { place, width, height } = block
     return [{ x: place.x, y: place.y, width, height }, ...nameArea(block)]
+  })
+}
+
+/** Width of a letter and height of the name of a signal, px. */
+const NAME_LETTER = 6.5
+const NAME_HEIGHT = 14
+
+/** The rectangles of the names of signals on their lines. */
+function signalNames(lines: Lines): Rectangle[] {
+  return Object.values(lines).flatMap((net) => {
+    const name = shownName(net)
+    if (!name || !net.name_at) return []
+    const [x, y, anchor] = net.name_at
+    const width = NAME_LETTER * name.length
+    const left = anchor === 'middle' ? x - width / 2 : x
+    return [{ x: left, y: y - NAME_HEIGHT, width, height: NAME_HEIGHT }]
   })
 }
 
@@ -168,7 +229,7 @@ function useValueTexts(layer: React.RefObject<HTMLDivElement | null>): void {
           const state = `${samples.version} ${time} ${path} ${useUnits.getState().radians} ${width}`
           if (written === state) return
           element.dataset['written'] = state
-          element.textContent = fittedValue((digits) => valueAtTime(path, time, digits), width)
+          element.textContent = valueText(path, time, width)
         })
       }),
     [layer],

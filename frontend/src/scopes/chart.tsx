@@ -6,17 +6,16 @@ import { useRuns } from '../run/runs'
 import { showBlock, useStudio } from '../store'
 import { saveCsv, savePng, saveSvg } from './export'
 import type { Figure } from './figure'
+import { Legend } from './legend'
 import { MeasureTable } from './measure_table'
 import { Plot, type PlotHandle } from './plot'
 import type { Values } from './plot_gestures'
 import { useUnits } from './quantity'
-import { hasEntry, type Trace } from '../model/trace'
+import type { Trace } from '../model/trace'
 import { toggleTrigger, useTrigger } from './trigger'
 import { toggleCursors, useWindow, visibleTimes } from './window'
 import { equalAxes, XyPlot } from './xy_plot'
-
-/** Number of letters of a name that the legend always shows. */
-const SHORT_NAME_LENGTH = 8
+import './chart.css'
 
 /** Hidden traces and the visible range of values, which two charts may share. */
 export interface ChartState {
@@ -86,7 +85,7 @@ export function Chart({
     <figure className={hasMeasures ? 'chart measured' : 'chart'} data-view={view} {...menus}>
       <figcaption>
         <b title={title}>{title}</b>
-        <span className="legend">{!isXy && <Legend traces={traces} hidden={hidden} toggle={toggle} />}</span>
+        {isXy ? <span className="legend" /> : <Legend traces={traces} hidden={hidden} toggle={toggle} />}
         {values && <ShowAllValues title={title} show={() => setValues(null)} />}
         {isXy && axesMayBeEqual && <EqualAxes equal={equal} title={title} set={setEqual} />}
         <Exports title={title} entries={exports} />
@@ -134,71 +133,6 @@ function useEqualAxes(traces: Trace[]) {
   const { possible, initial } = equalAxes(traces)
   const [chosen, setEqual] = useState<boolean | null>(null)
   return { axesMayBeEqual: possible, equal: possible && (chosen ?? initial), setEqual }
-}
-
-interface LegendProps {
-  traces: Trace[]
-  hidden: ReadonlySet<string>
-  toggle: (key: string) => void
-}
-
-/** The names of the traces, after the name of their common signal. */
-function Legend({ traces, hidden, toggle }: LegendProps) {
-  const stem = commonStem(traces)
-  return (
-    <>
-      {stem && (
-        <span className="stem" title={stem}>
-          {stem}
-        </span>
-      )}
-      {traces.map((trace) => (
-        <LegendEntry
-          key={trace.key}
-          trace={trace}
-          name={stem ? trace.entry : trace.label}
-          hidden={hidden.has(trace.key)}
-          toggle={() => toggle(trace.key)}
-        />
-      ))}
-    </>
-  )
-}
-
-interface LegendEntryProps {
-  trace: Trace
-  name: string
-  hidden: boolean
-  toggle: () => void
-}
-
-/** A trace in the legend. */
-function LegendEntry({ trace, name, hidden, toggle }: LegendEntryProps) {
-  const { label, tone, dash, stem, entry } = trace
-  return (
-    <button
-      type="button"
-      className={name.length > SHORT_NAME_LENGTH ? 'long' : undefined}
-      aria-label={label}
-      aria-pressed={!hidden}
-      title={hidden ? `Show ${label}` : `Hide ${label}`}
-      onClick={toggle}
-    >
-      <svg width="16" height="4" aria-hidden>
-        <line
-          x1="0"
-          x2="16"
-          y1="2"
-          y2="2"
-          stroke={`var(--${tone})`}
-          strokeWidth="2.5"
-          strokeDasharray={dash.join(' ')}
-        />
-      </svg>
-      <span>{name === label && hasEntry(trace) ? stem : name}</span>
-      {name === label && hasEntry(trace) && <span className="entry">&nbsp;{entry}</span>}
-    </button>
-  )
 }
 
 /** The button that gives both axes of an XY graph the same scale. */
@@ -318,10 +252,4 @@ function blockEntry(path: string): Entries {
   return [
     { title: 'Show the block on the sheet', run: () => void showBlock(names.slice(0, -1), names.at(-1)!) },
   ]
-}
-
-/** The signal to which all traces belong; the legend then shows only their entries. */
-function commonStem(traces: Trace[]): string {
-  const stem = traces[0]?.stem ?? ''
-  return traces.length > 1 && traces.every((one) => one.stem === stem && hasEntry(one)) ? stem : ''
 }

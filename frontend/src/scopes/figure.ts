@@ -1,4 +1,5 @@
 import { fittedLabel, tickText } from '../model/axis_texts'
+import { legendRows } from '../model/legend_names'
 
 export interface Axis {
   min: number
@@ -82,15 +83,14 @@ export function withMargin(min: number, max: number): [number, number] {
   return [min - marginWidth, max + marginWidth]
 }
 
+/** Left edge of the plot, px. */
+const LEFT = 58
+
 function draw(figure: Figure, painter: Painter): void {
-  const { width, height, x, y } = figure
-  const legend = figure.lines.length > 1 || figure.title
-  const box: Box = {
-    left: 58,
-    top: legend ? 30 : 10,
-    width: width - 58 - 12,
-    height: height - (legend ? 30 : 10) - 40,
-  }
+  const { title, width, height, x, y } = figure
+  const legend = legendOf(figure, LEFT)
+  const top = legend.length || title ? 30 + LEGEND_ROW * (legend.at(-1)?.row ?? 0) : 10
+  const box: Box = { left: LEFT, top, width: width - LEFT - 12, height: Math.max(height - top - 40, 40) }
   let [x0, x1, y0, y1] = [x.min, x.max, y.min, y.max]
   if (figure.equal) {
     const scale = Math.max((x1 - x0) / box.width, (y1 - y0) / box.height)
@@ -140,23 +140,36 @@ function draw(figure: Figure, painter: Painter): void {
     }
     if (figure.mark) painter.disc(atX(figure.mark[0]), atY(figure.mark[1]), 4.5, 'accent')
   })
-  if (!legend) return
-  painter.text(box.left, 17, figure.title, 'ink', 'start', true)
-  let legendX = box.left + 8.0 * figure.title.length + 18
-  for (const { label, tone, dash } of figure.lines) {
-    if (figure.lines.length < 2 || legendX + 24 + 6.4 * label.length > width) break
+  if (title) painter.text(box.left, LEGEND_Y, title, 'ink', 'start', true)
+  for (const { text, x: left, row, tone, dash } of legend) {
+    const baseline = LEGEND_Y + LEGEND_ROW * row
     painter.line(
       [
-        [legendX, 13],
-        [legendX + 16, 13],
+        [left, baseline - 4],
+        [left + 16, baseline - 4],
       ],
       tone,
       2.5,
       dash,
     )
-    painter.text(legendX + 21, 17, label, 'muted', 'start')
-    legendX += 34 + 6.4 * label.length
+    painter.text(left + 21, baseline, text, 'muted', 'start')
   }
+}
+
+/** Baseline of the first row of the legend, and distance of its rows, px. */
+const LEGEND_Y = 17
+const LEGEND_ROW = 16
+
+/** The entries of the legend, beside the title and in as many further rows as they need. */
+function legendOf({ title, lines, width }: Figure, left: number) {
+  if (lines.length < 2) return []
+  const names = lines.map(({ label }) => ({ name: label, entry: '' }))
+  const places = { first: left + 8 * title.length + (title ? 18 : 0), left, right: width, margin: 34 }
+  return legendRows(names, places, (text) => 6.4 * text.length).map((entry, k) => ({
+    ...entry,
+    tone: lines[k]!.tone,
+    dash: lines[k]!.dash,
+  }))
 }
 
 const colour = (tone: string) =>

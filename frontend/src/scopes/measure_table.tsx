@@ -5,6 +5,7 @@ import { measures, type Measures } from '../model/measures'
 import { formatNumber, displayUnit, withUnit } from './quantity'
 import { hasEntry, valueAt, type Trace } from '../model/trace'
 import { visibleTimes, useWindow } from './window'
+import './measure_table.css'
 
 const REFRESH_MS = 200
 const ROWS: [name: keyof Measures, head: string, title: string][] = [
