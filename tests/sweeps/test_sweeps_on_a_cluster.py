@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import armblocks as ab
+from armblocks.cli.main import app
 from armblocks.errors import InputError
 from armblocks.sweeps import cluster, scheduling
 from armblocks.sweeps.cluster import compute_parts
@@ -56,6 +58,29 @@ def test_a_cluster_computes_the_same_table(client: Any, monkeypatch: pytest.Monk
         ab.sweep("van_der_pol_pid", vary, **more),
         ab.sweep("van_der_pol_pid", vary, scheduler=address, lanes=True, **more),
     )
+
+
+def test_the_command_computes_on_the_scheduler_of_an_address(
+    client: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    used: list[Any] = []
+
+    class Observed(cluster.ClusterScheduler):
+        def __init__(self, groups: Any, client: Any, maker: Any) -> None:
+            used.append(client)
+            super().__init__(groups, client, maker)
+
+    monkeypatch.setattr("armblocks.face.sweep.ClusterScheduler", Observed)
+    address = client.scheduler_info()["address"]
+    arguments = ["sweep", "van_der_pol_pid", "--vary", "PID.P=1:3:3", "--measure", "peak(x1/y)"]
+    arguments += ["--stop-time", "1", "--sample-time", "0.1", "--out"]
+    tables: list[bytes] = []
+    for name, options in (("here.csv", []), ("there.csv", ["--scheduler", address])):
+        found = CliRunner().invoke(app, [*arguments, str(tmp_path / name), *options])
+        assert found.exit_code == 0, found.output
+        assert "3 runs" in found.output
+        tables.append((tmp_path / name).read_bytes())
+    assert tables[0] == tables[1] and len(used) == 1
 
 
 def test_tasks_of_a_lost_worker_are_repeated(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
