@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import warnings
 from collections.abc import Generator
 from pathlib import Path
@@ -14,7 +15,7 @@ from typer.testing import CliRunner
 import armblocks as ab
 from armblocks.cli.main import app
 from armblocks.errors import InputError
-from armblocks.sweeps import cluster, scheduling
+from armblocks.sweeps import cluster, files, scheduling
 from armblocks.sweeps.cluster import compute_parts
 
 VARY = {"PID.P": ab.uniform(1, 5), "x1.initial": ab.uniform(-1, 1)}
@@ -124,6 +125,27 @@ def test_an_interrupted_sweep_on_a_cluster_is_continued(
     second = ab.sweep("van_der_pol_pid", VARY, progress=interrupt, **arguments)
     assert second.complete
     assert_same(ab.sweep("van_der_pol_pid", VARY, runs=40, **SETTINGS), second)
+
+
+def test_a_sweep_continues_after_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("armblocks.face.sweep.PART_RUNS", 5)
+    monkeypatch.setattr(scheduling, "FIRST_RUNS", 3)
+    monkeypatch.setattr(scheduling, "MAX_RUNS", 5)
+    whole = ab.sweep("van_der_pol_pid", VARY, runs=30, **SETTINGS)
+    write = files.write_atomically
+
+    def full(path: Path, data: bytes) -> None:
+        if len(list(path.parent.glob("runs-*"))) == 2:
+            raise OSError(errno.ENOSPC, "no space left on device")
+        write(path, data)
+
+    target = tmp_path / "runs.parquet"
+    monkeypatch.setattr(files, "write_atomically", full)
+    with pytest.raises(OSError, match="no space left"):
+        ab.sweep("van_der_pol_pid", VARY, runs=30, out=target, **SETTINGS)
+    monkeypatch.setattr(files, "write_atomically", write)
+    assert len(list(tmp_path.glob("*.parts/runs-*"))) == 2 and not target.exists()
+    assert_same(whole, ab.sweep("van_der_pol_pid", VARY, runs=30, out=target, **SETTINGS))
 
 
 def test_messages_of_clusters(monkeypatch: pytest.MonkeyPatch) -> None:
