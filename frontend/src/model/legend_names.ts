@@ -96,9 +96,9 @@ export interface PlacedName {
 }
 
 /**
- * The legend of a picture, which nobody can scroll: the names are whole, in as many rows as they need. A name
- * is cut only if it is longer than a row. The first row begins at `first`, the others at `left`, px; `margin`
- * is the width of an entry in addition to its text.
+ * The legend of a picture, which cannot be scrolled. The names are whole, in as many rows as they need. A
+ * name is cut only if it is longer than a row. The first row begins at `first`, the others at `left`, px;
+ * `margin` is the width of an entry in addition to its text.
  */
 export function legendRows(
   names: readonly LegendName[],
