@@ -30,7 +30,7 @@ from armblocks.blocks import BLOCKS, DirectLookup, Modulo, VariableTransportDela
 from armblocks.blocks.external_resets import LEVELS
 from armblocks.diagram import Diagram, PortRef, flat_diagram, infer_shapes
 from armblocks.diagram.controls import EnableControl, TriggerControl
-from armblocks.errors import ArmblocksError, InputError, SimulationError
+from armblocks.errors import ArmblocksError, SimulationError
 from armblocks.face.linearizing import resolved_diagram
 from armblocks.face.model import compile_diagram
 from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_robot
@@ -628,7 +628,12 @@ CHANGE = 1e-6
 def sensitivities_agree_with_differences(case: Case) -> Iterator[str]:
     """The exact derivatives with respect to one parameter agree with differences of runs."""
     system = compile_diagram(case.diagram).system
-    numbers = [slot.name for slot in system.parameters.slots if slot.shape == ()]
+    numbers = [
+        slot.name
+        for slot in system.parameters.slots
+        if slot.shape == ()
+        and np.isfinite(system.parameter_values[system.parameters.range_of(slot.name)]).all()
+    ]
     random = np.random.default_rng(
         len(case.recipe.nodes) + round(1e6 * abs(sum(map(np.sum, case.run.values()))))
     )
@@ -641,12 +646,18 @@ def sensitivities_agree_with_differences(case: Case) -> Iterator[str]:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                found = ab.sensitivity(case.diagram, name, names, **settings)
+                try:
+                    found = ab.sensitivity(case.diagram, name, names, **settings)
+                except SimulationError as error:
+                    if "coincide" not in str(error):
+                        yield f"the run with derivatives by '{name}' fails: {error}"
+                        continue
+                    raise
                 runs = [
                     ab.simulate(resolved_diagram(case.diagram, {name: value + shift}), **settings)
                     for shift in CHANGE * (1.0 + abs(value)) * np.array([-2.0, -1.0, 1.0, 2.0])
                 ]
-        except (InputError, SimulationError) as error:
+        except ArmblocksError as error:
             raise InconclusiveError(f"refused: {error}") from None
         step = CHANGE * (1.0 + abs(value))
         for signal in names:
