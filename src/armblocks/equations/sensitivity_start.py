@@ -110,20 +110,30 @@ class _Start:
         """The blocks with initial states that have different derivatives to the left and to the right of a
         parameter, for example an initial value equal to a limit."""
         found: set[str] = set()
-        for index in range(entries.start, entries.stop):
-            step = KINK_STEP * (1.0 + abs(self.p[index]))
-            sides = [self.p.copy() for _ in range(3)]
-            for side, shift in zip(sides, (-step, 0.0, step)):
-                side[index] += shift
-            for initial, layout in (
-                (self.system.initial_states, self.system.states),
-                (self.system.initial_discrete, self.system.discrete),
-            ):
+        for initial, layout in (
+            (self.system.initial_states, self.system.states),
+            (self.system.initial_discrete, self.system.discrete),
+        ):
+            names = [element for slot in layout.slots for element in slot.elements]
+            for index in self._dependences(initial, entries):
+                step = KINK_STEP * (1.0 + abs(self.p[index]))
+                sides = [self.p.copy() for _ in range(3)]
+                for side, shift in zip(sides, (-step, 0.0, step)):
+                    side[index] += shift
                 below, here, above = (initial(side)[0].ravel() for side in sides)
-                curved = np.abs(above - 2.0 * here + below) > KINK * step
-                names = [element for slot in layout.slots for element in slot.elements]
+                with np.errstate(invalid="ignore"):  # infinite values have no difference
+                    curved = np.abs(above - 2.0 * here + below) > KINK * step
                 found |= {names[k].rpartition("/")[0] for k in np.flatnonzero(curved)}
         return sorted(found)
+
+    def _dependences(self, initial: TracedFunction, entries: slice) -> list[int]:
+        """The finite parameters among these on which initial values depend."""
+        columns = set(initial.casadi_function().jac_sparsity(0, 0).get_col())
+        return [
+            index
+            for index in range(entries.start, entries.stop)
+            if index in columns and np.isfinite(self.p[index])
+        ]
 
     def _initial_rates(self, p: SX, entries: slice) -> list[tuple[SX, SX, SX]]:
         """For each parameter entry the derivatives of the initial states and discrete variables, and its unit
