@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from casadi import SX, fabs, floor, fmax, if_else, logic_and, logic_not, logic_or, mmax, mmin, vertcat
 
-from armblocks.blocks.switching import SAME_INSTANT, since
+from armblocks.blocks.switching import SAME_INSTANT, SAME_VALUE, since
 from armblocks.diagram import (
     Guard,
     Signals,
@@ -29,8 +29,6 @@ RESAMPLE = Guard("again", (2,), "the input differs from its sample", -1)
 UP_TO_DATE = State("up_to_date", (), "1: all sample times until now are counted")
 ON_TIME = 1e-9
 """The longest time after a sample time at which the input is still sampled, in periods."""
-SAME_VALUE = 2.0**-40
-"""Relative tolerance for a signal to equal its sample; in a loop the rounding errors of both differ."""
 
 
 def sample_time(p: Signals, count: SX) -> SX:

@@ -24,6 +24,8 @@ THRESHOLD_OFFSET = 1e-300
 
 SMALLEST_JUMP = 1e-9
 """Relative size of the smallest jump that a block can distinguish from rounding errors."""
+SAME_VALUE = 2.0**-40
+"""Relative tolerance for a signal to equal a stored value of it; in a loop the rounding errors differ."""
 SAME_INSTANT = 2.0**-50
 """Relative tolerance within which two times are equal."""
 _HALF_LATER = 1.0 + 2.0**-51

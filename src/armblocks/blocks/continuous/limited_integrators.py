@@ -18,8 +18,7 @@ from armblocks.blocks.external_resets import (
     reset_ports,
     trigger_state,
 )
-from armblocks.blocks.periodic import SAME_VALUE
-from armblocks.blocks.switching import THRESHOLD_OFFSET, limits_in_order
+from armblocks.blocks.switching import SAME_VALUE, THRESHOLD_OFFSET, limits_in_order
 from armblocks.diagram import (
     Block,
     Guard,
@@ -47,8 +46,9 @@ class ResettableIntegrator(Block):
     The block corresponds to Simulink's Integrator with its optional ports. With ``level`` and ``level hold``
     y equals the present initial value while the trigger is not 0. The initial value may come from a port:
     always (``external``), or only at resets (``external at resets``), so that this value may depend on y. The
-    ``state_port`` outputs the state before a reset, so that a loop through this port is not algebraic. With
-    ``limit_output`` y stays between ``lower`` and ``upper``.
+    ``state_port`` outputs the state before a reset, so that a loop through this port is not algebraic. At the
+    start, ``external`` gives y and the state port the value of the port; a loop through it is then algebraic.
+    With ``limit_output`` y stays between ``lower`` and ``upper``.
     """
 
     title: ClassVar[str] = "Integrator with Reset"
