@@ -99,8 +99,8 @@ def _lead(contents: ReportContents) -> str:
     end = axis_number(float(result.time[-1])) if result.time.size else "0"
     robots = sorted({motion.robot.name for motion in contents.motions})
     arm = f", robot {escape(', '.join(robots))}" if robots else ""
-    about = contents.diagram.description
-    description = f"{escape(about[:1].upper() + about[1:])}. " if about else ""
+    about = contents.diagram.description.strip()
+    description = f"{escape(about[:1].upper() + about[1:]).removesuffix('.')}. " if about else ""
     return f"{description}Simulation of {end} s, {counted(count, 'block')}{arm}."
 
 
