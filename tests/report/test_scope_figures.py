@@ -43,3 +43,14 @@ def test_entries_of_a_mux_have_the_names_of_their_blocks() -> None:
     (figure,) = view_figures(diagram, ab.simulate(diagram))
     message = {mark.text for mark in text_marks(figure.picture)}
     assert {"reference", "pair[0]", "pair[1]"} <= message
+
+
+def test_signals_with_long_names_have_different_labels() -> None:
+    builder = ab.DiagramBuilder("long names")
+    names = [f"the torque of the second joint, measured at the {side} side" for side in ("motor", "link")]
+    builder.add("scope", Scope(inputs=2), *(builder.add(name, SineWave()) for name in names))
+    diagram = builder.build()
+    (figure,) = view_figures(diagram, ab.simulate(diagram))
+    labels = [mark.text for mark in text_marks(figure.picture) if "…" in mark.text and not mark.bold]
+    assert len(set(labels)) == 2
+    assert [label[-8:] for label in labels] == ["r side/y", "k side/y"]

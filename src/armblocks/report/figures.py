@@ -21,7 +21,7 @@ from armblocks.pictures.svg import svg_marks
 from armblocks.rendering.arm_drawing import pose_sequence_picture
 from armblocks.report.charts.path_chart import path_chart, side_by_side
 from armblocks.report.charts.spectrum_chart import spectrum_chart
-from armblocks.report.charts.time_chart import Panel, Trace, label_fits, time_chart
+from armblocks.report.charts.time_chart import Panel, Trace, fitted_label, label_fits, time_chart
 from armblocks.report.motion import Motion
 from armblocks.simulation.result import SimulationResult
 
@@ -237,6 +237,9 @@ def _scope(diagram: Diagram, block: str, view: View, result: SimulationResult, w
                 labels += slot.entries[: len(entries)]
                 continue
             labels += [f"{short}[{','.join(map(str, index))}]" if index else short for index in entries]
+        if len(set(labels)) < len(labels) == len(names):
+            # The last parts of long names are equal.
+            labels = [fitted_label(name) for name in names]
         # One prefix for all signals of a panel, so that they can be compared.
         values, unit = in_display_unit(np.hstack(columns), unit)
         first = numbers[0] if len(labels) == 1 else 0

@@ -99,6 +99,15 @@ def label_fits(label: str) -> bool:
     return text_width(label, SMALL_SIZE) <= _LABEL_WIDTH - 31
 
 
+def fitted_label(label: str) -> str:
+    """The label, cut in the middle if there is no space for it at the right end of a line."""
+    fitted, kept = label, len(label)
+    while not label_fits(fitted) and kept > 2:
+        kept -= 1
+        fitted = f"{label[: kept // 2]}…{label[len(label) - (kept - kept // 2) :]}"
+    return fitted
+
+
 def _labels_height(count: int) -> float:
     """The height of a panel beside which ``count`` labels do not overlap, px."""
     return (count - 1) * _LABEL_STEP - 2 * _LABEL_OVERHANG
