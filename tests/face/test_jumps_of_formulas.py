@@ -15,12 +15,15 @@ from armblocks.blocks import (
     Constant,
     EnabledSubsystem,
     Expression,
+    Gain,
     Inport,
     Integrator,
     Modulo,
     Outport,
     Ramp,
+    Rounding,
     SineWave,
+    Step,
     Sum,
     Switch,
     TransportDelay,
@@ -157,6 +160,28 @@ def test_a_jump_inside_an_enabled_subsystem_and_in_a_modulo_without_events() -> 
     builder.add("x", Integrator(), remainder)
     expected = CLOSED_FORMS["mod(u, p)"](0.73)
     assert derivative(builder, "v.value")[-1] == pytest.approx(expected, rel=1e-8)
+
+
+def test_a_remainder_has_a_derivative_if_its_divisor_is_zero_or_becomes_zero() -> None:
+    for zero_crossing in (True, False):
+        builder = ab.DiagramBuilder("divisors")
+        u = builder.add("u", Gain(gain=2.6), builder.add("time", Ramp(initial=0.5)))
+        divisors = Step(time=0.5, initial=[0.4, 0.0], final=[0.0, 0.4])
+        builder.add("y", Modulo(zero_crossing=zero_crossing), u, builder.add("v", divisors))
+        result = ab.sensitivity(builder.build(), "u.gain", "y", stop_time=1.0, sample_time=0.1)
+        expected = np.tile(0.5 + result.time[:, np.newaxis], 2)
+        np.testing.assert_allclose(result["y", "u.gain"], expected, atol=1e-12)
+
+
+def test_a_formula_that_is_not_a_number_ends_a_run_with_derivatives_by_this_reason() -> None:
+    builder = ab.DiagramBuilder("nan")
+    u = builder.add("u", Gain(gain=2.6), builder.add("time", Ramp(initial=0.5)))
+    rest = builder.add(
+        "rest", Modulo(function="rem"), u, builder.add("v", Step(time=0.5, initial=0.4, final=0.0))
+    )
+    builder.add("y", Rounding(zero_crossing=False), rest)
+    with pytest.raises(SimulationError, match=r"'rest/y' is nan at 0\.5 s"):
+        ab.sensitivity(builder.build(), "u.gain", "y", stop_time=1.0, sample_time=0.1)
 
 
 def test_a_jump_in_an_implicit_equation() -> None:

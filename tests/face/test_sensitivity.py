@@ -12,9 +12,7 @@ import pytest
 import armblocks as ab
 from armblocks.blocks import (
     PWM,
-    Abs,
     Backlash,
-    Bias,
     Constant,
     Derivative,
     EnabledSubsystem,
@@ -32,12 +30,9 @@ from armblocks.blocks import (
     ResettableIntegrator,
     ResettableSubsystem,
     Saturation,
-    SecondOrderIntegratorLimited,
-    Sign,
     SignalGenerator,
     SineWave,
     Step,
-    StickSlipFriction,
     Sum,
     TransferFunction,
     TransportDelay,
@@ -46,7 +41,6 @@ from armblocks.blocks import (
     VariableTransportDelay,
     ZeroOrderHold,
 )
-from armblocks.diagram import Block
 from armblocks.errors import InputError, SimulationError, UnknownNameError
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12, "stop_time": 3.0, "sample_time": 0.1}
@@ -418,53 +412,6 @@ def test_a_parameter_of_a_jump_time_with_an_implicit_equation_is_refused() -> No
         InputError, match=r"the parameter that determines when a signal jumps and the implicit equ"
     ):
         ab.sensitivity(builder.build(), "step.time", "x")
-
-
-def test_events_at_the_start_that_depend_on_the_parameter_are_refused() -> None:
-    def integrated(block: Block) -> ab.Diagram:
-        builder = ab.DiagramBuilder("start")
-        builder.add("x", Integrator(), builder.add("y", block, builder.add("wave", SineWave())))
-        return builder.build()
-
-    def integrated_twice(block: Block) -> ab.Diagram:
-        builder = ab.DiagramBuilder("start")
-        builder.add("y", block, builder.add("fall", Constant(value=-9.81)))
-        return builder.build()
-
-    for block, parameter in ((Sign(), "wave.phase"), (PWM(), "y.offset"), (FirstOrderHold(), "y.offset")):
-        with pytest.raises(InputError, match=f"event of 'y' at the start moves with .* '{parameter}'"):
-            ab.sensitivity(integrated(block), parameter, "x")
-    ball = SecondOrderIntegratorLimited(lower=0.0)
-    with pytest.raises(InputError, match=r"event of 'y' at the start moves with .* 'y.lower'"):
-        ab.sensitivity(integrated_twice(ball), "y.lower", "y/x")
-    # The absolute value has a kink at the start but no jump: dx/dphase = |sin(t)|.
-    result = ab.sensitivity(integrated(Abs()), "wave.phase", "x", **TIGHT)
-    assert np.allclose(result["x", "wave.phase"], np.sin(result.time), atol=1e-9)
-
-
-def test_events_at_the_start_of_a_table_that_is_read_by_index(capfd: pytest.CaptureFixture[str]) -> None:
-    """The sign of table + c changes at the start if the first value is 0.5 and c = -0.5."""
-
-    def diagram(first: float) -> ab.Diagram:
-        builder = ab.DiagramBuilder("table", settings=ab.SimulationOptions(stop_time=1.0, sample_time=0.25))
-        table = builder.add("table", FromFile(data=((0.0, first), (1.0, first + 1.0))))
-        builder.add("x", Integrator(), builder.add("y", Sign(), builder.add("c", Bias(bias=-0.5), table)))
-        return builder.build()
-
-    with pytest.raises(InputError, match=r"event of 'y' at the start moves with .* 'c.bias'"):
-        ab.sensitivity(diagram(0.5), "c.bias", "x")
-    # The sign changes at 0.5 s, earlier by dc: dx/dc = 2 afterwards.
-    result = ab.sensitivity(diagram(0.0), "c.bias", "x")
-    assert result["x", "c.bias"][[0, 1, 3, 4]] == pytest.approx([0.0, 0.0, 2.0, 2.0], abs=1e-6)
-    assert capfd.readouterr().out == ""
-
-
-def test_the_sensitivity_to_the_speed_of_a_stuck_mass_is_refused() -> None:
-    builder = ab.DiagramBuilder("rest")
-    mass = builder.add("mass", StickSlipFriction(), builder.add("force", Ramp(slope=0.8)))
-    builder.add("x", Integrator(), mass["x"])
-    with pytest.raises(InputError, match=r"event of 'mass' at the start moves with .* 'mass.initial_speed'"):
-        ab.sensitivity(builder.build(), "mass.initial_speed", "x")
 
 
 def test_the_sensitivity_to_a_seed_is_refused() -> None:

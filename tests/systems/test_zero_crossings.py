@@ -43,6 +43,7 @@ from armblocks.blocks import (
     Sign,
     SineWave,
     Sqrt,
+    Step,
     Sum,
     Switch,
     UnitDelay,
@@ -246,6 +247,39 @@ def test_the_integrals_of_remainders_of_a_sine_are_exact(run: Run) -> None:
         for k, divisor in enumerate(divisors):
             integral = remainder_integral(function, divisor, result["t"])
             close(result["integral/y"][:, k], integral, 1.5e-8)  # an amplitude of 2.5
+
+
+def test_remainders_agree_with_numpy_for_quotients_of_every_size() -> None:
+    """The divisors jump at 0.5 s, also to 0 and to numbers that are too small for events."""
+    random, n = np.random.default_rng(11), 60
+    before, factor = (
+        random.choice([-1, 1], n) * 10 ** random.uniform(-2, 2, n),
+        random.choice([1.5, -0.7, 1e-18, 0.0], n),
+    )
+    start = random.choice([-1, 1], n) * 10 ** random.uniform(0, 22, n) * np.abs(before)
+    initial = np.where(random.random(n) < 0.2, 0.0, before)
+    for function in ("mod", "rem"):
+        last = before * np.where((factor == 0.0) & (function == "rem"), 1e-20, factor)
+        first = before if function == "rem" else initial
+        for zero_crossing in (True, False):
+            builder = DiagramBuilder("quotients")
+            u = builder.add("u", Ramp(slope=random.uniform(-3, 3, n) * np.abs(before), initial=start))
+            v = builder.add("v", Step(time=0.5, initial=first, final=last))
+            builder.add("y", Modulo(function=function, zero_crossing=zero_crossing), u, v)
+            result = simulate(compiled(builder.build()), SimulationOptions(stop_time=1.0, sample_time=0.05))
+            u_run, v_run = result["u/y"], result["v/y"]
+            divisor = np.where(v_run == 0.0, np.inf, v_run)
+            remainder = np.mod if function == "mod" else np.fmod
+            expected = np.where(v_run == 0.0, u_run, remainder(u_run, divisor))
+            assert np.array_equal(result["y/y"], expected)
+
+
+def test_a_remainder_by_zero_is_nan_from_a_jump_of_the_divisor_on() -> None:
+    builder = DiagramBuilder("zero")
+    divisor = builder.add("v", Step(time=0.5, initial=0.4, final=0.0))
+    builder.add("y", Modulo(function="rem"), builder.add("u", Ramp(initial=1.3)), divisor)
+    with pytest.raises(SimulationError, match=r"'y/y' is nan at 0\.5 s"):
+        simulate(compiled(builder.build()), SimulationOptions(stop_time=1.0, sample_time=0.1))
 
 
 def remainder_integral(function: str, divisor: float, t: np.ndarray) -> np.ndarray:

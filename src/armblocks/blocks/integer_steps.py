@@ -10,13 +10,7 @@ from casadi import SX, ceil, fabs, floor, fmax, fmin, if_else, sign
 
 from armblocks.blocks.switching import THRESHOLD_OFFSET, beyond, cell_of
 from armblocks.diagram import Block, Guard, Shapes, Signals, State
-
-
-def nearest(u: SX) -> SX:
-    """Round to the nearest integer, halves away from zero, exactly for every double."""
-    whole = floor(fabs(u))
-    return sign(u) * (whole + (fabs(u) - whole >= 0.5))
-
+from armblocks.equations.remainders import nearest
 
 ROUNDINGS: Mapping[str, Callable[[SX], SX]] = {
     "floor": floor,

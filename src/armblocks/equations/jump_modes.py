@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass, field
 
 import casadi
-from casadi import SX, fabs, floor, fmax, fmod, if_else, logic_and, sign
+from casadi import SX, fabs, fmax, if_else, logic_and, sign
 
-OFFSET = 1e-300
-"""Offset of a guard that gives zero a definite sign."""
+from armblocks.equations.remainders import OFFSET, beyond_ends, quotient_of, remainder_for_quotient
+
 COMPARISONS = frozenset({casadi.OP_LT, casadi.OP_LE, casadi.OP_EQ, casadi.OP_NE})
 JUMPS = COMPARISONS | {
     casadi.OP_SIGN,
@@ -47,9 +47,9 @@ class JumpModes:
         if operation in (casadi.OP_FLOOR, casadi.OP_CEIL):
             return self._rounded(operation, a)
         if operation == casadi.OP_SIGN:
-            mode = self._mode(sign(a))
+            mode = self._mode(_if_number(a, sign(a), 0.0))
             self._guard(a, SX(1.0), SX(-1.0))
-            return mode
+            return _if_number(a, mode, sign(a))
         mode = self._mode(SX.binary(operation, a, b))
         if operation in (casadi.OP_EQ, casadi.OP_NE):
             passed = SX(float(operation == casadi.OP_NE))
@@ -71,12 +71,12 @@ class JumpModes:
         self.mode_of_guard.append(len(self.modes) - 1)
 
     def _rounded(self, operation: int, a: SX) -> SX:
-        mode = self._mode(SX.unary(operation, a))
+        mode = self._mode(_if_number(a, SX.unary(operation, a), 0.0))
         if operation == casadi.OP_FLOOR:
             self._steps(mode, a - (mode + 1.0) + OFFSET, a - mode + OFFSET)
         else:
             self._steps(mode, a - mode - OFFSET, a - (mode - 1.0) - OFFSET)
-        return mode
+        return _if_number(a, mode, a)
 
     def _steps(self, mode: SX, up: SX, down: SX) -> None:
         """The guards of an integer: at the next and at the previous integer."""
@@ -85,15 +85,9 @@ class JumpModes:
 
     def _remainder(self, a: SX, b: SX) -> SX:
         """``fmod(a, b) = a - n b``; the mode is the integer n, a / b rounded toward zero."""
-        quotient = floor((a - fmod(a, b)) / b + 0.5)
-        mode = self._mode(quotient)
-        upper, lower = mode + (mode >= 0.0), mode - (mode <= 0.0)
-        self._steps(
-            mode,
-            (a - upper * b) * sign(b) + if_else(mode >= 0.0, OFFSET, -OFFSET),
-            (a - lower * b) * sign(b) + if_else(mode <= 0.0, -OFFSET, OFFSET),
-        )
-        return if_else(quotient == mode, fmod(a, b), a - mode * b)
+        mode = self._mode(quotient_of("rem", a, b))
+        self._steps(mode, *beyond_ends("rem", a, b, mode))
+        return remainder_for_quotient("rem", a, b, mode)
 
     def _angle(self, y: SX, x: SX) -> SX:
         """``atan2(y, x)``; the mode is 1 in the third quadrant. The angle jumps where x < 0 and y changes
@@ -105,3 +99,8 @@ class JumpModes:
         above = logic_and(x < 0.0, y >= 0.0)
         turns = if_else(mode, if_else(above, -1.0, 0.0), if_else(below, 1.0, 0.0))
         return casadi.atan2(y, x) + 2.0 * math.pi * turns
+
+
+def _if_number(a: SX, value: SX, other: SX | float) -> SX:
+    """``value``, or ``other`` if ``a`` is infinite or NaN: no event occurs there, and the mode is 0."""
+    return if_else(fabs(a) < math.inf, value, other)

@@ -25,8 +25,13 @@ ZERO_TOLERANCE = 1e-8
 DERIVATIVE_TOLERANCE = 1e-9
 """Relative tolerance of equal derivatives of states and signals."""
 
-KINK_STEP, KINK = 1e-6, 1e-2
-"""The relative change of a parameter on both sides, and the smallest difference of both derivatives."""
+KINK_STEP, KINK, ROUNDING = 1e-6, 1e-2, 1e-13
+"""The relative change of a parameter, the smallest relative difference of two derivatives at a kink, and the
+relative rounding error of a value."""
+CLOSER = 1.0 / 16.0
+"""The ratio of two changes of a parameter."""
+SHORT = 0.01
+"""A kink that the run leaves within this time (s) does not count."""
 
 
 def refuse_moving_start(system: HybridSystem, parameters: Sequence[str]) -> None:
@@ -34,27 +39,34 @@ def refuse_moving_start(system: HybridSystem, parameters: Sequence[str]) -> None
 
     Diagrams with implicit equations are not checked, because their unknowns are not solved yet.
     """
-    if not system.guard_directions or system.algebraic.size:
+    if system.algebraic.size:
         return
     start = _Start(system)
     for name in parameters:
         entries = system.parameters.range_of(name)
         guards = [system.guard_names[guard] for guard in start.moving_guards(entries)]
-        for block in [*guards, *start.held_states(entries), *start.kinks(entries)]:
+        for block in [*guards, *start.held_states(entries)]:
             raise InputError(
                 f"an event of '{block}' at the start moves with the parameter '{name}'",
                 where=system.name,
                 allowed="events at the start that no parameter moves, or that change nothing",
                 fix=f"choose '{name}' so that the event is a little later",
             )
+        for block in start.kinks(entries):
+            raise InputError(
+                f"block '{block}' starts exactly at a limit or at a jump, which '{name}' moves",
+                where=system.name,
+                allowed="parameters with one derivative at the start of the run",
+                fix=f"change '{name}' a little, or use the difference of two runs",
+            )
 
 
 class _Start:
     """The time 0 of a run, after the ticks and with consistent modes."""
 
-    def __init__(self, system: HybridSystem) -> None:
+    def __init__(self, system: HybridSystem, p: Array | None = None) -> None:
         self.system = system
-        p = self.p = np.asarray(system.parameter_values, dtype=np.float64)
+        p = self.p = np.asarray(system.parameter_values if p is None else p, dtype=np.float64)
         x, z = system.initial_states(p)[0].ravel(), system.initial_discrete(p)[0].ravel()
         marks = np.array([float(clock.offset == 0.0) for clock in system.clocks])
         self._no_event = np.zeros(len(system.guard_directions))
@@ -107,33 +119,89 @@ class _Start:
         return [names[index].rpartition("/")[0] for index in np.flatnonzero(largest > ZERO_TOLERANCE)]
 
     def kinks(self, entries: slice) -> list[str]:
-        """The blocks with initial states that have different derivatives to the left and to the right of a
-        parameter, for example an initial value equal to a limit."""
-        found: set[str] = set()
-        for initial, layout in (
-            (self.system.initial_states, self.system.states),
-            (self.system.initial_discrete, self.system.discrete),
-        ):
-            names = [element for slot in layout.slots for element in slot.elements]
-            for index in self._dependences(initial, entries):
-                step = KINK_STEP * (1.0 + abs(self.p[index]))
-                sides = [self.p.copy() for _ in range(3)]
-                for side, shift in zip(sides, (-step, 0.0, step)):
-                    side[index] += shift
-                below, here, above = (initial(side)[0].ravel() for side in sides)
-                with np.errstate(invalid="ignore"):  # infinite values have no difference
-                    curved = np.abs(above - 2.0 * here + below) > KINK * step
-                found |= {names[k].rpartition("/")[0] for k in np.flatnonzero(curved)}
-        return sorted(found)
+        """The blocks with values at the start that have no derivative with respect to a parameter: an initial
+        value equal to a limit, or a comparison of two equal constants, for example.
 
-    def _dependences(self, initial: TracedFunction, entries: slice) -> list[int]:
-        """The finite parameters among these on which initial values depend."""
-        columns = set(initial.casadi_function().jac_sparsity(0, 0).get_col())
-        return [
-            index
-            for index in range(entries.start, entries.stop)
-            if index in columns and np.isfinite(self.p[index])
-        ]
+        The derivative by the traced equations is compared with the differences to both sides. The error of a
+        difference decreases with the change of the parameter, except at a kink or a jump. A kink that the
+        run leaves at once does not count.
+        """
+        blocks = [element.rpartition("/")[0] for element in self._elements()]
+        found: dict[str, None] = {}
+        for index in range(entries.start, entries.stop):
+            if not np.isfinite(self.p[index]):
+                continue
+            for sign in (-1.0, 1.0):
+                step = sign * KINK_STEP * (1.0 + abs(self.p[index]))
+                far, near = self._changed(index, step), self._changed(index, step * CLOSER)
+                error, limit = self._error(index, step, far)
+                remaining, _ = self._error(index, step * CLOSER, near)
+                kinks = np.flatnonzero((error > limit) & (remaining > error / 2.0))
+                if kinks.size and self._lasts(far, near):
+                    found[blocks[kinks[0]]] = None
+        return list(found)
+
+    def _changed(self, index: int, step: float) -> _Start:
+        """The start with one parameter changed by a step."""
+        p = self.p.copy()
+        p[index] += step
+        return _Start(self.system, p)
+
+    def _lasts(self, far: _Start, near: _Start) -> bool:
+        """Whether modes that change with a parameter stay changed: whether no mode changes, or a guard that
+        is zero only for the unchanged parameter does not move. ``far`` and ``near`` are starts with two
+        changes of the parameter in the ratio 1 to ``CLOSER``."""
+        modes = list(self.system.modes)
+        if np.array_equal(self.after[1][modes], far.after[1][modes]):
+            return True
+        g, rates = far._guard_rates()[0], near._guard_rates()
+        here = np.abs(rates[0])
+        with np.errstate(invalid="ignore"):  # infinite guards
+            through_zero = (here > 0.0) & (np.abs(g - rates[0] / CLOSER) <= 0.1 * np.abs(g))
+        moves = np.array([np.abs(rate) * SHORT**order > here for order, rate in enumerate(rates)][1:])
+        return bool((through_zero & ~moves.any(axis=0)).any())
+
+    def _guard_rates(self) -> list[Array]:
+        """The guards at the start, and their time derivatives up to the third order."""
+        t, x, z, w, p = self.system.guards.arguments
+        rates = [vertcat(*self.system.guards.results, SX(0, 1))]
+        direction = vertcat(SX(1.0), self._flow(t, x, z, w, p))
+        for _ in range(3):
+            rates.append(jtimes(rates[-1], vertcat(t, x), direction))
+        return self._numbers([t, x, z, w, p], rates, self.after)
+
+    def _error(self, index: int, step: float, side: _Start) -> tuple[Array, Array]:
+        """The difference between the derivatives of all values by a step of one parameter and by the
+        equations, and the smallest difference that counts. ``side`` is the start after the step."""
+        values = self._values()
+        with np.errstate(invalid="ignore", over="ignore"):  # infinite values have no difference
+            rate = self._rate(index, side, step)
+            error = np.abs((side._values() - values) / step - rate)
+            return error, KINK * (1.0 + np.abs(rate)) + ROUNDING * np.abs(values / step)
+
+    def _elements(self) -> list[str]:
+        """The names of the elements of :meth:`_values`."""
+        system = self.system
+        layouts = (system.states, system.discrete, system.signals_layout, system.states)
+        return [element for layout in layouts for slot in layout for element in slot.elements]
+
+    def _values(self) -> Array:
+        """The initial states and discrete variables, the signals and the flow at the start."""
+        system = self.system
+        initial = [*system.initial_states(self.p), *system.initial_discrete(self.p)]
+        present = [*self._at(system.signals, *self.after), *self._at(system.derivative, *self.after)]
+        return np.concatenate([column.ravel() for column in (*initial, *present)])
+
+    def _rate(self, index: int, side: _Start, step: float) -> Array:
+        """The derivatives of :meth:`_values` with respect to one parameter, with constant modes. ``side`` is
+        the start with this parameter changed by ``step``."""
+        t, x, z, w, p = self.system.signals.arguments
+        ((of_states, of_discrete, seed),) = self._initial_rates(p, slice(index, index + 1))
+        of_x, of_z = ((b - a) / step for a, b in zip(self.after, side.after))
+        of_z[list(self.system.modes)] = 0.0
+        values = vertcat(*self.system.signals.results, self._flow(t, x, z, w, p))
+        rate = jtimes(values, vertcat(x, z, p), vertcat(of_x, of_z, seed))
+        return self._numbers([t, x, z, w, p], [vertcat(of_states, of_discrete, rate)], self.after)[0]
 
     def _initial_rates(self, p: SX, entries: slice) -> list[tuple[SX, SX, SX]]:
         """For each parameter entry the derivatives of the initial states and discrete variables, and its unit
@@ -156,9 +224,7 @@ class _Start:
         each (ng,)."""
         t, states, discrete, w, p = self.system.guards.arguments
         g = vertcat(*self.system.guards.results)
-        derivative = self.system.derivative
-        flow = Function("f", list(derivative.arguments), [vertcat(*derivative.results, SX(0, 1))])
-        (f,) = flow.call([t, states, discrete, w, p], True, False)
+        f = self._flow(t, states, discrete, w, p)
         moves = [
             jtimes(g, vertcat(states, discrete, p), vertcat(*rates))
             for rates in self._initial_rates(p, entries)
@@ -166,6 +232,13 @@ class _Start:
         rate = jtimes(g, vertcat(t, states), vertcat(SX(1.0), f))
         values = self._numbers([t, states, discrete, w, p], [g, rate, *moves], (x, z))
         return values[0], values[1], np.abs(np.array(values[2:])).max(axis=0)
+
+    def _flow(self, *symbols: SX) -> SX:
+        """The derivative of the states in other symbols ``t, x, z, w, p``."""
+        derivative = self.system.derivative
+        flow = Function("f", list(derivative.arguments), [vertcat(*derivative.results, SX(0, 1))])
+        (xd,) = flow.call(list(symbols), True, False)
+        return xd
 
     def _numbers(
         self, symbols: list[SX], results: list[SX], point: tuple[Array, Array], *further_arguments: Array

@@ -97,7 +97,7 @@ def sensitivity(
     - an index that is out of range,
     - a table that is read by index,
     - a parameter whose integer part alone has an effect,
-    - a parameter that shifts an event at the start,
+    - a parameter that shifts an event at the start, or a limit or jump at which a block starts exactly,
     - implicit equations together with delays, or with a parameter that determines a jump time.
     """
     check_settings(settings, sensitivity)

@@ -10,15 +10,8 @@ from typing import ClassVar
 from casadi import SX, atan2, cos, hypot, sin
 
 from armblocks.blocks.elementwise import common_unit
-from armblocks.blocks.maths.rounding import (
-    quotient_guard_values,
-    quotient_guards,
-    quotient_modes,
-    quotient_of,
-    remainder,
-    remainder_for_quotient,
-    step_after,
-)
+from armblocks.blocks.integer_steps import step_after
+from armblocks.blocks.maths.rounding import quotient_guard_values, quotient_guards, quotient_modes
 from armblocks.blocks.switching import beyond, cell_of, zero_crossing_parameter
 from armblocks.diagram import (
     Block,
@@ -32,6 +25,7 @@ from armblocks.diagram import (
     driver,
 )
 from armblocks.diagram.signs import FaceSign, Words
+from armblocks.equations.remainders import quotient_of, remainder, remainder_for_quotient
 
 
 @dataclass(frozen=True, kw_only=True)

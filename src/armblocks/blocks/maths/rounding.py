@@ -6,18 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from casadi import SX, fmod, if_else, logic_and, sign
+from casadi import SX
 
 from armblocks.blocks.elementwise import common_unit
-from armblocks.blocks.integer_steps import (
-    ROUNDINGS,
-    BlockWithSteps,
-    IntegerSteps,
-    nearest,
-    rounding_edges,
-    step_after,
-)
-from armblocks.blocks.switching import THRESHOLD_OFFSET, beyond, cell_of, zero_crossing_parameter
+from armblocks.blocks.integer_steps import ROUNDINGS, BlockWithSteps, IntegerSteps, step_after
+from armblocks.blocks.switching import beyond, cell_of, zero_crossing_parameter
 from armblocks.diagram import (
     Block,
     Guard,
@@ -32,6 +25,7 @@ from armblocks.diagram import (
 )
 from armblocks.diagram.signs import FaceSign, Words, function_sign
 from armblocks.equations import Shape
+from armblocks.equations.remainders import beyond_ends, quotient_of, remainder, remainder_for_quotient
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,31 +121,6 @@ class Modulo(Block):
         return {"turns": step_after(quotient_of(self.function, u["u"], u["v"]), x["turns"], e)}
 
 
-# The remainder is u - n v; the integer n is a mode, so that the remainder is smooth between two events.
-
-_QUOTIENTS = {"mod": "floor", "rem": "fix"}
-"""The rounding that gives the integer n from u / v."""
-
-
-def remainder(function: str, u: SX, v: SX) -> SX:
-    """``mod`` (sign of the divisor; u if the divisor is zero) or ``rem``."""
-    rest = fmod(u, v)
-    if function == "rem":
-        return rest
-    other_sign = logic_and(rest != 0.0, (rest < 0.0) != (v < 0.0))
-    return if_else(v == 0.0, u, if_else(other_sign, rest + v, rest))
-
-
-def quotient_of(function: str, u: SX, v: SX) -> SX:
-    """The integer n in u - n v, consistent with :func:`remainder`."""
-    return if_else(v == 0.0, 0.0, nearest((u - remainder(function, u, v)) / v))
-
-
-def remainder_for_quotient(function: str, u: SX, v: SX, quotient: SX) -> SX:
-    """The remainder u - n v for a given n, also slightly beyond the ends of its interval."""
-    return if_else(quotient_of(function, u, v) == quotient, remainder(function, u, v), u - quotient * v)
-
-
 def quotient_modes(shape: Shape, doc: str) -> tuple[State, ...]:
     """The mode of the integer n in a remainder u - n v; ``doc`` describes it."""
     return (State("turns", shape, doc),)
@@ -165,13 +134,4 @@ def quotient_guards(shape: Shape) -> tuple[Guard, ...]:
 
 def quotient_guard_values(function: str, u: SX, v: SX, quotient: SX) -> Signals:
     """The distance of u beyond both ends of the interval, in the direction of v."""
-    rule = _QUOTIENTS[function]
-    edge, upper_end_rounds_up = rounding_edges(rule, quotient)
-    below, lower_end_rounds_down = rounding_edges(rule, -quotient, mirrored=True)
-    values = {
-        "up": (u - edge * v) * sign(v) + if_else(upper_end_rounds_up, THRESHOLD_OFFSET, -THRESHOLD_OFFSET),
-        "down": (u + below * v) * sign(v)
-        - if_else(lower_end_rounds_down, THRESHOLD_OFFSET, -THRESHOLD_OFFSET),
-    }
-    # With a divisor of zero, n is 0 and no event occurs.
-    return {name: if_else(v == 0.0, 0.0, value) for name, value in values.items()}
+    return dict(zip(("up", "down"), beyond_ends(function, u, v, quotient)))

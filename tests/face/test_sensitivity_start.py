@@ -1,0 +1,123 @@
+"""Sensitivities of runs that start at an event, at a limit or at a jump."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import armblocks as ab
+from armblocks.blocks import (
+    PWM,
+    Abs,
+    Bias,
+    CompareToZero,
+    Constant,
+    DeadZone,
+    FirstOrderHold,
+    FromFile,
+    Gain,
+    Integrator,
+    Ramp,
+    RateLimiterContinuous,
+    RateLimiterDynamic,
+    Relay,
+    Rounding,
+    Saturation,
+    SecondOrderIntegratorLimited,
+    Sign,
+    SineWave,
+    StickSlipFriction,
+)
+from armblocks.diagram import Block
+from armblocks.errors import InputError
+
+TIGHT = {"rtol": 1e-10, "atol": 1e-12, "stop_time": 3.0, "sample_time": 0.1}
+
+
+def test_events_at_the_start_that_depend_on_the_parameter_are_refused() -> None:
+    def integrated(block: Block) -> ab.Diagram:
+        builder = ab.DiagramBuilder("start")
+        builder.add("x", Integrator(), builder.add("y", block, builder.add("wave", SineWave())))
+        return builder.build()
+
+    def integrated_twice(block: Block) -> ab.Diagram:
+        builder = ab.DiagramBuilder("start")
+        builder.add("y", block, builder.add("fall", Constant(value=-9.81)))
+        return builder.build()
+
+    for block, parameter in ((Sign(), "wave.phase"), (PWM(), "y.offset"), (FirstOrderHold(), "y.offset")):
+        with pytest.raises(InputError, match=f"event of 'y' at the start moves with .* '{parameter}'"):
+            ab.sensitivity(integrated(block), parameter, "x")
+    ball = SecondOrderIntegratorLimited(lower=0.0)
+    with pytest.raises(InputError, match=r"'y' starts exactly at a limit .* 'y.lower'"):
+        ab.sensitivity(integrated_twice(ball), "y.lower", "y/x")
+    # The absolute value has a kink at the start but no jump: dx/dphase = |sin(t)|.
+    result = ab.sensitivity(integrated(Abs()), "wave.phase", "x", **TIGHT)
+    assert np.allclose(result["x", "wave.phase"], np.sin(result.time), atol=1e-9)
+
+
+def test_events_at_the_start_of_a_table_that_is_read_by_index(capfd: pytest.CaptureFixture[str]) -> None:
+    """The sign of table + c changes at the start if the first value is 0.5 and c = -0.5."""
+
+    def diagram(first: float) -> ab.Diagram:
+        builder = ab.DiagramBuilder("table", settings=ab.SimulationOptions(stop_time=1.0, sample_time=0.25))
+        table = builder.add("table", FromFile(data=((0.0, first), (1.0, first + 1.0))))
+        builder.add("x", Integrator(), builder.add("y", Sign(), builder.add("c", Bias(bias=-0.5), table)))
+        return builder.build()
+
+    with pytest.raises(InputError, match=r"event of 'y' at the start moves with .* 'c.bias'"):
+        ab.sensitivity(diagram(0.5), "c.bias", "x")
+    # The sign changes at 0.5 s, earlier by dc: dx/dc = 2 afterwards.
+    result = ab.sensitivity(diagram(0.0), "c.bias", "x")
+    assert result["x", "c.bias"][[0, 1, 3, 4]] == pytest.approx([0.0, 0.0, 2.0, 2.0], abs=1e-6)
+    assert capfd.readouterr().out == ""
+
+
+def test_the_sensitivity_to_the_speed_of_a_stuck_mass_is_refused() -> None:
+    builder = ab.DiagramBuilder("rest")
+    mass = builder.add("mass", StickSlipFriction(), builder.add("force", Ramp(slope=0.8)))
+    builder.add("x", Integrator(), mass["x"])
+    with pytest.raises(InputError, match=r"event of 'mass' at the start moves with .* 'mass.initial_speed'"):
+        ab.sensitivity(builder.build(), "mass.initial_speed", "x")
+
+
+@pytest.mark.parametrize(
+    ("block", "value"),
+    [
+        (Saturation(lower=-1.0, upper=1.0), 1.0),
+        (Saturation(lower=-1.0, upper=1.0), -1.0),
+        (DeadZone(start=-1.0, end=1.0), 1.0),
+        (Abs(), 0.0),
+        (Sign(), 0.0),
+        (CompareToZero(), 0.0),
+        (Rounding(function="round"), 0.5),
+        (Relay(), 0.5),
+    ],
+    ids=lambda entry: type(entry).__name__ if isinstance(entry, Block) else str(entry),
+)
+def test_a_constant_at_a_limit_or_at_a_jump_has_no_derivative(block: Block, value: float) -> None:
+    def derivative(bias: float) -> np.ndarray:
+        builder = ab.DiagramBuilder("limit")
+        bias_of = builder.add("bias", Bias(bias=bias), builder.add("zero", Constant(value=0.0)))
+        builder.add("x", Integrator(), builder.add("y", block, bias_of))
+        return ab.sensitivity(builder.build(), "bias.bias", "y", stop_time=0.5)["y", "bias.bias"]
+
+    with pytest.raises(InputError, match=r"'y' starts exactly at a limit .* 'bias.bias' moves"):
+        derivative(value)
+    for side in (value - 1e-3, value + 1e-3):
+        assert np.isin(derivative(side), (-1.0, 0.0, 1.0)).all()
+
+
+def test_a_rate_limiter_that_starts_at_its_input() -> None:
+    """It leaves the limit of its rate at once, unless its limits are 0."""
+    builder = ab.DiagramBuilder("follows")
+    wave = builder.add("wave", SineWave(frequency=0.5))
+    builder.add("y", RateLimiterContinuous(), wave)
+    result = ab.sensitivity(builder.build(), "wave.phase", "y", stop_time=1.0)
+    assert np.allclose(result["y", "wave.phase"][1:], np.cos(0.5 * result.time[1:]), atol=1e-6)
+
+    builder = ab.DiagramBuilder("stands")
+    zero = builder.add("zero", Constant(value=0.0))
+    builder.add("y", RateLimiterDynamic(), zero, builder.add("u", Gain(), zero), zero)
+    with pytest.raises(InputError, match="'y' starts exactly at a limit"):
+        ab.sensitivity(builder.build(), "y.initial", "y", stop_time=1.0)
