@@ -17,6 +17,7 @@ from armblocks.blocks import (
     FromFile,
     Gain,
     Integrator,
+    Polynomial,
     Ramp,
     RateLimiterContinuous,
     RateLimiterDynamic,
@@ -27,6 +28,7 @@ from armblocks.blocks import (
     Sign,
     SineWave,
     StickSlipFriction,
+    Sum,
 )
 from armblocks.diagram import Block
 from armblocks.errors import InputError
@@ -121,3 +123,26 @@ def test_a_rate_limiter_that_starts_at_its_input() -> None:
     builder.add("y", RateLimiterDynamic(), zero, builder.add("u", Gain(), zero), zero)
     with pytest.raises(InputError, match="'y' starts exactly at a limit"):
         ab.sensitivity(builder.build(), "y.initial", "y", stop_time=1.0)
+
+
+def test_the_start_of_a_diagram_with_an_implicit_equation() -> None:
+    """w + w^3 = sin(t + phase) + bias is an implicit equation; the sign of w changes at the start."""
+
+    def diagram(phase: float, bias: float) -> ab.Diagram:
+        builder = ab.DiagramBuilder("loop")
+        total = builder.add("w", Sum(signs="+-"), builder.add("wave", SineWave(phase=phase)))
+        cube = builder.add("cube", Polynomial(coefficients=[1.0, 0.0, 0.0, 0.0]), total)
+        builder.connect(cube, total["u2"])
+        builder.add("x", Integrator(), builder.add("sign", Sign(), total))
+        constant = builder.add("bias", Bias(bias=bias), builder.add("zero", Constant(value=0.0)))
+        builder.add("limited", Saturation(lower=-1.0, upper=1.0), constant)
+        return builder.build()
+
+    with pytest.raises(InputError, match=r"event of 'sign' at the start moves .* 'wave.phase'"):
+        ab.sensitivity(diagram(0.0, 0.0), "wave.phase", "x")
+    with pytest.raises(InputError, match=r"'limited' starts exactly at a limit .* 'bias.bias'"):
+        ab.sensitivity(diagram(0.5, 1.0), "bias.bias", "limited")
+    result = ab.sensitivity(diagram(0.5, 0.0), ["wave.phase", "bias.bias"], ["x", "limited"], **TIGHT)
+    # The sign changes at pi - 0.5, earlier by a change of the phase.
+    assert result["x", "wave.phase"][-1] == pytest.approx(-2.0, abs=1e-8)
+    assert np.array_equal(result["limited", "bias.bias"], np.ones(result.time.size))

@@ -1,13 +1,16 @@
-"""Events at the start of a run that a change of a parameter would move into the run or before it.
+"""Parameters without a derivative at the start of a run.
 
-The derivatives for a change that moves the event into the run, and for a change that moves it before the run,
-differ. They are equal only if flow and signals are the same on both sides of the event. The start is
-evaluated once, in Python, before a run.
+A change of a parameter can move an event at the start into the run or before it. The derivatives for both
+differ, unless flow and signals are the same on both sides of the event. A change can also move a block that
+starts exactly at a limit or at a jump to one of its sides. The start is evaluated once, in Python, before a
+run.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from casadi import SX, Function, densify, jtimes, vertcat
@@ -32,16 +35,20 @@ CLOSER = 1.0 / 16.0
 """The ratio of two changes of a parameter."""
 SHORT = 0.01
 """A kink that the run leaves within this time (s) does not count."""
+MAX_NEWTON_STEPS, SAME_SOLUTION = 50, 1e-13
+"""Newton's method for implicit equations: its maximum number of steps, and the relative last step."""
 
 
 def refuse_moving_start(system: HybridSystem, parameters: Sequence[str]) -> None:
-    """Raise ``InputError`` if an event is at the start, depends on a parameter, and its two sides differ.
+    """Raise ``InputError`` for a parameter without a derivative at the start of a run.
 
-    Diagrams with implicit equations are not checked, because their unknowns are not solved yet.
+    An event is at the start, depends on the parameter, and its two sides differ; or a block starts exactly at
+    a limit or at a jump. If implicit equations have no solution here, nothing is checked: the run reports it.
     """
-    if system.algebraic.size:
+    try:
+        start = _Start(_Equations(system))
+    except _UnsolvedError:
         return
-    start = _Start(system)
     for name in parameters:
         entries = system.parameters.range_of(name)
         guards = [system.guard_names[guard] for guard in start.moving_guards(entries)]
@@ -61,40 +68,193 @@ def refuse_moving_start(system: HybridSystem, parameters: Sequence[str]) -> None
             )
 
 
-class _Start:
-    """The time 0 of a run, after the ticks and with consistent modes."""
+class _UnsolvedError(ArithmeticError):
+    """Newton's method finds no solution of the implicit equations."""
 
-    def __init__(self, system: HybridSystem, p: Array | None = None) -> None:
+
+class _Point(NamedTuple):
+    """States, discrete variables and unknowns, each (n,)."""
+
+    x: Array
+    z: Array
+    w: Array
+
+
+class _Equations:
+    """The functions of a system at t = 0 and their derivatives along a direction, each built once."""
+
+    def __init__(self, system: HybridSystem) -> None:
+        self.system = system
+        self.symbols = list(system.signals.arguments)
+        """``t, x, z, w, p``."""
+        self.direction = [SX.sym(f"along {k}", symbol.numel()) for k, symbol in enumerate(self.symbols)]
+        self._reading: dict[int, bool] = {}
+
+    def numbers(self, function: Function, *arguments: Array) -> list[Array]:
+        """The values of a function, each a flat array."""
+        key = id(function)
+        if key not in self._reading:
+            self._reading[key] = reads_tables(function)
+        reads = self._reading[key]
+        values = evaluate_with_reads(function, arguments) if reads else function.call(list(arguments))
+        return [np.array(value, dtype=np.float64).ravel() for value in values]
+
+    def along(self, function: Function, point: _Point, p: Array, direction: Sequence[Array]) -> Array:
+        """The derivative of a column along changes of ``t, x, z, p``; ``function`` is one of the derivatives
+        of this class. The unknowns follow from the implicit equations."""
+        moved_t, moved_x, moved_z, moved_p = direction
+        moved_w: Array = np.zeros(point.w.size)
+        at = [np.zeros(1), *point, p]
+        if point.w.size:
+            moved = self.numbers(self.residual_along, *at, moved_t, moved_x, moved_z, moved_w, moved_p)[0]
+            try:
+                moved_w = np.asarray(-np.linalg.solve(self.jacobian(point, p), moved), dtype=np.float64)
+            except np.linalg.LinAlgError:
+                raise _UnsolvedError from None
+        return self.numbers(function, *at, moved_t, moved_x, moved_z, moved_w, moved_p)[0]
+
+    def jacobian(self, point: _Point, p: Array) -> Array:
+        """The derivatives of the implicit equations with respect to the unknowns, (n, n)."""
+        n = point.w.size
+        (matrix,) = self.numbers(self._functions["residual_jacobian"], np.zeros(1), *point, p)
+        return matrix.reshape(n, n)
+
+    def at(self, name: str, point: _Point, p: Array, *arguments: Array) -> list[Array]:
+        """The values of a function of the system."""
+        return self.numbers(self._functions[name], np.zeros(1), *point, p, *arguments)
+
+    def solved(self, x: Array, z: Array, guess: Array, p: Array) -> _Point:
+        """The point with the solution of the implicit equations. Raises ``_UnsolvedError``."""
+        point = _Point(x, z, guess)
+        for _ in range(MAX_NEWTON_STEPS if guess.size else 0):
+            (residual,) = self.at("residual", point, p)
+            try:
+                step = np.linalg.solve(self.jacobian(point, p), residual)
+            except np.linalg.LinAlgError:
+                raise _UnsolvedError from None
+            point = _Point(x, z, point.w - step)
+            if (np.abs(step) <= SAME_SOLUTION * (1.0 + np.abs(point.w))).all():
+                return point
+        if guess.size:
+            raise _UnsolvedError
+        return point
+
+    @cached_property
+    def _functions(self) -> dict[str, Function]:
+        names = ("signals", "derivative", "guards", "residual", "residual_jacobian", "update", "reset")
+        return {name: getattr(self.system, name).casadi_function() for name in names}
+
+    @cached_property
+    def initial(self) -> Function:
+        """The initial states and discrete variables, from p."""
+        return Function("initial", [self.symbols[4]], [vertcat(*self._initial_columns)])
+
+    @cached_property
+    def initial_along(self) -> Function:
+        """The derivatives of the initial states and of the initial discrete variables, from p and its
+        change."""
+        p, moved = self.symbols[4], self.direction[4]
+        rates = [_along(column, p, moved) for column in self._initial_columns]
+        return Function("initial", [p, moved], rates)
+
+    @property
+    def _initial_columns(self) -> list[SX]:
+        initial = (self.system.initial_states, self.system.initial_discrete)
+        return [_in_symbols(traced, [self.symbols[4]]) for traced in initial]
+
+    @cached_property
+    def values_along(self) -> Function:
+        """The derivative of the signals and of the flow."""
+        return self._derivative(vertcat(*(self._column(name) for name in ("signals", "derivative"))))
+
+    @cached_property
+    def guards_along(self) -> Function:
+        return self._derivative(self._column("guards"))
+
+    @cached_property
+    def residual_along(self) -> Function:
+        return self._derivative(self._column("residual"))
+
+    @cached_property
+    def reset_along(self) -> Function:
+        """The derivative of the states after a reset without events."""
+        traced = self.system.reset
+        no_event = SX.zeros(len(self.system.guard_directions))
+        after = _in_symbols(traced, [*self.symbols, no_event])
+        return self._derivative(after[: self.symbols[1].numel(), :])
+
+    @cached_property
+    def guard_rates(self) -> Function:
+        """The guards and their time derivatives up to the third order, with constant unknowns."""
+        t, x = self.symbols[:2]
+        rates = [self._column("guards")]
+        direction = vertcat(SX(1.0), self._column("derivative"))
+        for _ in range(3):
+            rates.append(_along(rates[-1], vertcat(t, x), direction))
+        return Function("rates", self.symbols, [densify(rate) for rate in rates])
+
+    def _column(self, name: str) -> SX:
+        return _in_symbols(getattr(self.system, name), self.symbols)
+
+    def _derivative(self, column: SX) -> Function:
+        rate = _along(column, vertcat(*self.symbols), vertcat(*self.direction))
+        return Function("along", [*self.symbols, *self.direction], [rate])
+
+
+def _along(column: SX, symbols: SX, direction: SX) -> SX:
+    return densify(jtimes(column, symbols, direction)) if column.numel() else column
+
+
+def _in_symbols(traced: TracedFunction, symbols: list[SX]) -> SX:
+    """All results of a function in one column, in other symbols."""
+    function = Function("f", list(traced.arguments), [vertcat(*traced.results, SX(0, 1))])
+    (column,) = function.call(symbols, True, False)
+    return densify(column)
+
+
+class _Start:
+    """The time 0 of a run, after the ticks and with consistent modes. Raises ``_UnsolvedError``."""
+
+    def __init__(self, equations: _Equations, p: Array | None = None) -> None:
+        self.equations, system = equations, equations.system
         self.system = system
         p = self.p = np.asarray(system.parameter_values if p is None else p, dtype=np.float64)
-        x, z = system.initial_states(p)[0].ravel(), system.initial_discrete(p)[0].ravel()
+        (values,) = equations.numbers(equations.initial, p)
+        self.initial = values
+        x, z = np.split(values, [system.states.size])
+        (guess,) = (column.ravel() for column in system.initial_algebraic(p))
         marks = np.array([float(clock.offset == 0.0) for clock in system.clocks])
         self._no_event = np.zeros(len(system.guard_directions))
+        point = equations.solved(x, z, guess, p)
         for ticking, follows_events in system.ticks_by_level(marks):
             if follows_events:
-                x, z = self._consistent(x, z)
-            (z,) = self._at(system.update, x, z, ticking)
-        self.before = (x, z)
-        self.after = self._consistent(x, z)
+                point = self._consistent(point)
+            (z,) = equations.at("update", point, p, ticking)
+            point = equations.solved(point.x, z, point.w, p)
+        self.before = point
+        self.after = self._consistent(point)
 
-    def _consistent(self, x: Array, z: Array) -> tuple[Array, Array]:
-        """States and discrete variables after resets without events."""
+    def _consistent(self, point: _Point) -> _Point:
+        """States, discrete variables and unknowns after resets without events."""
         for _ in range(self._no_event.size):
-            new_x, new_z = self._at(self.system.reset, x, z, self._no_event)
-            same = np.array_equal(new_x, x) and np.array_equal(new_z, z)
-            x, z = new_x, new_z
+            x, z = self._reset(point, self._no_event)
+            same = np.array_equal(x, point.x) and np.array_equal(z, point.z)
+            point = self.equations.solved(x, z, point.w, self.p)
             if same:
                 break
-        return x, z
+        return point
 
-    def _at(self, traced: TracedFunction, x: Array, z: Array, *arguments: Array) -> tuple[Array, ...]:
-        return tuple(value.ravel() for value in traced(0.0, x, z, np.empty(0), self.p, *arguments))
+    def _reset(self, point: _Point, event: Array) -> list[Array]:
+        values = np.concatenate(self.equations.at("reset", point, self.p, event))
+        return np.split(values, [point.x.size])
 
     def moving_guards(self, entries: slice) -> list[int]:
         """The guards that are zero, depend on one of these parameters, and whose two sides differ."""
+        if not self.system.guard_directions:
+            return []
         guards: set[int] = set()
         for point in (self.before, self.after):
-            g, rate, moves = self._guards(*point, entries)
+            g, rate, moves = self._guards(point, entries)
             zero = np.isfinite(rate) & (np.abs(g) <= ZERO_TOLERANCE * np.abs(rate)) & (rate != 0.0)
             for guard in np.flatnonzero(zero & (moves > ZERO_TOLERANCE * np.abs(rate))).tolist():
                 direction = self.system.guard_directions[guard]
@@ -107,16 +267,12 @@ class _Start:
     def held_states(self, entries: slice) -> list[str]:
         """The blocks with states whose derivative with respect to these parameters is changed by the reset at
         the start."""
-        system = self.system
-        t, x, z, w, p, e = system.reset.arguments
-        after = vertcat(*system.reset.results)[: x.numel(), :]
-        changes: list[SX] = []
-        for of_states, of_discrete, seed in self._initial_rates(p, entries):
-            changes.append(jtimes(after, vertcat(x, z, p), vertcat(of_states, of_discrete, seed)) - of_states)
-        values = self._numbers([t, x, z, w, p, e], changes, self.after, np.zeros(e.numel()))
-        largest = np.abs(np.array(values)).max(axis=0)
-        names = [element for slot in system.states for element in slot.elements]
-        return [names[index].rpartition("/")[0] for index in np.flatnonzero(largest > ZERO_TOLERANCE)]
+        changed = np.zeros(self.system.states.size)
+        for direction in self._initial_directions(entries):
+            after = self.equations.along(self.equations.reset_along, self.after, self.p, direction)
+            changed = np.maximum(changed, np.abs(after - direction[1]))
+        names = [element for slot in self.system.states for element in slot.elements]
+        return [names[index].rpartition("/")[0] for index in np.flatnonzero(changed > ZERO_TOLERANCE)]
 
     def kinks(self, entries: slice) -> list[str]:
         """The blocks with values at the start that have no derivative with respect to a parameter: an initial
@@ -126,143 +282,112 @@ class _Start:
         difference decreases with the change of the parameter, except at a kink or a jump. A kink that the
         run leaves at once does not count.
         """
-        blocks = [element.rpartition("/")[0] for element in self._elements()]
+        system = self.system
+        layouts = (system.states, system.discrete, system.signals_layout, system.states)
+        elements: list[str] = [
+            element for layout in layouts for slot in layout.slots for element in slot.elements
+        ]
         found: dict[str, None] = {}
         for index in range(entries.start, entries.stop):
             if not np.isfinite(self.p[index]):
                 continue
             for sign in (-1.0, 1.0):
                 step = sign * KINK_STEP * (1.0 + abs(self.p[index]))
-                far, near = self._changed(index, step), self._changed(index, step * CLOSER)
+                try:
+                    far, near = self._changed(index, step), self._changed(index, step * CLOSER)
+                except _UnsolvedError:
+                    continue
                 error, limit = self._error(index, step, far)
                 remaining, _ = self._error(index, step * CLOSER, near)
                 kinks = np.flatnonzero((error > limit) & (remaining > error / 2.0))
                 if kinks.size and self._lasts(far, near):
-                    found[blocks[kinks[0]]] = None
+                    found[elements[int(kinks[0])].rpartition("/")[0]] = None
         return list(found)
 
     def _changed(self, index: int, step: float) -> _Start:
         """The start with one parameter changed by a step."""
         p = self.p.copy()
         p[index] += step
-        return _Start(self.system, p)
+        return _Start(self.equations, p)
 
     def _lasts(self, far: _Start, near: _Start) -> bool:
         """Whether modes that change with a parameter stay changed: whether no mode changes, or a guard that
         is zero only for the unchanged parameter does not move. ``far`` and ``near`` are starts with two
         changes of the parameter in the ratio 1 to ``CLOSER``."""
         modes = list(self.system.modes)
-        if np.array_equal(self.after[1][modes], far.after[1][modes]):
+        if np.array_equal(self.after.z[modes], far.after.z[modes]):
             return True
-        g, rates = far._guard_rates()[0], near._guard_rates()
+        g, rates = (
+            self.equations.numbers(self.equations.guard_rates, np.zeros(1), *side.after, side.p)
+            for side in (far, near)
+        )
         here = np.abs(rates[0])
         with np.errstate(invalid="ignore"):  # infinite guards
-            through_zero = (here > 0.0) & (np.abs(g - rates[0] / CLOSER) <= 0.1 * np.abs(g))
+            through_zero = (here > 0.0) & (np.abs(g[0] - rates[0] / CLOSER) <= 0.1 * np.abs(g[0]))
         moves = np.array([np.abs(rate) * SHORT**order > here for order, rate in enumerate(rates)][1:])
         return bool((through_zero & ~moves.any(axis=0)).any())
 
-    def _guard_rates(self) -> list[Array]:
-        """The guards at the start, and their time derivatives up to the third order."""
-        t, x, z, w, p = self.system.guards.arguments
-        rates = [vertcat(*self.system.guards.results, SX(0, 1))]
-        direction = vertcat(SX(1.0), self._flow(t, x, z, w, p))
-        for _ in range(3):
-            rates.append(jtimes(rates[-1], vertcat(t, x), direction))
-        return self._numbers([t, x, z, w, p], rates, self.after)
+    @cached_property
+    def _values(self) -> Array:
+        """The initial states and discrete variables, the signals and the flow at the start."""
+        return np.concatenate([self.initial, self._present(self.after)])
+
+    def _present(self, point: _Point) -> Array:
+        """The signals and the flow."""
+        names = ("signals", "derivative")
+        return np.concatenate([column for name in names for column in self.equations.at(name, point, self.p)])
 
     def _error(self, index: int, step: float, side: _Start) -> tuple[Array, Array]:
         """The difference between the derivatives of all values by a step of one parameter and by the
         equations, and the smallest difference that counts. ``side`` is the start after the step."""
-        values = self._values()
+        values = self._values
         with np.errstate(invalid="ignore", over="ignore"):  # infinite values have no difference
             rate = self._rate(index, side, step)
-            error = np.abs((side._values() - values) / step - rate)
+            error = np.abs((side._values - values) / step - rate)
             return error, KINK * (1.0 + np.abs(rate)) + ROUNDING * np.abs(values / step)
 
-    def _elements(self) -> list[str]:
-        """The names of the elements of :meth:`_values`."""
-        system = self.system
-        layouts = (system.states, system.discrete, system.signals_layout, system.states)
-        return [element for layout in layouts for slot in layout for element in slot.elements]
-
-    def _values(self) -> Array:
-        """The initial states and discrete variables, the signals and the flow at the start."""
-        system = self.system
-        initial = [*system.initial_states(self.p), *system.initial_discrete(self.p)]
-        present = [*self._at(system.signals, *self.after), *self._at(system.derivative, *self.after)]
-        return np.concatenate([column.ravel() for column in (*initial, *present)])
-
     def _rate(self, index: int, side: _Start, step: float) -> Array:
-        """The derivatives of :meth:`_values` with respect to one parameter, with constant modes. ``side`` is
-        the start with this parameter changed by ``step``."""
-        t, x, z, w, p = self.system.signals.arguments
-        ((of_states, of_discrete, seed),) = self._initial_rates(p, slice(index, index + 1))
-        of_x, of_z = ((b - a) / step for a, b in zip(self.after, side.after))
+        """The derivatives of all values with respect to one parameter, with constant modes. ``side`` is the
+        start with this parameter changed by ``step``."""
+        ((zero, of_states, of_discrete, seed),) = self._initial_directions(slice(index, index + 1))
+        of_x, of_z = (side.after.x - self.after.x) / step, (side.after.z - self.after.z) / step
         of_z[list(self.system.modes)] = 0.0
-        values = vertcat(*self.system.signals.results, self._flow(t, x, z, w, p))
-        rate = jtimes(values, vertcat(x, z, p), vertcat(of_x, of_z, seed))
-        return self._numbers([t, x, z, w, p], [vertcat(of_states, of_discrete, rate)], self.after)[0]
+        direction = (zero, of_x, of_z, seed)
+        rate = self.equations.along(self.equations.values_along, self.after, self.p, direction)
+        return np.concatenate([of_states, of_discrete, rate])
 
-    def _initial_rates(self, p: SX, entries: slice) -> list[tuple[SX, SX, SX]]:
-        """For each parameter entry the derivatives of the initial states and discrete variables, and its unit
-        vector."""
-        rates_by_entry: list[tuple[SX, SX, SX]] = []
+    def _initial_directions(self, entries: slice) -> list[tuple[Array, Array, Array, Array]]:
+        """For each parameter entry the derivatives of time (0), of the initial states and discrete variables,
+        and of the parameters."""
+        directions: list[tuple[Array, Array, Array, Array]] = []
         for index in range(entries.start, entries.stop):
-            seed = SX.zeros(p.numel())
+            seed = np.zeros(self.p.size)
             seed[index] = 1.0
-            rates: list[SX] = []
-            for traced in (self.system.initial_states, self.system.initial_discrete):
-                (own,) = traced.arguments
-                initial = Function("i", [own], [vertcat(*traced.results, SX(0, 1))])
-                (value,) = initial.call([p], True, False)
-                rates.append(densify(jtimes(value, p, seed)) if value.numel() else value)
-            rates_by_entry.append((rates[0], rates[1], seed))
-        return rates_by_entry
+            x, z = self.equations.numbers(self.equations.initial_along, self.p, seed)
+            directions.append((np.zeros(1), x, z, seed))
+        return directions
 
-    def _guards(self, x: Array, z: Array, entries: slice) -> tuple[Array, Array, Array]:
+    def _guards(self, point: _Point, entries: slice) -> tuple[Array, Array, Array]:
         """The guards, their time derivatives, and their largest derivative with respect to the parameters,
         each (ng,)."""
-        t, states, discrete, w, p = self.system.guards.arguments
-        g = vertcat(*self.system.guards.results)
-        f = self._flow(t, states, discrete, w, p)
-        moves = [
-            jtimes(g, vertcat(states, discrete, p), vertcat(*rates))
-            for rates in self._initial_rates(p, entries)
-        ]
-        rate = jtimes(g, vertcat(t, states), vertcat(SX(1.0), f))
-        values = self._numbers([t, states, discrete, w, p], [g, rate, *moves], (x, z))
-        return values[0], values[1], np.abs(np.array(values[2:])).max(axis=0)
-
-    def _flow(self, *symbols: SX) -> SX:
-        """The derivative of the states in other symbols ``t, x, z, w, p``."""
-        derivative = self.system.derivative
-        flow = Function("f", list(derivative.arguments), [vertcat(*derivative.results, SX(0, 1))])
-        (xd,) = flow.call(list(symbols), True, False)
-        return xd
-
-    def _numbers(
-        self, symbols: list[SX], results: list[SX], point: tuple[Array, Array], *further_arguments: Array
-    ) -> list[Array]:
-        """The values of expressions in ``symbols`` at the start; ``further_arguments`` follow ``t, x, z, w,
-        p``."""
-        arguments = [np.zeros(1), *point, np.empty(0), self.p, *further_arguments]
-        function = Function("f", symbols, [densify(result) for result in results])
-        values = (
-            evaluate_with_reads(function, arguments) if reads_tables(function) else function.call(arguments)
+        equations = self.equations
+        (g,), (flow,) = (equations.at(name, point, self.p) for name in ("guards", "derivative"))
+        with_time = (np.ones(1), flow, np.zeros(point.z.size), np.zeros(self.p.size))
+        rate, *moves = (
+            equations.along(equations.guards_along, point, self.p, direction)
+            for direction in (with_time, *self._initial_directions(entries))
         )
-        return [np.array(value, dtype=np.float64).ravel() for value in values]
+        return g, rate, np.abs(np.array(moves)).max(axis=0)
 
     def _sides_differ(self, guard: int) -> bool:
         """Whether the flow or a signal jumps where a guard of both directions fires."""
-        sides: list[tuple[Array, ...]] = [self.after]
+        others: list[Array] = []
         for direction in (-1.0, 1.0):
             event = np.zeros(len(self.system.guard_directions))
             event[guard] = direction
-            sides.append(self._at(self.system.reset, *self.after, event))
-        present, *others = (
-            np.concatenate([*self._at(self.system.derivative, *side), *self._at(self.system.signals, *side)])
-            for side in sides
-        )
+            x, z = self._reset(self.after, event)
+            others.append(self._present(self.equations.solved(x, z, self.after.w, self.p)))
+        present = self._present(self.after)
         with np.errstate(invalid="ignore"):
             limit = DERIVATIVE_TOLERANCE * (1.0 + np.abs(present))
             return any((np.abs(present - other) > limit).any() for other in others)
