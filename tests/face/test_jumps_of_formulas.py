@@ -172,6 +172,14 @@ def test_a_remainder_has_a_derivative_if_its_divisor_is_zero_or_becomes_zero() -
         expected = np.tile(0.5 + result.time[:, np.newaxis], 2)
         np.testing.assert_allclose(result["y", "u.gain"], expected, atol=1e-12)
 
+        builder = ab.DiagramBuilder("many jumps")
+        fall = builder.add("v", Gain(), builder.add("time", Ramp(initial=1.0, slope=-0.8)))
+        u = builder.add("u", Constant(value=-9.81))
+        builder.add("y", Modulo(zero_crossing=zero_crossing), u, fall)
+        result = ab.sensitivity(builder.build(), "v.gain", "y", stop_time=1.0, sample_time=0.1)
+        v = result.run["v"]
+        np.testing.assert_allclose(result["y", "v.gain"], -np.floor(-9.81 / v) * v, rtol=1e-12)
+
 
 def test_a_formula_that_is_not_a_number_ends_a_run_with_derivatives_by_this_reason() -> None:
     builder = ab.DiagramBuilder("nan")

@@ -4,7 +4,7 @@
 is used as a mode, so that the remainder is smooth between two events.
 
 If |n| is greater than 2**44, the rounding error of u is not small compared with v, and the remainder is
-arbitrary. There, and for a zero or infinite divisor, n counts as 0, no event occurs, and the remainder is
+arbitrary. There, and for a zero or huge divisor, n counts as 0, no event occurs, and the remainder is
 computed directly.
 """
 
@@ -14,8 +14,8 @@ from casadi import SX, fabs, floor, fmod, if_else, logic_and, sign
 
 OFFSET = 1e-300
 """Offset of a guard that gives zero a definite sign. It is below the resolution of any signal."""
-LARGEST_QUOTIENT = 2.0**44
-"""The quotient u / v from which on n is not computed."""
+LARGEST_QUOTIENT, LARGEST_DIVISOR = 2.0**44, 2.0**900
+"""The quotient u / v and the divisor from which on n is not computed."""
 
 
 def nearest(u: SX) -> SX:
@@ -39,9 +39,29 @@ def quotient_of(function: str, u: SX, v: SX) -> SX:
 
 
 def remainder_for_quotient(function: str, u: SX, v: SX, quotient: SX) -> SX:
-    """The remainder u - n v for a given n, also slightly beyond the ends of its interval."""
-    differs = logic_and(_has_quotient(u, v), quotient_of(function, u, v) != quotient)
-    return if_else(differs, u - quotient * v, remainder(function, u, v))
+    """The remainder u - n v for a given n, also slightly beyond the ends of its interval, rounded once.
+
+    For a consistent n it equals :func:`remainder`, which jumps, and which is evaluated only if no n is
+    computed.
+    """
+    known = _has_quotient(u, v)
+    product = quotient * v
+    rest = (u - product) - _rounding_error(quotient, v, product)
+    return if_else(known, rest, remainder(function, if_else(known, 0.0, u), if_else(known, 1.0, v)))
+
+
+def _rounding_error(a: SX, b: SX, product: SX) -> SX:
+    """The exact difference between a b and the rounded product (Dekker, Numerische Mathematik 18, 1971,
+    224-242)."""
+    (a_high, a_low), (b_high, b_low) = _halves(a), _halves(b)
+    return ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
+
+
+def _halves(a: SX) -> tuple[SX, SX]:
+    """Two doubles of at most 26 bits with the sum a (Veltkamp)."""
+    scaled = (2.0**27 + 1.0) * a
+    high = scaled - (scaled - a)
+    return high, a - high
 
 
 def beyond_ends(function: str, u: SX, v: SX, quotient: SX) -> tuple[SX, SX]:
@@ -64,4 +84,4 @@ def beyond_ends(function: str, u: SX, v: SX, quotient: SX) -> tuple[SX, SX]:
 
 
 def _has_quotient(u: SX, v: SX) -> SX:
-    return logic_and(fabs(u) < LARGEST_QUOTIENT * fabs(v), fabs(v) < float("inf"))
+    return logic_and(fabs(u) < LARGEST_QUOTIENT * fabs(v), fabs(v) < LARGEST_DIVISOR)
