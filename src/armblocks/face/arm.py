@@ -135,9 +135,10 @@ class Arm(NativeFunctions):
     def maniplty(self, q: ArrayLike, kind: str = "yoshikawa", axes: str = "all") -> Array:
         """A measure of the mobility of the tool at ``q`` (nq,) or (N, nq); 0 at a singularity.
 
-        ``"yoshikawa"``: product of the singular values of the Jacobian; ``"asada"``: smallest over largest
-        eigenvalue of ``cinertia``; ``"condition"``: smallest over largest singular value; ``"smallest"``
-        singular value. ``axes``: ``"all"``, ``"trans"`` or ``"rot"``. The units of ``"all"`` are mixed.
+        - ``kind``: ``"yoshikawa"`` is the product of the singular values of the Jacobian, ``"asada"`` the
+          smallest over the largest eigenvalue of ``cinertia``, ``"condition"`` the smallest over the largest
+          singular value, and ``"smallest"`` the smallest singular value.
+        - ``axes``: ``"all"``, ``"trans"`` or ``"rot"``. The units of ``"all"`` are mixed.
         """
         return manipulability_of(self.jacob0, self.inertia, q, kind, axes, f"maniplty of robot '{self.name}'")
 
@@ -223,9 +224,13 @@ class Arm(NativeFunctions):
 
         The closed form exists for arms with six joints and a spherical wrist or three parallel axes, for arms
         with only parallel axes (SCARA, planar), and for palletisers. It also exists for arms of these types
-        with three to five joints. Every branch is checked by forward kinematics to ``tolerance`` (m and rad,
-        of the tool). ``T`` and ``limits`` as for :meth:`ikine`; angles are shifted by full turns into the
-        limits if possible, else to the value nearest to zero. ``frame``: fixed to the link of the tool.
+        with three to five joints.
+
+        - ``T``, ``limits``: as for :meth:`ikine`. Angles are shifted by full turns into the limits if
+          possible, else to the value nearest to zero.
+        - ``frame``: a frame that is fixed to the link of the tool.
+        - ``tolerance``: every branch is checked by forward kinematics to this error of the tool, m and rad.
+
         Raises RobotError with the reason for other arms.
         """
         return self._inverse.branches(T, limits, frame, tolerance, threads)
@@ -235,10 +240,13 @@ class Arm(NativeFunctions):
     ) -> IkineResult:
         """Find the solution with the letters of the toolbox's ``ikine6s``, in closed form.
 
-        For arms with six revolute joints, parallel axes 2 and 3, and a spherical wrist. ``l`` or ``r``: left
-        or right-handed, ``u`` or ``d``: elbow up or down, ``n`` or ``f``: wrist not flipped or flipped, as in
-        release 10 and the Python toolbox. The arm is right-handed if the centre of the wrist is on the side
-        of ``z1 × z2`` of axis 1, where z1 and z2 are the directions of axes 1 and 2.
+        For arms with six revolute joints, parallel axes 2 and 3, and a spherical wrist. The letters of
+        ``configuration`` are those of release 10 and of the Python toolbox:
+
+        - ``l`` or ``r``: left or right-handed. The arm is right-handed if the centre of the wrist is on the
+          side of ``z1 × z2`` of axis 1, where z1 and z2 are the directions of axes 1 and 2.
+        - ``u`` or ``d``: elbow up or down.
+        - ``n`` or ``f``: wrist not flipped or flipped.
         """
         return self._inverse.with_letters(T, configuration, limits, threads)
 
@@ -256,10 +264,13 @@ class Arm(NativeFunctions):
     ) -> ArmMotionResult:
         """Simulate ``duration`` s from ``q0``, ``qd0`` under joint torques; ``t, q, qd = arm.fdyn(2.0)``.
 
-        ``torque``: none, (n,) constant, or a function with any of the arguments ``t, q, qd``. The function is
-        traced and compiled (:class:`PythonFunction`). With ``sample_time`` (s) it is called at each tick
-        instead, and may then branch on values. Coulomb friction sticks. ``dt``: interval of the samples.
-        ``settings``: of ``ab.simulate``.
+        - ``torque``: none, (n,) constant, or a function with any of the arguments ``t, q, qd``. The function
+          is traced and compiled (:class:`PythonFunction`).
+        - ``sample_time`` (s): the function is called at each tick instead, and may then branch on values.
+        - ``dt``: interval of the samples, s.
+        - ``settings``: of ``ab.simulate``.
+
+        Coulomb friction sticks.
         """
         return simulate_arm(self.robot, duration, torque, q0, qd0, sample_time, dt, settings)
 
@@ -293,12 +304,16 @@ class Arm(NativeFunctions):
     ) -> Any:
         """Show the arm at ``q`` (nq,), or a motion ``q`` (N, nq), with a slider for each joint.
 
-        In a notebook the result is a widget; elsewhere the 3-D page opens in the browser, and the call
-        returns at once. ``block`` waits until the page is closed. ``q`` of the result are the coordinates at
-        the sliders. ``save``: write a file instead, ``.png``, ``.svg`` or ``.pdf``, and return its path; a
-        motion is drawn as its last pose, its first pose (pale) and the path of the tool. ``theme``:
-        ``"light"``, ``"dark"``, or by default the theme of the viewer. ``size``: width and height, px (files,
-        widgets). ``view``: azimuth and elevation of the camera of a file, degrees.
+        In a notebook the result is a widget. Elsewhere the 3-D page opens in the browser, and the call
+        returns at once. The attribute ``q`` of the result has the coordinates at the sliders.
+
+        - ``q``: rad or m; by default the neutral configuration.
+        - ``save``: write a file instead, ``.png``, ``.svg`` or ``.pdf``, and return its path. A motion is
+          drawn as its last pose, its first pose (pale) and the path of the tool.
+        - ``block``: wait until the page is closed.
+        - ``theme``: ``"light"``, ``"dark"``, or by default the theme of the viewer.
+        - ``size``: width and height, px, of files and widgets.
+        - ``view``: azimuth and elevation of the camera of a file, degrees.
 
         Raises InputError for a wrong shape of ``q``, UnknownNameError for an unsupported suffix.
         """
@@ -320,13 +335,17 @@ class Arm(NativeFunctions):
         view: tuple[float, float] | None = None,
         progress: FilmProgress | None = None,
     ) -> Any:
-        """Play a motion: ``q`` (N, nq) with ``dt`` s between rows, or at times ``dt`` (N,), or a trajectory.
+        """Play a motion as a widget in a notebook, else on a browser page, as for :meth:`plot`.
 
-        The view is a widget in a notebook, else a browser page, as for :meth:`plot`. The default of ``dt`` is
-        0.05 s. ``save``: write a video instead, ``.mp4`` or ``.gif``, and return its path; ``.png`` and
-        ``.svg`` show the path of the tool. Videos need the extra ``film``. ``rate``: frames per second.
-        ``speed`` 2 plays twice as fast. ``progress(done, all)`` is called after each frame. Ctrl-C leaves an
-        existing file unchanged.
+        - ``q``: coordinates (N, nq), rad or m, or a trajectory.
+        - ``dt``: the time between rows, s, by default 0.05; or the times (N,) of the rows. By default a
+          trajectory has its own times.
+        - ``save``: write a video instead, ``.mp4`` or ``.gif``, and return its path. ``.png``, ``.svg`` and
+          ``.pdf`` show the path of the tool. Videos need the extra ``film``.
+        - ``rate``: frames per second of a video.
+        - ``speed``: 2 plays the video twice as fast.
+        - ``block``, ``theme``, ``size``, ``view``: as for :meth:`plot`.
+        - ``progress(done, all)`` is called after each frame. Ctrl-C leaves an existing file unchanged.
         """
         from armblocks.face import arm_views
 

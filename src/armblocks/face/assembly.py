@@ -21,12 +21,15 @@ Array = NDArray[np.float64]
 class Assembly(metaclass=ArgumentErrors):
     """A state that satisfies the constraints of a robot.
 
-    ``q`` (nq,) rad or m and ``qd`` (n,) rad/s or m/s. ``degrees_of_freedom``: of the mechanism at regular
-    configurations. ``instantaneous_mobility``: degrees of freedom at ``q``, larger where q is singular.
-    ``redundant``: the number of redundant equations of each constraint. ``residual``: the largest
-    residual, m or cosine of an angle. ``free_joints``: the joints that can move at a singular ``q``.
-    ``branches`` (b, n): for one degree of freedom, the directions of the motions through a singular q, each
-    of length 1; with two or more, q is a bifurcation, where the mechanism can change to another branch.
+    - ``q`` (nq,) rad or m, ``qd`` (n,) rad/s or m/s: the state.
+    - ``degrees_of_freedom``: of the mechanism at regular configurations.
+    - ``instantaneous_mobility``: degrees of freedom at ``q``, larger where ``q`` is singular.
+    - ``redundant``: the number of redundant equations of each constraint.
+    - ``residual``: the largest residual, m or cosine of an angle.
+    - ``free_joints``: the joints that can move at a singular ``q``.
+    - ``branches`` (b, n): for one degree of freedom, the directions of the motions through a singular ``q``,
+      each of length 1. With two or more, ``q`` is a bifurcation, where the mechanism can change to another
+      branch.
     """
 
     q: Array

@@ -37,9 +37,11 @@ _PENALTY = 20.0
 class Excitation(metaclass=ArgumentErrors):
     """A periodic motion for identification, at rest at both ends.
 
-    ``condition``: condition number of the regressor of the base parameters along the motion, with columns of
-    length 1 and torques in units of their limits; near 10 is very good, above 100 poor. ``evaluations``:
-    number of evaluated motions. ``stopped``: whether Ctrl-C ended the search.
+    - ``trajectory``: the motion.
+    - ``condition``: condition number of the regressor of the base parameters along the motion, with columns
+      of length 1 and torques in units of their limits. Values near 10 are very good, values above 100 poor.
+    - ``evaluations``: number of evaluated motions.
+    - ``stopped``: whether Ctrl-C ended the search.
     """
 
     trajectory: JointTrajectory = field(repr=False)
@@ -67,13 +69,21 @@ def excitation(
 ) -> Excitation:
     """Find a motion of ``duration`` s along which the parameters of an arm can be identified.
 
-    Each joint moves by a Fourier series with ``harmonics`` terms of the frequency 1 / ``duration``, at rest
-    (speed and acceleration 0) at start and end. The motion is within the position limits of the robot and the
-    limits of ``speed`` (rad/s or m/s), ``acceleration`` and ``torque``, by default the limits of the robot. A
-    seeded random search minimises the condition number of the regressor of the base parameters, friction
-    included. ``progress(evaluations, condition)`` is called at each improvement; Ctrl-C ends the search with
-    the best motion so far. ``dt`` (s): about the time between samples, a fraction of the duration. Collisions
-    are not checked: view the motion with ``arm.animate`` first.
+    Each joint moves by a Fourier series, at rest (speed and acceleration 0) at start and end. The motion is
+    within the position limits of the robot. A random search minimises the condition number of the regressor
+    of the base parameters, friction included. Collisions are not checked: view the motion with
+    ``arm.animate`` first.
+
+    - ``harmonics``: the number of terms of each series, 2 to 100. Their frequencies are the multiples of 1 /
+      ``duration``.
+    - ``speed`` (rad/s or m/s), ``acceleration`` (rad/s² or m/s²), ``torque`` (N m or N): limits of the
+      motion, numbers or (n,). By default speeds and torques have the limits of the robot, and accelerations
+      have none.
+    - ``dt`` (s): about the time between samples, a fraction of the duration.
+    - ``evaluations``: the number of evaluated motions.
+    - ``seed``: the seed of the random search.
+    - ``progress(evaluations, condition)`` is called at each improvement. Ctrl-C ends the search with the best
+      motion so far.
 
     The motion has a limited spectrum, ``harmonics / duration`` Hz, so that it can be filtered exactly, and
     repeated, so that periods can be averaged. Source: Swevers et al., *Optimal robot excitation and

@@ -61,18 +61,22 @@ def least_time(
 ) -> JointTrajectory:
     """The time-optimal motion of ``arm`` from rest to rest along the path through ``points`` (K, n).
 
-    The path is the cubic spline through the points; with ``blend``, straight lines in joint space with
-    parabolas at the inner points. A parabola replaces this fraction (0 to 0.5) of the shorter adjacent line.
-    ``speed``, ``acceleration``, ``torque``: greatest magnitudes, numbers or (n,), in rad or m, s, N m or N.
-    By default speeds and torques have the limits of the robot, and accelerations have none. ``payload``: a
-    :class:`Payload`, or a mass (kg) at the tool. ``grid``: minimum number of segments of the path; ``dt``:
-    time between samples, s.
+    - ``points``: joint coordinates, rad or m. The path is the cubic spline through the points.
+    - ``speed``, ``acceleration``, ``torque``: greatest magnitudes, numbers or (n,), in rad or m, s, N m or N.
+      By default speeds and torques have the limits of the robot, and accelerations have none.
+    - ``payload``: a :class:`Payload`, or a mass (kg) at the tool.
+    - ``blend``: with this argument, the path consists of straight lines in joint space with parabolas at the
+      inner points. A parabola replaces this fraction (above 0, up to 0.5) of the shorter adjacent line.
+    - ``grid``: minimum number of segments of the path.
+    - ``dt``: time between samples, s.
 
     Torques are computed as by ``arm.rne``: rigid bodies, payload, rotor inertia, gravity, viscous and Coulomb
-    friction of the motion. Source: Pham and Pham, A new approach to time-optimal path parameterization based
-    on reachability analysis, IEEE Trans. Robotics 2018; viscous friction and the limits between grid points
-    are added by iteration. The acceleration jumps at each segment of the grid. Strong viscous friction can
+    friction of the motion. The acceleration jumps at each segment of the grid. Strong viscous friction can
     cause separate intervals of feasible speeds; only the slowest interval is used.
+
+    Source: Pham and Pham, A new approach to time-optimal path parameterization based on reachability
+    analysis, IEEE Trans. Robotics 2018. Viscous friction and the limits between grid points are added by
+    iteration.
 
     Raises InputError for a path that is infeasible, with the joint whose torque is too small, and for paths
     without a limit; RobotError for robots with ball joints or closed loops. Warns of positions outside the

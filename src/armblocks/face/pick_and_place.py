@@ -85,12 +85,17 @@ def pick_and_place(
 ) -> PickAndPlaceCycle:
     """The fastest cycle from ``q0`` (n,) to the pose ``pick``, with the payload to ``place``, and back.
 
-    ``pick``, ``place``: poses of the tool in the world, (4, 4) or :class:`Transform`. The tool goes down and
-    up vertically over the height ``lift`` (m) at both poses, and rests ``grip_time`` (s) there. Between the
-    vertical lines the joints move on straight lines in joint space. ``blend`` rounds the corners, and
-    ``speed``, ``acceleration`` and ``torque`` are limits, as for :func:`~armblocks.least_time`. Each of the
-    three motions is time-optimal, the second motion with the ``payload``. ``mask``: as for ``arm.ikine``.
-    ``dt``: time between samples, s.
+    The tool moves vertically down and up at both poses. Between the vertical lines the joints move on
+    straight lines in joint space. Each of the three motions is time-optimal.
+
+    - ``pick``, ``place``: poses of the tool in the world, (4, 4) or :class:`Transform`, m.
+    - ``lift`` (m): the height of the vertical lines.
+    - ``grip_time`` (s): the time for which the tool rests at each of the two poses.
+    - ``payload``: a :class:`Payload`, or a mass (kg) at the tool, during the second motion.
+    - ``blend``: rounds the corners, as for :func:`~armblocks.least_time`.
+    - ``mask``: as for ``arm.ikine``.
+    - ``speed``, ``acceleration``, ``torque``: limits, as for :func:`~armblocks.least_time`.
+    - ``dt``: time between samples, s.
 
     Raises InputError for a pose that the arm does not reach, with the reason, and for a vertical line on
     which the configuration of the arm changes. Warns of positions outside the limits of the joints.

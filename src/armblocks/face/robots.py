@@ -27,13 +27,17 @@ def load_robot(
     Files: ``.json``, ``.urdf``, ``.xacro``, ``.sdf``, MJCF ``.xml``, toolbox scripts ``.m``, and the CAD
     exports of Simscape Multibody (``.xml``, ``_DataFile.m``).
 
-    ``name`` selects one of several robots in a script or a world. ``friction_model``: the formula of another
-    toolbox release, see :class:`FrictionModel`; by default the formula of the file. ``tip``: the link that
-    carries the tool, by default the last link; in URDF and SDF files, the end of the chain with the most
-    joints. If the joint of ``tip`` moves, its coordinate is the last entry of q. ``packages``: folders of ROS
-    packages and Gazebo models by name, for ``package://`` and ``model://``. Other packages and models are
-    searched for in the folders above the file. ``arguments``: values of the arguments of a xacro file, which
-    needs the extra ``xacro``.
+    - ``name_or_path``: a text with a path separator or with the suffix of a robot file is a path, any other
+      text is the name of a shipped robot.
+    - ``name``: selects one of several robots of a script or a world.
+    - ``friction_model``: the formula of another toolbox release, see :class:`FrictionModel`. By default the
+      formula of the file.
+    - ``tip``: the link that carries the tool. If the joint of this link moves, its coordinate is the last
+      entry of q. By default, in URDF, SDF and MJCF files and in CAD exports, the end of the chain with the
+      most degrees of freedom; in other files, the last link.
+    - ``packages``: folders of ROS packages and Gazebo models by name, for ``package://`` and ``model://``.
+      Other packages and models are searched for in the folders above the file.
+    - ``arguments``: values of the arguments of a xacro file, which needs the extra ``xacro``.
 
     Raises UnknownNameError for a name that is not shipped and a tip that is not in the file, FormatError for
     a file that cannot be read.

@@ -136,17 +136,19 @@ def size_drives(
 ) -> SizingReport:
     """Compare candidate motors and gears for a cycle: the trajectory and a ``pause`` (s) at its end.
 
-    In a cycle of :func:`~armblocks.pick_and_place` the payload is at the tool only in the loaded phases.
+    - ``trajectory``: the motion. In a cycle of :func:`~armblocks.pick_and_place` the payload is at the tool
+      only in the loaded phases.
+    - ``drives``: the candidates. They replace the motors of the robot's file.
+    - ``payload``: a :class:`Payload`, or a mass (kg) at the tool.
+    - ``pause`` (s): the time at rest after the motion. The motor holds the arm.
+    - ``brakes_in_pause``: the brake holds the arm in the pause, and the motor torque is 0.
 
     The torque of a motor is the sum of two parts. The first part is the torque of gravity and of the rigid
-    bodies with the ``payload`` (a :class:`Payload`, or kg at the tool), converted by the ratio and efficiency
-    of the gear. The second part is the torque of inertia and friction of the drive itself. The motors of the
-    robot's file are replaced by the candidates. In the pause the motor holds the arm. With
-    ``brakes_in_pause`` the brake holds it, and the motor torque is 0. The brake must hold the largest gravity
-    torque of the motion.
+    bodies with the payload, converted by the ratio and efficiency of the gear. The second part is the torque
+    of inertia and friction of the drive itself. The brake must hold the largest gravity torque of the motion.
 
-    Raises InputError without a drive for some joint or for an unknown joint of a drive; RobotError for robots
-    with closed loops, ball joints, or motors at joints that depend on others.
+    Raises InputError without a drive for some joint, UnknownNameError for an unknown joint of a drive,
+    RobotError for robots with closed loops, ball joints, or motors at joints that depend on others.
     """
     where = "size_drives"
     if isinstance(pause, str) or not 0.0 <= pause < math.inf:  # pyright: ignore[reportUnnecessaryIsInstance]

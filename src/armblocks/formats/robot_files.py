@@ -29,18 +29,22 @@ def load_robot(
 ) -> Robot:
     """A shipped robot by its name, ``"kr180"``, or a robot file by its path.
 
-    A text with a path separator or with the suffix of a robot format is a path, any other text is a name.
-    ``name`` selects one of several robots of a script, by the script's variable or by the robot's name.
-    ``friction_model`` replaces the model of the file; scripts get the model of releases 9.5 to 10.
-    ``tip`` names the link that carries the tool, see :func:`armblocks.robot.with_tip`; by default the tip of
-    the file, in a URDF file the end of the chain with the most joints. ``packages`` maps names of ROS
-    packages to their folders; other packages are searched for in the folders above the file. ``arguments``
-    are the values of the arguments of a xacro file. The robot's ``source`` is the shipped name or the path.
+    - ``name_or_path``: a text with a path separator or with the suffix of a robot format is a path, any other
+      text is a name. The robot's ``source`` is the shipped name or the path.
+    - ``name``: selects one of several robots of a script, by the script's variable or by the robot's name.
+    - ``friction_model``: replaces the model of the file. Scripts get the model of releases 9.5 to 10.
+    - ``tip``: the link that carries the tool, see :func:`armblocks.robot.with_tip`. By default the tip of the
+      file; in a URDF file, this is the end of the chain with the most degrees of freedom.
+    - ``packages``: folders of ROS packages by name. Other packages are searched for in the folders above the
+      file.
+    - ``arguments``: values of the arguments of a xacro file.
 
     Raises ``UnknownNameError`` for a name that is not shipped and for a ``name`` or ``tip`` that is not in
-    the file. Raises ``FormatError`` for a file that is missing, has no known format or cannot be read. Issues
-    warnings for physically impossible inertias (``InertiaWarning``), for numbers with a probably wrong unit
-    or sign and for parts of the file that are not read. For shipped robots, ``armblocks show`` prints them.
+    the file. Raises ``FormatError`` for a file that is missing, has no known format or cannot be read.
+
+    Warns of physically impossible inertias (``InertiaWarning``), of numbers with a probably wrong unit or
+    sign, and of parts of the file that are not read. For shipped robots, ``armblocks show`` prints these
+    warnings.
     """
     context = file_context(packages, arguments)
     robot = load_robot_in(name_or_path, context, name=name)

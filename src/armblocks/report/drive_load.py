@@ -26,19 +26,27 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Drive(metaclass=ArgumentErrors):
-    """A motor with its gear from a catalogue. Torques in N m, speeds in rad/s, inertias in kg m², all at the
-    motor, unless stated otherwise; ``None`` and infinity: no limit.
+    """A motor with its gear from a catalogue.
 
-    ``gear_ratio``: motor turns per joint turn (rad/m for a prismatic joint), above 0. ``inertia``: rotor,
-    brake and input side of the gear. ``stall_torque``: continuous torque at rest; ``rated_torque`` at
-    ``rated_speed``: a second point of the continuous curve, which is a straight line. ``peak_torque``: up to
-    ``corner_speed``; from there it falls on a line to the continuous torque at ``max_speed``.
-    ``brake_torque``: holding torque. ``thermal_time_constant``: of the winding, s. ``efficiency`` of the gear
-    in both directions, 0 to 1. ``gear_peak_torque``, ``gear_rated_torque``: at the output, N m (N);
-    ``gear_max_speed``: at the input. ``viscous_friction`` N m s and ``coulomb_friction`` N m, as for
-    :class:`~armblocks.Motor`. ``torque_constant`` N m/A and ``resistance`` Ω: for the copper losses.
-    ``max_inertia_ratio``: largest load inertia divided by the own inertia. ``joints``: the names of the
-    joints for which the drive is a candidate; none: all joints.
+    Torques are in N m, speeds in rad/s and inertias in kg m², all at the motor, unless stated otherwise.
+    ``None`` and infinity: no limit.
+
+    - ``gear_ratio``: motor turns per joint turn (rad/m for a prismatic joint), above 0.
+    - ``stall_torque``: continuous torque at rest.
+    - ``max_speed``: the largest speed.
+    - ``inertia``: rotor, brake and input side of the gear.
+    - ``rated_torque``, ``rated_speed``: a second point of the continuous curve, which is a straight line.
+    - ``peak_torque``: the limit up to ``corner_speed``. From there it falls on a line to the continuous
+      torque at ``max_speed``.
+    - ``brake_torque``: holding torque of the brake.
+    - ``thermal_time_constant``: of the winding, s.
+    - ``efficiency``: of the gear in both directions, 0 to 1.
+    - ``gear_peak_torque``, ``gear_rated_torque``: at the output of the gear, N m (N).
+    - ``gear_max_speed``: at the input of the gear.
+    - ``viscous_friction`` (N m s), ``coulomb_friction`` (N m): as for :class:`~armblocks.Motor`.
+    - ``torque_constant`` (N m/A), ``resistance`` (Ω): for the copper losses.
+    - ``max_inertia_ratio``: largest load inertia divided by the own inertia.
+    - ``joints``: the names of the joints for which the drive is a candidate; none: all joints.
     """
 
     name: str
@@ -143,10 +151,13 @@ class LimitCheck:
 class DriveLoad(metaclass=ArgumentErrors):
     """The load of one drive at one joint over a cycle: a motion and a pause.
 
-    ``time`` (N,) s, ``speed`` (N,) rad/s and ``torque`` (N,) N m of the motor; ``output_torque`` (N,) N m or
-    N at the output of the gear. ``pause`` s, with the torque ``pause_torque`` N m. ``holding_torque``: the
-    largest gravity torque, at the motor. ``load_inertia``: the largest inertia at the joint without the
-    drive, divided by the square of the gear ratio, kg m².
+    - ``time`` (N,) s.
+    - ``speed`` (N,) rad/s, ``torque`` (N,) N m: of the motor.
+    - ``output_torque`` (N,) N m or N: at the output of the gear.
+    - ``pause`` s, ``pause_torque`` N m: duration of the pause and motor torque in it.
+    - ``holding_torque`` N m: the largest gravity torque, at the motor.
+    - ``load_inertia`` kg m²: the largest inertia at the joint without the drive, divided by the square of the
+      gear ratio.
     """
 
     joint: str

@@ -35,12 +35,17 @@ def payload_capacity(
 ) -> Array | float:
     """The largest mass (kg) at the tool with which the joint torques stay within their limits.
 
-    ``q`` (nq,) or (N, nq): one mass for each configuration, at rest or with ``qd`` and ``qdd``, (n,) or
-    (N, n). Or a trajectory: one mass for the whole motion. ``torque`` (n,) N m or N: limits, by default the
-    limits of the robot. ``centre`` (3,) m: the centre of mass in the axes of the tool, or of ``frame``. The
-    torques are computed as by ``arm.rne``; they are linear in the mass. The result is 0 where the weight of
-    the arm alone exceeds a limit, and infinite where the payload loads no joint with a limit. Raises
-    InputError without any torque limit, RobotError for closed loops.
+    - ``q`` (nq,) or (N, nq): configurations, rad or m; the result is one mass for each. Or a trajectory; the
+      result is one mass for the whole motion.
+    - ``qd``, ``qdd`` (n,) or (N, n): speeds and accelerations at ``q``, by default zero.
+    - ``torque`` (n,) N m or N: limits, by default the limits of the robot.
+    - ``centre`` (3,) m: the centre of mass in the axes of the tool, or of ``frame``.
+    - ``frame``: the frame to which the mass is attached, by default the tool.
+
+    The torques are computed as by ``arm.rne``; they are linear in the mass. The result is 0 where the weight
+    of the arm alone exceeds a limit, and infinite where the payload loads no joint with a limit.
+
+    Raises InputError without any torque limit, RobotError for closed loops.
     """
     where = f"payload_capacity of robot '{arm.name}'"
     check_robot(arm, where)
