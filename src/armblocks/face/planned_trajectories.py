@@ -38,11 +38,14 @@ def point_to_point(
 ) -> JointTrajectory:
     """The fastest synchronised motion from rest at ``q0`` to rest at ``qf`` (n,) under limits.
 
-    ``speed``, ``acceleration``, ``deceleration`` (by default as ``acceleration``) and ``jerk``: greatest
-    magnitudes, a number for all joints or (n,), in rad or m and s. All joints start and end together and the
-    motion is a straight line in joint space. Without ``jerk`` the speed is a trapezoid, or a triangle if no
-    joint reaches its speed; with ``jerk`` the acceleration is continuous (a double S). ``duration`` (s):
-    a longer duration, to which the motion is scaled. ``dt``: time between samples, s.
+    All joints start and end together, and the motion is a straight line in joint space.
+
+    - ``speed``, ``acceleration``: greatest magnitudes, a number for all joints or (n,), in rad or m and s.
+    - ``deceleration``: as ``acceleration``, which is its default. Not together with ``jerk``.
+    - ``jerk``: the same for the derivative of the acceleration. With ``jerk`` the acceleration is continuous
+      (a double S). Without it the speed is a trapezoid, or a triangle if no joint reaches its speed.
+    - ``duration`` (s): a longer duration, to which the motion is scaled.
+    - ``dt``: time between samples, s.
 
     Raises InputError for limits that are not positive and for a duration below the minimum.
     """
@@ -93,11 +96,18 @@ def spline_trajectory(
 ) -> JointTrajectory:
     """A spline through ``points`` (K, n), at rest at both ends or with the end speeds ``qd0``, ``qd1`` (n,).
 
-    ``times`` (K,), ascending, in s: when each point is passed. Without ``times``, the time between two points
-    is proportional to the largest joint motion relative to its ``speed``. The whole motion is then scaled in
-    time so that one joint reaches its ``speed`` or ``acceleration`` limit (numbers or (n,)). ``kind``:
-    ``"cubic"`` has continuous accelerations, ``"quintic"`` also continuous jerk and no acceleration at the
-    ends. ``dt``: time between samples, s.
+    - ``times`` (K,), ascending, in s: when each point is passed. Without ``times``, the time between two
+      points is proportional to the largest joint motion relative to its ``speed``. The whole motion is then
+      scaled in time so that one joint reaches its ``speed`` or ``acceleration`` limit.
+    - ``speed``, ``acceleration``: limits of a motion without ``times``, numbers or (n,), in rad or m and s.
+      By default accelerations have no limit.
+    - ``kind``: ``"cubic"`` has continuous accelerations, ``"quintic"`` also continuous jerk and no
+      acceleration at the ends.
+    - ``qd0``, ``qd1`` (n,): the speeds at the ends, only together with ``times``.
+    - ``dt``: time between samples, s.
+
+    Raises InputError if neither ``times`` nor ``speed`` is given, and, without ``times``, for equal
+    consecutive points. Raises UnknownNameError for another kind.
     """
     where = "spline_trajectory"
     via = via_points("points", points, where)

@@ -23,13 +23,15 @@ def write_report(
     formats: Sequence[str] | None = None,
     data: Sequence[str] | None = None,
 ) -> ReportFiles:
-    """Write ``report.html``, the diagram, figures and data of a run into a folder, created if absent.
+    """Write ``report.html``, the diagram, figures and data of a run into a folder, and return the paths.
 
-    ``formats`` of the figures: svg, png. ``data``: csv, parquet, npz, mat. The default is svg and csv, also
-    png if matplotlib is installed, and parquet if pyarrow is installed. The files of To File blocks are
-    written to the same folder. Returns the paths. Raises UnknownNameError for an unsupported format,
-    MissingLibraryError for a format whose library is not installed, DiagramError if two blocks write the same
-    file, FormatError if the folder cannot be written.
+    The folder is created if absent. The files of To File blocks are written to the same folder.
+
+    - ``formats``: of the figures, svg and png. The default is svg, also png if matplotlib is installed.
+    - ``data``: csv, parquet, npz and mat. The default is csv, also parquet if pyarrow is installed.
+
+    Raises UnknownNameError for an unsupported format, MissingLibraryError for a format whose library is not
+    installed, DiagramError if two blocks write the same file, FormatError if the folder cannot be written.
     """
     from armblocks import report
 
@@ -61,10 +63,13 @@ def draw_diagram(
 ) -> Path:
     """Draw a diagram into a ``.svg``, ``.png`` or ``.pdf`` file; returns the path.
 
-    ``sheet``: the path of a subsystem, such as ``"controller/filter"``; ``""`` is the top level. ``theme``
-    ``None``: SVG follows the viewer's preference, other formats are light. With a ``result``, scopes and
-    displays show its data; ``rates`` shows the clocks of sampled blocks. Raises UnknownNameError for another
-    suffix or sheet.
+    - ``sheet``: the path of a subsystem, such as ``"controller/filter"``; ``""`` is the top level.
+    - ``theme``: ``"light"`` or ``"dark"``. By default SVG follows the viewer's preference, and other formats
+      are light.
+    - ``result``: a run whose data the scopes and displays show.
+    - ``rates``: whether the clocks of sampled blocks are shown.
+
+    Raises UnknownNameError for another suffix or sheet.
     """
     from armblocks import drawing
 

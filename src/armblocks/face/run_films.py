@@ -40,10 +40,15 @@ def write_film(
 ) -> Path:
     """Write a video of the arms of a run, side by side, as a ``.mp4`` or ``.gif`` file; returns the path.
 
-    The video shows the arms of the report: one for each signal of joint coordinates, at most four. ``rate``:
-    frames per second. ``speed`` 2 plays the run twice as fast. ``size``: width and height, px. ``view``:
-    azimuth and elevation of the camera, degrees. ``progress(done, all)`` is called after each frame. The file
-    is replaced when the video is complete; Ctrl-C leaves an existing file unchanged.
+    The video shows the arms of the report: one for each signal of joint coordinates, at most four.
+
+    - ``rate``: frames per second.
+    - ``speed``: 2 plays the run twice as fast.
+    - ``theme``: ``"light"`` or ``"dark"``.
+    - ``size``: width and height, px.
+    - ``view``: azimuth and elevation of the camera, degrees.
+    - ``progress(done, all)`` is called after each frame. The file is replaced when the video is complete;
+      Ctrl-C leaves an existing file unchanged.
 
     Raises InputError if the diagram has no moving arm and for values out of range, UnknownNameError for
     another suffix, MissingLibraryError without the extra ``film``, FormatError if the file cannot be written.

@@ -43,10 +43,12 @@ class SymbolicArm(metaclass=ArgumentErrors):
     ) -> SymbolicArm:
         """The arm with symbols in the place of numbers.
 
-        ``links``: by the name of a link the new ``a`` and ``d`` of its D-H row (m), ``mass`` (kg),
-        ``centre_of_mass`` (3) m, ``inertia`` (3 or 6: xx yy zz, xy yz xz about the centre of mass, kg m2).
-        ``gravity`` (3): m/s2, the acceleration of a falling body. Each entry is a number or a formula such as
-        ``"l1"``, ``"-l1/2"``. Raises InputError or UnknownNameError.
+        - ``links``: new entries by the name of a link: ``a`` and ``d`` of its D-H row (m), ``mass`` (kg),
+          ``centre_of_mass`` (3) m, ``inertia`` (3 or 6: xx yy zz, xy yz xz about the centre of mass, kg m²).
+        - ``gravity`` (3) m/s²: the acceleration of a falling body.
+
+        Each entry is a number or a formula such as ``"l1"``, ``"-l1/2"``. Raises InputError or
+        UnknownNameError.
         """
         before = self._equations
         merged = {name: {**row, **(links or {}).get(name, {})} for name, row in before.links.items()}
@@ -143,11 +145,13 @@ def symbolic_dh(
 ) -> SymbolicArm:
     """A chain from rows of a D-H table, whose entries are numbers or formulas with symbols.
 
-    ``rows``: for each joint the keywords of :func:`standard_dh` or :func:`modified_dh` (``alpha``, ``a``,
-    ``d``, ``theta``, ``sigma``, ``offset``, ``mass`` …) and ``name``, by default q1, q2 …: the name of its
-    coordinate. ``a``, ``d``, ``mass``, ``centre_of_mass`` and ``inertia`` may have strings such as ``"l1"``
-    or ``"-l1/2"``; angles are numbers (rad). ``convention``: ``"standard"`` or ``"modified"``. ``gravity``
-    (3): m/s2, for example ``(0, "-g", 0)``.
+    - ``rows``: for each joint the keywords of :func:`standard_dh` or :func:`modified_dh` (``alpha``, ``a``,
+      ``d``, ``theta``, ``sigma``, ``offset``, ``mass`` …) and ``name``, the name of its coordinate, by
+      default q1, q2 …. ``a``, ``d``, ``mass``, ``centre_of_mass`` and ``inertia`` may have strings such as
+      ``"l1"`` or ``"-l1/2"``; angles are numbers (rad).
+    - ``convention``: ``"standard"`` or ``"modified"``.
+    - ``name``: the name of the robot.
+    - ``gravity`` (3) m/s²: for example ``(0, "-g", 0)``.
     """
     conventions = {known.value: known for known in DhConvention}
     if isinstance(convention, str):

@@ -26,10 +26,13 @@ Terms = tuple[Term, ...]
 class SymbolicExpression(metaclass=ArgumentErrors):
     """A quantity of a robot in symbols: the result of the methods of :class:`SymbolicArm`.
 
-    ``casadi``: the expression as traced, an ``SX`` in natural shape (a vector is a column), for CasADi's own
-    functions. ``shape``: (4, 4), (6, n), (n,) or () of a scalar. All other forms are simplified: products of
-    sines and cosines of parallel axes become sines and cosines of the sum of the angles, and common factors
-    are taken out. Numbers then have 12 digits. ``T[0, 3]`` is an entry.
+    - ``casadi``: the expression as traced, an ``SX`` in natural shape (a vector is a column), for CasADi's
+      own functions.
+    - ``shape``: (4, 4), (6, n), (n,), or () of a scalar.
+
+    ``T[0, 3]`` is an entry. All other forms are simplified: products of sines and cosines of parallel axes
+    become sines and cosines of the sum of the angles, and common factors are taken out. Numbers then have 12
+    digits.
 
     ``str`` and the notebook have the short form of textbooks, ``l1 c1 + l2 c12`` with ``c12 = cos(q1 + q2)``
     by the numbers of the joints.

@@ -40,10 +40,12 @@ def jtraj(
 ) -> JointTrajectory:
     """Quintic motion from ``q0`` to ``qf`` (n,), zero acceleration at both ends.
 
-    ``t`` is either the times (N,) in s, from 0 to the end of the motion, or a number of samples N: then the
-    time is normalised as in the toolbox, ``linspace(0, 1, N)``, and rates are per unit of this time. ``qd0``,
-    ``qd1`` (n,): speeds at the ends, zero by default. The polynomial is the same as in the toolbox. ``q, qd,
-    qdd = jtraj(…)`` unpacks the motion. Warns of angles that look like degrees.
+    - ``t``: the times (N,) in s, from 0 to the end of the motion. Or a number of samples N: then the time is
+      normalised as in the toolbox, ``linspace(0, 1, N)``, and rates are per unit of this time.
+    - ``qd0``, ``qd1`` (n,): speeds at the ends, zero by default.
+
+    The polynomial is the same as in the toolbox. ``q, qd, qdd = jtraj(…)`` unpacks the motion. Warns of
+    angles that look like degrees.
     """
     start, goal = ends_of(q0, qf, "jtraj")
     first = None if qd0 is None else end_speed("qd0", qd0, start, "jtraj")
@@ -66,10 +68,11 @@ def tpoly(
 ) -> JointTrajectory:
     """The toolbox's ``tpoly``: a quintic, zero acceleration at both ends.
 
-    It differs from :func:`jtraj` in the meaning of a number of samples N: the times are 0, 1 … N - 1, and
-    rates are per sample, in releases 9 and 10 and in roboticstoolbox-python (``quintic``). ``t`` (N,): times
-    in s from 0. ``qd0``, ``qdf`` (n,): speeds at the ends, zero by default. The toolbox supports one joint;
-    here ``q0`` and ``qf`` are numbers or (n,).
+    - ``q0``, ``qf``: numbers or (n,). The toolbox supports one joint only.
+    - ``t``: the times (N,) in s from 0. Or a number of samples N: then the times are 0, 1 … N - 1, and rates
+      are per sample, as in releases 9 and 10 and in roboticstoolbox-python (``quintic``). :func:`jtraj` has
+      another time for a number of samples.
+    - ``qd0``, ``qdf`` (n,): speeds at the ends, zero by default.
     """
     start, goal = ends_of(q0, qf, "tpoly")
     times = sample_times(t, "tpoly", step=1.0)
@@ -80,11 +83,14 @@ def tpoly(
 def lspb(q0: ArrayLike, qf: ArrayLike, t: ArrayLike | int, speed: ArrayLike | None = None) -> JointTrajectory:
     """The toolbox's ``lspb``: constant acceleration, constant ``speed``, constant deceleration.
 
-    ``t`` (N,): times in s from 0, or a number of samples N for the times 0, 1 … N - 1. ``speed``: a number or
-    (n,), between one and two times the mean speed; its sign is ignored, as in release 10 (release 9.4
-    compares the signed value). By default it is 1.5 times the mean speed, which gives three equal parts. All
-    joints end at the same time. At a time at which the acceleration jumps, the table has the value before the
-    jump, as in the toolbox. Raises InputError for a speed that is too small or too large.
+    - ``q0``, ``qf``: numbers or (n,). All joints end at the same time.
+    - ``t``: the times (N,) in s from 0, or a number of samples N for the times 0, 1 … N - 1.
+    - ``speed``: a number or (n,), between one and two times the mean speed. Its sign is ignored, as in
+      release 10 (release 9.4 compares the signed value). By default it is 1.5 times the mean speed, which
+      gives three equal parts.
+
+    At a time at which the acceleration jumps, the table has the value before the jump, as in the toolbox.
+    Raises InputError for a speed that is too small or too large.
     """
     start, goal = ends_of(q0, qf, "lspb")
     times = sample_times(t, "lspb", step=1.0)
@@ -118,9 +124,11 @@ def mtraj(
 ) -> JointTrajectory:
     """The toolbox's ``mtraj``: a motion of several joints by ``lspb`` or ``tpoly`` for each of them.
 
-    ``function``: :func:`lspb`, :func:`tpoly`, or another function ``(q0, qf, t)`` of one joint that returns a
-    :class:`JointTrajectory`. ``t``: times (N,) in s from 0, or a number of samples. Releases 9 and 10 replace
-    times by their number; here, as in roboticstoolbox-python, the given times are used.
+    - ``function``: :func:`lspb`, :func:`tpoly`, or another function ``(q0, qf, t)`` of one joint that returns
+      a :class:`JointTrajectory`.
+    - ``q0``, ``qf`` (n,): start and end.
+    - ``t``: times (N,) in s from 0, or a number of samples. Releases 9 and 10 replace times by their number;
+      here, as in roboticstoolbox-python, the given times are used.
     """
     start, goal = ends_of(q0, qf, "mtraj")
     parts = [function(a, b, t) for a, b in zip(start.tolist(), goal.tolist())]
@@ -151,20 +159,26 @@ def mstraj(
 ) -> JointTrajectory:
     """The toolbox's ``mstraj``: linear segments between via points with quintic blends.
 
-    ``points`` (K, n): the via points. ``qdmax``, a number or (n,): greatest joint speeds, or ``tsegment``
-    (K,): durations of the segments in s; the other argument is ``None``. ``q0`` (n,): the start; ``None``:
-    the first point. ``dt``: the sample time, s. ``tacc``, a number or one for each segment: durations of the
-    blends, s. ``qd0``, ``qdf`` (n,): speeds at the ends.
+    - ``points`` (K, n): the via points.
+    - ``qdmax``: greatest joint speeds, a number or (n,), or ``None`` if ``tsegment`` is given.
+    - ``tsegment`` (K,): durations of the segments in s, or ``None`` if ``qdmax`` is given.
+    - ``q0`` (n,): the start; ``None``: the first point.
+    - ``dt``: the sample time, s.
+    - ``tacc``: durations of the blends in s, a number or one for each segment.
+    - ``qd0``, ``qdf`` (n,): speeds at the ends, zero by default.
 
-    The motion passes near the inner points and ends at the last point. As in releases 9 and 10, the durations
-    of blends and, for given ``qdmax``, of segments are rounded up to multiples of ``dt``. A segment takes at
-    least two blends, and its speed is the distance between the points divided by its duration. The table
-    includes the start, which the toolbox omits. A duration that is a multiple of ``dt`` up to rounding is not
-    lengthened.
+    The motion passes near the inner points and ends at the last point. A segment takes at least two blends,
+    and its speed is the distance between the points divided by its duration.
 
-    The last row is the last point, and positions do not jump. For this, a segment that no blend follows takes
-    a multiple of ``dt`` also for given ``tsegment`` (rounded up) and ends at its point. The toolbox ends such
-    a segment, and then the motion, before its point.
+    As in releases 9 and 10, the durations of blends and, for given ``qdmax``, of segments are rounded up to
+    multiples of ``dt``. A duration that is a multiple of ``dt`` up to rounding is not lengthened.
+
+    Two properties differ from the toolbox:
+
+    - The table includes the start, which the toolbox omits.
+    - The last row is the last point, and positions do not jump. For this, a segment that no blend follows
+      takes a multiple of ``dt`` also for given ``tsegment`` (rounded up) and ends at its point. The toolbox
+      ends such a segment, and then the motion, before its point.
     """
     via = via_points("points", points, "mstraj", least=1 if q0 is not None else 2)
     start, via = (via[0], via[1:]) if q0 is None else (joint_vector("q0", q0, "mstraj"), via)
@@ -206,9 +220,13 @@ def mstraj(
 def ctraj(T0: ArrayLike | Transform, T1: ArrayLike | Transform, s: ArrayLike | int) -> Array:
     """The toolbox's ``ctraj``: poses (N, 4, 4) on a straight line from ``T0`` to ``T1``, each (4, 4).
 
-    ``s``: path parameters (N,) from 0 to 1, or a number of poses N. For a number, ``s`` has the trapezoidal
-    speed of :func:`lspb`, as in releases 9 and 10; releases up to 8 have equal steps: ``np.linspace(0, 1,
-    N)``. The rotation is about one axis by the shorter angle. Translations are in the unit of ``T0``.
+    - ``T0``, ``T1``: poses, (4, 4) or :class:`Transform`. Translations of the result are in the unit of
+      ``T0``.
+    - ``s``: path parameters (N,) from 0 to 1, or a number of poses N. For a number, ``s`` has the trapezoidal
+      speed of :func:`lspb`, as in releases 9 and 10. Releases up to 8 have equal steps:
+      ``np.linspace(0, 1, N)``.
+
+    The rotation is about one axis by the shorter angle.
     """
     first, last = pose_of("T0", T0, "ctraj"), pose_of("T1", T1, "ctraj")
     if sample_count(s) is not None:

@@ -23,11 +23,16 @@ _UNITS = {"": 1.0, "rad": 1.0, "m": 1.0, "deg": math.pi / 180.0, "°": math.pi /
 def load_trajectory(path: str | PathLike[str], *, dt: float | None = None) -> JointTrajectory:
     """The joint motion in a table file (``.csv``, ``.npz``, ``.mat``, ``.parquet``).
 
-    Columns: the times ``t`` or ``time`` in s, the positions ``q1`` … ``qn`` in rad or m, and optionally the
-    speeds ``qd1`` … and accelerations ``qdd1`` …, as :meth:`JointTrajectory.save` writes them. Between rows
-    the motion is the quintic with the values of both rows. Without speeds and accelerations, the motion is
-    the cubic spline through the positions, at rest at both ends. Units in headers, such as ``q1 [deg]`` or
-    ``qd2 [mm/s]``, are converted. ``dt``: time between samples, s; ``None``: the rows of the file.
+    Columns, as :meth:`JointTrajectory.save` writes them:
+
+    - ``t`` or ``time``: the times, s.
+    - ``q1`` … ``qn``: the positions, rad or m.
+    - ``qd1`` …, ``qdd1`` …, both optional: speeds and accelerations.
+
+    Units in headers, such as ``q1 [deg]`` or ``qd2 [mm/s]``, are converted. Between rows the motion is the
+    quintic with the values of both rows. Without speeds and accelerations, the motion is the cubic spline
+    through the positions, at rest at both ends. ``dt``: time between samples, s; ``None``: the rows of the
+    file.
 
     Raises ``FormatError`` and ``UnknownNameError`` as :func:`~armblocks.load_table`, and InputError for
     missing columns.

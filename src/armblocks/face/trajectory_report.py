@@ -61,9 +61,11 @@ class BindingInterval(metaclass=ArgumentErrors):
 class TrajectoryReport(metaclass=ArgumentErrors):
     """A trajectory against the limits of an arm. ``print`` shows it as a table.
 
-    ``joints``: the names of the n joints, ``units`` rad or m. ``time`` (N,) s; ``q``, ``qd``, ``qdd``,
-    ``tau`` (N, n) at these times. ``speed_limits``, ``acceleration_limits``, ``torque_limits`` (n,), infinite
-    without a limit; ``position_limits`` (n, 2). ``collisions``: the check for collisions, if it was made.
+    - ``joints``, ``units``: the names of the n joints, and rad or m.
+    - ``time`` (N,) s; ``q``, ``qd``, ``qdd``, ``tau`` (N, n) at these times.
+    - ``position_limits`` (n, 2).
+    - ``speed_limits``, ``acceleration_limits``, ``torque_limits`` (n,): infinite without a limit.
+    - ``collisions``: the check for collisions, if it was made.
     """
 
     name: str
@@ -234,12 +236,17 @@ def trajectory_report(
 ) -> TrajectoryReport:
     """The report of a trajectory of ``arm``: cycle time, peaks and limits, the binding limit at each time.
 
-    The limits are defined as for :func:`~armblocks.least_time`; torques are computed by ``arm.rne`` with the
-    ``payload``. In a cycle of :func:`~armblocks.pick_and_place` the payload is at the tool only in the loaded
-    phases. With ``obstacles`` (``()`` for none) the report names the first contact of the links with each
-    other and with these bodies, as :func:`~armblocks.collisions` with this ``margin`` (m); ``collisions`` has
-    all distances. The body in the gripper is not included. Raises InputError for a trajectory with another
-    number of joints.
+    - ``trajectory``: the motion. In a cycle of :func:`~armblocks.pick_and_place` the payload is at the tool
+      only in the loaded phases.
+    - ``speed``, ``acceleration``, ``torque``: limits, as for :func:`~armblocks.least_time`.
+    - ``payload``: a :class:`Payload`, or a mass (kg) at the tool. Torques are computed by ``arm.rne`` with
+      it.
+    - ``obstacles``: with this argument (``()`` for none) the report names the first contact of the links with
+      each other and with these bodies, as :func:`~armblocks.collisions`. The attribute ``collisions`` of the
+      report has all distances. The body in the gripper is not included.
+    - ``margin`` (m): bodies touch where their distance is at most this margin.
+
+    Raises InputError for a trajectory with another number of joints.
     """
     where = "trajectory_report"
     limits = motion_limits(arm, where, speed, acceleration, torque)

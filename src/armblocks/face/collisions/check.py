@@ -35,18 +35,21 @@ def collisions(
 ) -> CollisionReport:
     """The minimum distance of every two bodies along a motion, and when they first touch.
 
-    Bodies are the base, the links and the ``obstacles`` (:class:`Box`, :class:`Sphere`, :class:`Cylinder`,
-    :class:`Plane`). Each shape in the file of a link is replaced by its convex hull. A link without shapes
-    has the default shapes of its drawing. The bars of ``Rod`` constraints are not bodies. ``motion``: a
-    trajectory, or configurations (nq,) or (N, nq), of which only these are checked. Bodies touch where their
-    distance is at most ``margin`` (m). The hull of a mesh with more than 120 vertices may be too small: it
-    has only those extreme in 120 directions.
+    Bodies are the base, the links and the obstacles. Each shape in the file of a link is replaced by its
+    convex hull. A link without shapes has the default shapes of its drawing. The hull of a mesh with more
+    than 120 vertices may be too small: it has only those extreme in 120 directions. The bars of ``Rod``
+    constraints are not bodies.
 
-    Four kinds of pairs are not compared: links that a joint or a closure connects, the base and an obstacle,
-    pairs that touch in almost all configurations (such as the links of a wrist), and the pairs of names in
-    ``ignore``. The result lists these pairs. Between two samples of a trajectory no body moves by more than
-    about ``resolution`` (m), so that only shorter contacts are missed. Times of contacts are located by
-    bisection.
+    - ``motion``: a trajectory, or configurations (nq,) or (N, nq), of which only these are checked.
+    - ``obstacles``: :class:`Box`, :class:`Sphere`, :class:`Cylinder`, :class:`Plane`.
+    - ``ignore``: pairs of names of bodies that are not compared.
+    - ``margin`` (m): bodies touch where their distance is at most this margin.
+    - ``resolution`` (m): between two samples of a trajectory no body moves by more than about this distance,
+      so that only shorter contacts are missed. Times of contacts are located by bisection.
+
+    Three further kinds of pairs are not compared: links that a joint or a closure connects, the base and an
+    obstacle, and pairs that touch in almost all configurations (such as the links of a wrist). The result
+    lists the pairs of ``ignore`` and the pairs that touch in almost all configurations.
 
     Raises UnknownNameError for an unknown name in ``ignore``, InputError for motions of another robot.
     """

@@ -49,9 +49,12 @@ class MeasureMap(metaclass=ArgumentErrors):
 class WorkspaceSlice(metaclass=ArgumentErrors):
     """One layer of cells normal to a world axis.
 
-    ``normal``: the axis; ``at``: the coordinate (m) of the centres of the layer. ``axes``: the names of the
-    two other axes; ``first`` (na,) and ``second`` (nb,) m: the centres of the cells along them. ``counts``
-    (na, nb): numbers of samples in the cells. ``maps``: for each measure, its values in the cells (na, nb).
+    - ``normal``: the axis.
+    - ``at``: the coordinate (m) of the centres of the layer.
+    - ``axes``: the names of the two other axes.
+    - ``first`` (na,), ``second`` (nb,) m: the centres of the cells along these axes.
+    - ``counts`` (na, nb): numbers of samples in the cells.
+    - ``maps``: for each measure, its values in the cells (na, nb).
     """
 
     normal: str

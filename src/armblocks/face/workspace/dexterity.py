@@ -37,12 +37,18 @@ def dexterity(
 ) -> Array:
     """The dexterous index of ``points`` (3,) or (N, 3), m in the world: 0 to 1 for each point.
 
-    It is the share of ``directions`` in which the ``axis`` of the tool, or of ``frame``, can point at the
-    position; the rotation about this axis is free. ``directions``: a number of almost uniform directions
-    (a Fibonacci lattice), or vectors (D, 3) in the world. A point with the index 1 is in the dexterous
-    region. Every direction is a search by :meth:`Arm.ikine` with ``limits``, ``tolerance`` (m and rad),
-    ``restarts`` and ``seed``; a search that misses a solution lowers the index. Source: Vijaykumar, Waldron,
-    Tsai, IJRR 5(2), 1986 (dexterous workspace). Raises InputError for wrong shapes.
+    It is the share of ``directions`` in which the ``axis`` of the tool can point at the position. The
+    rotation about this axis is free. A point with the index 1 is in the dexterous region.
+
+    - ``directions``: a number of almost uniform directions (a Fibonacci lattice), or vectors (D, 3) in the
+      world.
+    - ``axis``: ``"x"``, ``"y"`` or ``"z"``, an axis of the tool or of ``frame``.
+    - ``frame``: the frame that reaches the points, by default the tool.
+    - ``limits``, ``tolerance`` (m and rad), ``restarts``, ``seed``: every direction is a search by
+      :meth:`Arm.ikine` with these arguments. A search that misses a solution lowers the index.
+
+    Source: Vijaykumar, Waldron, Tsai, IJRR 5(2), 1986 (dexterous workspace). Raises InputError for wrong
+    shapes.
     """
     where = f"dexterity of robot '{arm.name}'"
     if axis not in ("x", "y", "z"):
