@@ -27,10 +27,11 @@ _BEFORE = 1.0 - 2.0**-48
 class Experiment(metaclass=ArgumentErrors):
     """Measured signals of one run, and the parameters that differ in this run.
 
-    ``data``: a dictionary, data frame or file with the times ``t`` (or ``time``, s) and a column for each
-    measured signal, by the name of the signal in the diagram. A run starts at 0. NaN are missing values; two
-    rows with one time are both sides of a jump. ``parameters``: values of this experiment, such as its input
-    ``{"source.data": table}`` and its initial values.
+    - ``data``: a dictionary, data frame or file with the times ``t`` (or ``time``, s) and a column for each
+      measured signal, by the name of the signal in the diagram. A run starts at 0. NaN are missing values;
+      two rows with one time are both sides of a jump.
+    - ``parameters``: values of this experiment, such as its input ``{"source.data": table}`` and its initial
+      values.
     """
 
     data: Any = field(repr=False)

@@ -67,12 +67,16 @@ class FittedSignal(metaclass=ArgumentErrors):
 class FitResult(metaclass=ArgumentErrors):
     """Fitted parameters of a diagram. ``print`` shows them as a table.
 
-    ``diagram``: the diagram with the fitted values. ``parameters``: the names of the k fitted numbers;
-    ``values``, ``start`` (k,); ``covariance`` (k, k), NaN for parameters that the measurements do not
-    determine. ``bounds`` (k, 2). ``signals``: measured and fitted signals of all experiments.
-    ``condition``: condition number of the weighted derivatives with columns of length 1.
-    ``differences``: parameters that were differentiated by differences of runs, with the reason.
-    ``message``: the reason why the search ended; ``stopped``: it ended early.
+    - ``diagram``: the diagram with the fitted values.
+    - ``parameters``: the names of the k fitted numbers.
+    - ``values``, ``start`` (k,): the fitted values and the values at the start of the search.
+    - ``covariance`` (k, k): NaN for parameters that the measurements do not determine.
+    - ``bounds`` (k, 2): the lowest and highest values.
+    - ``condition``: condition number of the weighted derivatives with columns of length 1.
+    - ``signals``: measured and fitted signals of all experiments.
+    - ``message``: the reason why the search ended.
+    - ``stopped``: whether the search ended early.
+    - ``differences``: parameters that were differentiated by differences of runs, with the reason.
     """
 
     diagram: Diagram = field(repr=False)

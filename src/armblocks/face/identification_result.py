@@ -44,18 +44,19 @@ _MISFIT_OF_NOISE, _MISFIT_OF_TORQUES = 0.3, 0.01
 class IdentificationResult(metaclass=ArgumentErrors):
     """The identified parameters of an arm. ``print`` shows them as a table.
 
-    ``parameters``: the names of the b base parameters; ``groupings``: each base parameter as a sum of
-    parameters of links and motors. ``values`` (b,), ``covariance`` (b, b); parameters in ``not_identified``
-    are NaN, because the motion of the log does not determine them. ``prior`` (b,): the values of the
-    description. ``condition``: condition number of the weighted regressor with columns of length 1.
-
-    ``robot``: a description with physically consistent bodies whose base parameters are nearest to the
-    estimate; they are ``consistent_values`` (b,). Combinations that the torques do not determine stay near
-    the description that was given.
-
-    ``time`` (N,) s; ``tau``, ``fitted`` (N, n): measured and fitted torques of the used samples. ``noise``
-    (n,): standard deviation of each joint's torque, N m or N. ``dropped``: samples with missing values.
-    ``notes``: the filters and weights.
+    - ``parameters``: the names of the b base parameters.
+    - ``groupings``: each base parameter as a sum of parameters of links and motors.
+    - ``values`` (b,), ``covariance`` (b, b): parameters in ``not_identified`` are NaN, because the motion of
+      the log does not determine them.
+    - ``prior`` (b,): the values of the description.
+    - ``condition``: condition number of the weighted regressor with columns of length 1.
+    - ``noise`` (n,): standard deviation of each joint's torque, N m or N.
+    - ``robot``: a description with physically consistent bodies whose base parameters are nearest to the
+      estimate. Combinations that the torques do not determine stay near the description that was given.
+    - ``consistent_values`` (b,): the base parameters of ``robot``.
+    - ``time`` (N,) s; ``tau``, ``fitted`` (N, n): measured and fitted torques of the used samples.
+    - ``dropped``: the number of samples that were omitted, with missing values or at the ends.
+    - ``notes``: the filters and weights.
     """
 
     parameters: tuple[str, ...]

@@ -39,14 +39,16 @@ LETTERS = "lr ud nf"
 class IkineBranches(metaclass=ArgumentErrors):
     """All configurations for one pose, or for N poses (then every array has a leading axis of N).
 
-    ``q`` (B, nq) rad or m: the branches; rows of branches that do not exist, or that exceed requested limits,
-    are NaN. ``exists`` (B,): whether a branch is a solution. ``beyond_limits`` (B,): whether a branch has the
-    pose, but exceeds limits. With ``limits=True``, such branches are not solutions. ``position_error`` m and
-    ``rotation_error`` rad (B,): of the pose at ``q``, computed by forward kinematics.
-
-    ``geometry``: the property of the arm that the solution uses. ``choices``: the choices between two
-    solutions; the number of branches is 2 to the power of their number. ``singular`` (B, choices): whether
-    both solutions of a choice coincide; the arm is then singular.
+    - ``q`` (B, nq) rad or m: the branches. Rows of branches that do not exist, or that exceed requested
+      limits, are NaN.
+    - ``exists`` (B,): whether a branch is a solution.
+    - ``beyond_limits`` (B,): whether a branch has the pose, but exceeds limits. With ``limits=True``, such
+      branches are not solutions.
+    - ``position_error`` m, ``rotation_error`` rad (B,): of the pose at ``q``, computed by forward kinematics.
+    - ``singular`` (B, choices): whether both solutions of a choice coincide; the arm is then singular.
+    - ``geometry``: the property of the arm that the solution uses.
+    - ``choices``: the choices between two solutions. The number of branches is 2 to the power of their
+      number.
     """
 
     q: Array

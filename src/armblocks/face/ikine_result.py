@@ -26,21 +26,26 @@ SHOWN = 10
 class IkineResult(metaclass=ArgumentErrors):
     """Configurations for one pose, or for N poses (then every field has a leading axis of N).
 
-    ``q`` (nq,) rad or m: the solution, or the configuration whose pose is nearest to the target.
-    ``success``: whether ``q`` is a solution, within the tolerance and the limits. ``reason``:
+    - ``q`` (nq,) rad or m: the solution, or the configuration whose pose is nearest to the target.
+    - ``success``: whether ``q`` is a solution, within the tolerance and the limits.
+    - ``reason``: one of the texts below.
+    - ``position_error`` m, ``rotation_error`` rad: of ``q``, without the components that a mask excludes.
+    - ``lost_direction`` (6,): a direction in the world, or in the axes of the mask, first translation (m),
+      then rotation (rad). It is NaN unless the reason is ``"out of reach"`` or ``"singular"``.
+    - ``excess`` (nq,) rad or m: see ``"limits"``.
+    - ``iterations``: evaluations of the kinematics.
+    - ``restarts``: starts after the first start.
+    - ``names``: the names of the coordinates.
 
-    - ``"converged"``: ``q`` is a solution;
-    - ``"limits"``: there are solutions only beyond the limits of joints; ``excess`` (nq,) rad or m: the
-      amount by which one of these solutions exceeds the limits of each coordinate;
-    - ``"out of reach"``: no configuration has this pose; ``position_error`` and ``rotation_error`` are those
-      of the nearest pose, and ``lost_direction`` is the direction from there to the target;
-    - ``"singular"``: ``q`` is near a solution, where the arm cannot move along ``lost_direction``;
+    Reasons:
+
+    - ``"converged"``: ``q`` is a solution.
+    - ``"limits"``: there are solutions only beyond the limits of joints. ``excess`` is the amount by which
+      one of these solutions exceeds the limits of each coordinate.
+    - ``"out of reach"``: no configuration has this pose. ``position_error`` and ``rotation_error`` are those
+      of the nearest pose, and ``lost_direction`` is the direction from there to the target.
+    - ``"singular"``: ``q`` is near a solution, where the arm cannot move along ``lost_direction``.
     - ``"steps"``: the maximum number of iterations was reached.
-
-    ``position_error`` m and ``rotation_error`` rad of ``q``, without the components that a mask excludes;
-    ``iterations``: evaluations of the kinematics; ``restarts``: starts after the first start.
-    ``lost_direction`` (6,): a direction in the world, or in the axes of the mask, first translation (m), then
-    rotation (rad); NaN for the other reasons. ``names``: the names of the coordinates.
     """
 
     q: Array

@@ -50,13 +50,18 @@ _REQUIRED = tuple(
 def load_drives(path: str | PathLike[str]) -> tuple[Drive, ...]:
     """The candidate motors and gears of a CSV file, one in each row.
 
-    Columns: ``name``, ``gear_ratio``, ``stall_torque_nm`` and ``max_speed_rpm``; optionally ``joint`` (names
-    separated by semicolons; empty for all joints), ``inertia_kgm2``, ``rated_torque_nm``,
-    ``rated_speed_rpm``,
-    ``peak_torque_nm``, ``corner_speed_rpm``, ``brake_torque_nm``, ``thermal_time_constant_s``,
-    ``efficiency``, ``gear_peak_torque_nm``, ``gear_rated_torque_nm``, ``gear_max_speed_rpm``,
-    ``viscous_friction_nms``, ``coulomb_friction_nm``, ``torque_constant_nm_per_a``, ``resistance_ohm``,
-    ``max_inertia_ratio``. An empty cell is the default of :class:`Drive`, which defines the quantities.
+    Columns, with the quantities of :class:`Drive`:
+
+    - required: ``name``, ``gear_ratio``, ``stall_torque_nm``, ``max_speed_rpm``;
+    - ``joint``: names separated by semicolons; empty for all joints;
+    - the motor: ``inertia_kgm2``, ``rated_torque_nm``, ``rated_speed_rpm``, ``peak_torque_nm``,
+      ``corner_speed_rpm``, ``thermal_time_constant_s``, ``torque_constant_nm_per_a``, ``resistance_ohm``,
+      ``max_inertia_ratio``;
+    - the brake: ``brake_torque_nm``;
+    - the gear: ``efficiency``, ``gear_peak_torque_nm``, ``gear_rated_torque_nm``, ``gear_max_speed_rpm``;
+    - friction: ``viscous_friction_nms``, ``coulomb_friction_nm``.
+
+    An empty cell is the default of :class:`Drive`.
 
     Raises ``FormatError`` for a file that cannot be read, ``UnknownNameError`` for other columns, and
     InputError that names the line for missing or invalid values.

@@ -107,8 +107,10 @@ class NativeFunctions(metaclass=ArgumentErrors):
     def rne(self) -> MotionFunction:
         """``rne(q, qd, qdd)`` → tau (n,) N m or N: joint torques of a motion, with motors and friction.
 
-        The torques of a motion that violates the constraints of the robot are NaN. ``wrench=`` [fx fy fz mx
-        my mz] in the last link's frame, ``payload=`` a :class:`Payload` at the tool, or a point mass (kg).
+        - ``wrench=``: [fx fy fz mx my mz] in the last link's frame, N and N m.
+        - ``payload=``: a :class:`Payload` at the tool, or a point mass (kg).
+
+        The torques of a motion that violates the constraints of the robot are NaN.
         """
         return self._code.loaded("rne")
 
@@ -116,12 +118,14 @@ class NativeFunctions(metaclass=ArgumentErrors):
     def joint_wrenches(self) -> MotionFunction:
         """``joint_wrenches(q, qd, qdd)`` → (L + K, 6): reaction force (N) and moment (N m) of each joint.
 
-        Row k is the wrench that its parent exerts on link k, about the origin and in the axes of the distal
-        frame of the joint (NOTATION.md). The component along the axis is the torque of the rigid bodies:
-        ``rne`` without friction and rotor inertia. The last K rows are the wrenches of the closures of loops,
-        which the first link exerts on the second link, in the second frame. Forces of redundant closure
-        equations are statically indeterminate and are 0 in the result. ``wrench=`` and ``payload=`` as for
-        ``rne``.
+        - Row k of the first L rows is the wrench that its parent exerts on link k, about the origin and in
+          the axes of the distal frame of the joint (NOTATION.md). The component along the axis is the torque
+          of the rigid bodies: ``rne`` without friction and rotor inertia.
+        - The last K rows are the wrenches of the closures of loops, which the first link exerts on the second
+          link, in the second frame. Forces of redundant closure equations are statically indeterminate and
+          are 0 in the result.
+
+        ``wrench=`` and ``payload=`` as for ``rne``.
         """
         return self._code.loaded("joint_wrenches")
 
@@ -134,13 +138,16 @@ class NativeFunctions(metaclass=ArgumentErrors):
     def hybrid_dynamics(self) -> HybridFunction:
         """``hybrid_dynamics(q, qd, tau, qdd)`` → (qdd, tau), each (n,): motion with prescribed joints.
 
-        The joints of the robot's :class:`PrescribedMotion` constraints have the given accelerations
-        ``qdd``, all other joints the given torques ``tau``; the other entries of the arguments are not read.
-        The results are the accelerations of all joints, rad/s² or m/s², and the torques of all joints, N m or
-        N, including the drives of the prescribed joints. In closed loops the state is the consistent state
-        nearest to ``q``, ``qd`` with the given motion of these joints; the results are NaN if this state is
-        too far away. ``wrench=`` and ``payload=`` as for ``rne``. Raises RobotError without prescribed
-        joints, and if their motions depend on each other.
+        - ``qdd``: accelerations of the joints of the robot's :class:`PrescribedMotion` constraints, rad/s² or
+          m/s². Its other entries are not read.
+        - ``tau``: torques of all other joints, N m or N. Its other entries are not read.
+        - ``wrench=``, ``payload=``: as for ``rne``.
+
+        The results are the accelerations and the torques of all joints, including the drives of the
+        prescribed joints. In closed loops the state is the consistent state nearest to ``q``, ``qd`` with the
+        given motion of these joints; the results are NaN if this state is too far away.
+
+        Raises RobotError without prescribed joints, and if their motions depend on each other.
         """
         return cast("HybridFunction", self._code.loaded("hybrid_dynamics"))
 

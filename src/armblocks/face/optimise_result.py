@@ -37,9 +37,11 @@ def _nothing() -> Array:
 class OptimisedConstraint(metaclass=ArgumentErrors):
     """A constraint at the end of an optimisation: ``low <= value <= high``.
 
-    ``value``: in the scenario that is nearest to a limit. ``start``: the same at the start. ``multiplier``:
-    minus the derivative of the minimum with respect to the limit; positive for the upper limit, negative for
-    the lower one, 0 if neither is active, NaN if the method does not determine it.
+    - ``value``: in the scenario that is nearest to a limit.
+    - ``start``: the same at the start.
+    - ``multiplier``: minus the derivative of the minimum with respect to the limit. It is positive for the
+      upper limit, negative for the lower one, 0 if neither is active, NaN if the method does not determine
+      it.
     """
 
     name: str
@@ -78,19 +80,25 @@ class LocalSolution(metaclass=ArgumentErrors):
 class OptimisationResult(metaclass=ArgumentErrors):
     """The result of :func:`armblocks.optimise`. ``print`` shows it as tables.
 
-    ``diagram``: the diagram with the best values. ``variables``: the names of the n variables, with
-    ``units``, ``values``, ``start`` and ``bounds (n, 2)``. ``objective``, ``start_objective``: the value of
-    ``objective_name`` at both. ``constraints``: see :class:`OptimisedConstraint`. ``bound_multipliers
-    (n,)``: as for constraints, for the bounds of the variables.
-
-    ``method``: ``gradient`` (exact derivatives) or ``search`` (values alone); ``reason``: why. ``message``:
-    why the search ended; ``converged``: whether it found a minimum; ``feasible``: whether all constraints
-    hold. ``evaluations``, ``runs``: the numbers of evaluated points and of runs. ``history (K, 2 + n)``:
-    objective, largest relative violation of a constraint, and variables of each evaluated point.
-    ``solutions``: the ends of the searches from all starts.
-
-    ``scenarios``: the parameters of each scenario of the design ``over``; ``scenario_objectives``,
-    ``start_scenario_objectives (S,)``: the objective in each.
+    - ``diagram``: the diagram with the best values.
+    - ``variables``, ``units``: the names of the n variables, and their units.
+    - ``values``, ``start`` (n,): the best values and the values at the start.
+    - ``bounds`` (n, 2): the lowest and highest values.
+    - ``bound_multipliers`` (n,): the multipliers of the bounds, as for constraints.
+    - ``objective``, ``start_objective``: the value of ``objective_name`` at the best values and at the start.
+    - ``constraints``: see :class:`OptimisedConstraint`.
+    - ``method``: ``gradient`` (exact derivatives) or ``search`` (values alone).
+    - ``reason``: the reason for this method.
+    - ``message``: the reason why the search ended.
+    - ``converged``: whether the search found a minimum.
+    - ``feasible``: whether all constraints hold.
+    - ``evaluations``, ``runs``: the numbers of evaluated points and of runs.
+    - ``history`` (K, 2 + n): objective, largest relative violation of a constraint, and variables of each
+      evaluated point.
+    - ``solutions``: the ends of the searches from all starts.
+    - ``scenarios``: the parameters of each of the S scenarios of the design ``over``.
+    - ``scenario_objectives``, ``start_scenario_objectives`` (S,): the objective in each scenario, at the best
+      values and at the start.
     """
 
     diagram: Diagram = field(repr=False)

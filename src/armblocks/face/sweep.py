@@ -66,17 +66,17 @@ def sweep(
 ) -> SweepResult:
     """Run a diagram with many combinations of parameters, and return a table with a row for each run.
 
-    ``vary``: ``{"block.parameter": values}``. Values are a list, an array, or a distribution:
-    :func:`uniform`, :func:`loguniform`, :func:`normal`, :func:`seeds`. Lists form a grid of all
-    combinations. If there are distributions, ``runs`` is the number of runs, a multiple of the size of the
-    grid, and ``design`` is ``random``, ``sobol``, ``halton`` or ``latin``; ``seed`` determines the points.
-    With ``design="paired"``, or with a table or a list of mappings as ``vary``, each row is a run. Entries of
-    arrays are ``block.parameter[k]``. Parameters that are constants of the equations, such as robots and
-    sample times, are compiled for each combination.
-
+    - ``vary``: ``{"block.parameter": values}``. Values are a list, an array, or a distribution:
+      :func:`uniform`, :func:`loguniform`, :func:`normal`, :func:`seeds`. Lists form a grid of all
+      combinations. In a table or a list of mappings, each row is a run. Entries of arrays are
+      ``block.parameter[k]``. Parameters that are constants of the equations, such as robots and sample times,
+      are compiled for each combination.
     - ``measures``: a mapping of names to measures. A measure is a :class:`Measure`, a string such as
       ``"overshoot(motor/speed, final=1)"``, or a Python function of the result that returns a number.
     - ``keep``: signals whose samples are kept in memory or in the file.
+    - ``runs``: the number of runs if there are distributions, a multiple of the size of the grid.
+    - ``design``: ``random``, ``sobol``, ``halton`` or ``latin`` for distributions. With ``paired``, each row
+      of the lists is a run. ``seed`` determines the points of the design.
     - ``parameters``: parameter values for all runs. ``settings``: as for :func:`simulate`.
     - ``max_steps``: the maximum number of steps of a run. ``threads``: by default the number of cores.
     - ``lanes``: whether each thread computes several runs at a time in the lanes of vector registers, by

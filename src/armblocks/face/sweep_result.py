@@ -56,12 +56,14 @@ class SweepResult(metaclass=ArgumentErrors):
     - The measures; NaN for runs that failed or reached the step limit.
     - ``steps``, ``events`` and ``end_time`` (s).
 
-    ``kept`` names the signals whose samples are kept: ``result[name]`` is ``(runs, N)`` at ``time (N,)`` s,
-    NaN after the end of a run.
+    Attributes:
 
-    ``complete``: whether all runs were computed; Ctrl-C ends a sweep early. ``planned``: the number of runs
-    of the design. ``remark``: the number of runs that the native loop did not compute, the reason for this,
-    and the reason why lanes are not used.
+    - ``kept``: the signals whose samples are kept. ``result[name]`` is ``(runs, N)`` at ``time (N,)`` s, NaN
+      after the end of a run.
+    - ``complete``: whether all runs were computed; Ctrl-C ends a sweep early.
+    - ``planned``: the number of runs of the design.
+    - ``remark``: the number of runs that the native loop did not compute, the reason for this, and the reason
+      why lanes are not used.
     """
 
     name: str

@@ -20,10 +20,14 @@ Array = NDArray[np.float64]
 class SobolIndices(metaclass=ArgumentErrors):
     """Sobol indices of a measure, from :meth:`armblocks.SweepResult.sobol`; arrays ``(d,)`` for d parameters.
 
-    ``first``: the share of the variance that the parameter causes alone. ``total``: the share that would
-    remain if all other parameters were known; the difference comes from interactions. ``first_error``,
-    ``total_error``: half widths of the 95 % confidence intervals, from a bootstrap. ``groups``: the number of
-    groups of runs; ``omitted``: groups with a failed run. NaN if the measure is constant.
+    - ``first``: the share of the variance that the parameter causes alone.
+    - ``total``: the share that would remain if all other parameters were known. The difference comes from
+      interactions.
+    - ``first_error``, ``total_error``: half widths of the 95 % confidence intervals, from a bootstrap.
+    - ``groups``: the number of groups of runs.
+    - ``omitted``: the number of groups with a failed run.
+
+    Indices are NaN if the measure is constant.
     """
 
     measure: str
@@ -46,10 +50,14 @@ class SobolIndices(metaclass=ArgumentErrors):
 class MorrisEffects(metaclass=ArgumentErrors):
     """Elementary effects of Morris on a measure, from :meth:`armblocks.SweepResult.morris`; arrays ``(d,)``.
 
-    An effect is the change of the measure if the parameter passes its whole distribution, extrapolated
-    from half of it. ``mean_absolute``: the importance of the parameter (mu*). ``mean``: smaller than
-    ``mean_absolute`` in magnitude if the direction changes. ``deviation``: large for nonlinear parameters and
-    for interactions (sigma). ``groups``: the number of paths; ``omitted``: paths with a failed run.
+    An effect is the change of the measure if the parameter passes its whole distribution, extrapolated from
+    half of it.
+
+    - ``mean_absolute``: the importance of the parameter (mu*).
+    - ``mean``: smaller than ``mean_absolute`` in magnitude if the direction changes.
+    - ``deviation``: large for nonlinear parameters and for interactions (sigma).
+    - ``groups``: the number of paths.
+    - ``omitted``: the number of paths with a failed run.
     """
 
     measure: str

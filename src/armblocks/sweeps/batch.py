@@ -47,10 +47,13 @@ _RUNS = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64,
 class RunRows:
     """The results of several runs, a row for each run.
 
-    ``status (n,)``: indices in :data:`STATUSES`. ``messages``: texts for stopped and failed runs.
-    ``measures (n, nm)``, NaN for runs that failed. ``steps``, ``events (n,)``. ``end_time (n,)`` s. ``kept
-    (n, kept, N)``: samples, NaN after the end of a run. ``general``: the number of runs that the native loop
-    did not complete.
+    - ``status`` (n,): indices in :data:`STATUSES`.
+    - ``messages``: texts for stopped and failed runs.
+    - ``measures`` (n, nm): NaN for runs that failed.
+    - ``steps``, ``events`` (n,): numbers of steps and of events.
+    - ``end_time`` (n,) s.
+    - ``kept`` (n, kept, N): samples, NaN after the end of a run.
+    - ``general``: the number of runs that the native loop did not complete.
     """
 
     status: NDArray[np.int8]

@@ -33,10 +33,12 @@ def group_size(kind: str, dimensions: int) -> int:
 def sensitivity_points(kind: str, runs: int | None, dimensions: int, seed: int) -> Array:
     """The probabilities of the parameters of all runs, ``(runs, dimensions)``.
 
-    ``saltelli``: each group has a point A, a point B, and for each parameter A with the value of B. A and B
-    are points of a scrambled Sobol sequence (Saltelli et al., Computer Physics Communications 181, 2010).
-    ``morris``: each group is a path in which the parameters change one after the other, in random order
-    (Morris, Technometrics 33, 1991). Raises ``InputError`` for other numbers of runs.
+    - ``saltelli``: each group has a point A, a point B, and for each parameter A with the value of B. A and B
+      are points of a scrambled Sobol sequence (Saltelli et al., Computer Physics Communications 181, 2010).
+    - ``morris``: each group is a path in which the parameters change one after the other, in random order
+      (Morris, Technometrics 33, 1991).
+
+    Raises ``InputError`` for other numbers of runs.
     """
     size = group_size(kind, dimensions)
     if runs is None or runs < 2 * size or runs % size:
