@@ -84,7 +84,7 @@ class ConstrainedEquations:
         self._map = robot.coordinate_map
         tree_q = tree_coordinates(self._map, q)
         self._joints = joint_motions(tree, tree_q)
-        equations = constraint_equations(tree, tree_q).only(relations)
+        equations = constraint_equations(tree, tree_q).subset(relations)
         self.residuals = equations.residuals
         self.J = reduced_columns(self._map, equations.jacobian)
 
@@ -217,7 +217,7 @@ def projected(robot: Robot, tree: KinematicTree, q: SX, relations: Sequence[int]
     for _ in range(POSITION_STEPS):
         q = SX(vertcat(*integrated(robot, entries(q), entries(step(residuals)), 1.0)))
         at = tree_coordinates(robot.coordinate_map, q)
-        residuals = constraint_equations(tree, at).only(relations).residuals
+        residuals = constraint_equations(tree, at).subset(relations).residuals
     return q + if_else(_largest(residuals) <= MAX_RESIDUAL, 0.0, math.nan)
 
 

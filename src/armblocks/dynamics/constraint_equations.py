@@ -39,7 +39,7 @@ class ConstraintEquations:
     residuals: tuple[Scalar, ...]
     rows: tuple[tuple[Scalar, ...], ...]
 
-    def only(self, indices: Sequence[int]) -> ConstraintEquations:
+    def subset(self, indices: Sequence[int]) -> ConstraintEquations:
         """The relations with these indices."""
         names, residuals, rows = self.names, self.residuals, self.rows
         return ConstraintEquations(

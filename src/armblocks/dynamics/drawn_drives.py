@@ -113,7 +113,7 @@ class DrawnDrives:
             return SX(0, self.robot.nv), SX(0, 1)
         # dJ/dt qd is a derivative with respect to q at constant speeds: both are symbols.
         at, speeds = SX.sym("q", self.robot.nq), SX.sym("qd", self.robot.nv)
-        rows = constraint_equations(self.motion.tree, at).only(self._relations).jacobian
+        rows = constraint_equations(self.motion.tree, at).subset(self._relations).jacobian
         rates = vertcat(*position_rates(self.robot, entries(at), entries(speeds)))
         bias_of_rows = jtimes(mtimes(rows, speeds), at, rates)
         relations = Function("relations", [at, speeds], [rows, bias_of_rows])

@@ -163,7 +163,7 @@ def _shortest_step(
 def _relations(robot: Robot, tree: KinematicTree, q: SX, relations: Sequence[int]) -> tuple[SX, SX]:
     """The residuals (m, 1) of relations and their Jacobian (m, n) in independent speeds."""
     coordinates = robot.coordinate_map
-    equations = constraint_equations(tree, tree_coordinates(coordinates, q)).only(relations)
+    equations = constraint_equations(tree, tree_coordinates(coordinates, q)).subset(relations)
     return equations.residual_vector, SX(reduced_columns(coordinates, equations.jacobian))
 
 
