@@ -218,7 +218,7 @@ def restarted(features: Features, *, clocked: bool) -> Features:
     return dataclasses.replace(
         features.with_equations(equations),
         discrete=(*features.discrete, *added),
-        guards=tuple(dataclasses.replace(guard, silenced_by=_INSTANT_RESET) for guard in features.guards),
+        guards=tuple(dataclasses.replace(guard, disabled_by=_INSTANT_RESET) for guard in features.guards),
     )
 
 

@@ -98,14 +98,14 @@ def momentary_states(model: Model, symbols: Symbols) -> dict[tuple[str, str], in
     }
 
 
-def silenced_guards(
+def disabled_guards(
     guards: Sequence[tuple[str, Guard]], momentary: Mapping[tuple[str, str], int]
 ) -> tuple[tuple[int, int], ...]:
     """The guards that a momentary state disables, each with the index of this state in ``z``."""
     return tuple(
-        (number, momentary[name, guard.silenced_by])
+        (number, momentary[name, guard.disabled_by])
         for number, (name, guard) in enumerate(guards)
-        if guard.silenced_by
+        if guard.disabled_by
     )
 
 

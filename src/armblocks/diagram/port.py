@@ -71,7 +71,7 @@ class Guard:
 
     ``direction``: +1 for upward crossings, -1 for downward, 0 for both. ``action``: effect on the run where
     it is positive: ``stop`` ends the run, ``fail`` is an error, ``warn`` is reported at the end. ``locates``:
-    whether a zero crossing only locates a change of a following mode. ``silenced_by``: the momentary
+    whether a zero crossing only locates a change of a following mode. ``disabled_by``: the momentary
     state that disables the guard while it is not 0. At the end of the instant, the guard is initialised again
     with its sign at that time.
     """
@@ -82,7 +82,7 @@ class Guard:
     direction: int = 0
     action: str = ""
     locates: bool = False
-    silenced_by: str = ""
+    disabled_by: str = ""
 
 
 @dataclass(frozen=True)

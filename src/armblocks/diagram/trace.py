@@ -26,13 +26,13 @@ from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.features import AT_TICKS, SlotKind
 from armblocks.diagram.flat_values import broadcast_column
 from armblocks.diagram.guards_and_modes import (
+    disabled_guards,
     event_ranks,
     guards_of,
     hysteresis_modes,
     mode_contradictions,
     momentary_states,
     recaptured_states,
-    silenced_guards,
 )
 from armblocks.diagram.hierarchy import FlatForm, flatten_hierarchy
 from armblocks.diagram.implicit import solve_affine
@@ -125,7 +125,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
         hysteresis_modes=hysteresis_modes(model, symbols),
         recaptured_states=recaptured_states(model, symbols),
         momentary_states=tuple(momentary.values()),
-        silenced_guards=silenced_guards(entries, momentary),
+        disabled_guards=disabled_guards(entries, momentary),
         ranks=event_ranks(model, symbols, entries),
         locating_guards=tuple(number for number, (_, guard) in enumerate(entries) if guard.locates),
         contradictions=function("contradictions", point, c=contradictions) if modes else None,

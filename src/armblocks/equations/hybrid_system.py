@@ -168,7 +168,7 @@ class HybridSystem:
     """The indices in ``z`` of the captured values of hysteresis modes, which are captured again at events."""
     momentary_states: tuple[int, ...] = ()
     """The indices in ``z`` of the momentary values, which become 0 at the end of every instant."""
-    silenced_guards: tuple[tuple[int, int], ...] = ()
+    disabled_guards: tuple[tuple[int, int], ...] = ()
     """Guards, each with the index in ``z`` of a momentary value. While that value is nonzero the guard does
     not fire; at the end of the instant its stored sign becomes the sign of its value."""
     locating_guards: tuple[int, ...] = ()

@@ -293,10 +293,10 @@ class Events:
                 z[before[i]] = value
 
     def _end_instant(self) -> None:
-        """Give silenced guards their present signs, and set the momentary values to 0."""
+        """Give disabled guards their present signs, and set the momentary values to 0."""
         f, r = self.frame, self.frame.r
-        if self.functions.store_silenced_signs:
-            r.call(self.functions.store_silenced_signs, f.reals)
+        if self.functions.store_disabled_signs:
+            r.call(self.functions.store_disabled_signs, f.reals)
         if f.sizes.momentary_states:
             z, momentary = f.vector(f.workspace.z), r.integers("momentary", f.sizes.momentary_states)
             for i in r.each(len(f.sizes.momentary_states)):

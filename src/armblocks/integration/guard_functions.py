@@ -43,7 +43,7 @@ class GuardFunctions:
         self.count = len(sizes.directions)
         self.modes = sizes.modes
         self.followers = tuple(int(follows) for follows in sizes.followers)
-        self.silenced_guards = sizes.silenced_guards
+        self.disabled_guards = sizes.disabled_guards
         self.locating_guards = tuple(int(number in sizes.locating_guards) for number in range(self.count))
         self.tangents = sizes.tangents
         self.states, self.discrete = sizes.states, sizes.discrete
@@ -51,9 +51,9 @@ class GuardFunctions:
         self.mark_fired = program.define(self._mark_fired, "mark_fired")
         self.store_signs = program.define(self._store_signs, "store_signs")
         self.store_other_signs = program.define(self._store_other_signs, "store_other_signs")
-        self.store_silenced_signs = (
-            program.define(self._store_silenced_signs, "store_silenced_signs")
-            if sizes.silenced_guards
+        self.store_disabled_signs = (
+            program.define(self._store_disabled_signs, "store_disabled_signs")
+            if sizes.disabled_guards
             else None
         )
         self.count_events = program.define(self._count_events, "count_events")
@@ -96,7 +96,7 @@ class GuardFunctions:
             fired[i] = select(crossed, new_sign, 0.0)
             total.value = total.value + crossed.count()
         z = reals.after(workspace.z)
-        for guard, place in self._each_silenced_guard(r):
+        for guard, place in self._each_disabled_guard(r):
             active = (fired[guard] == 0.0) | (z[place] == 0.0)
             fired[guard] = select(active, fired[guard], 0.0)
             total.value = total.value - (~active).count()
@@ -293,21 +293,21 @@ class GuardFunctions:
             now, known = sign(values[i]), signs[i]
             signs[i] = select((fired[i] == 0.0) & (now != 0.0), now, known)
 
-    def _store_silenced_signs(self, r: Routine, reals: Reals) -> None:
-        """Set the signs of silenced guards to the signs of their values, including 0."""
+    def _store_disabled_signs(self, r: Routine, reals: Reals) -> None:
+        """Set the signs of disabled guards to the signs of their values, including 0."""
         workspace = self.workspace
         values, signs, z = (reals.after(place) for place in (workspace.guards, workspace.signs, workspace.z))
-        for guard, place in self._each_silenced_guard(r):
+        for guard, place in self._each_disabled_guard(r):
             signs[guard] = select(z[place] == 0.0, signs[guard], sign(values[guard]))
 
-    def _each_silenced_guard(self, r: Routine) -> Iterator[tuple[Integer, Integer]]:
-        """A loop of the routine over the silenced guards; yields each with the index of its momentary
+    def _each_disabled_guard(self, r: Routine) -> Iterator[tuple[Integer, Integer]]:
+        """A loop of the routine over the disabled guards; yields each with the index of its momentary
         value."""
-        if not self.silenced_guards:
+        if not self.disabled_guards:
             return
-        guards, indices = zip(*self.silenced_guards)
-        of_guards, of_places = r.integers("silenced.guards", guards), r.integers("silenced.by", indices)
-        for i in r.each(len(self.silenced_guards)):
+        guards, indices = zip(*self.disabled_guards)
+        of_guards, of_places = r.integers("disabled.guards", guards), r.integers("disabled.by", indices)
+        for i in r.each(len(self.disabled_guards)):
             yield of_guards[i], of_places[i]
 
     def _count_events(self, r: Routine, t: Real, reals: Reals, counts: Integers, first: Boolean) -> Real:

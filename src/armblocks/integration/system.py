@@ -131,8 +131,8 @@ class CompiledSystem:
             ),
             recaptured_states=tuple(int(place) for place in description["recaptured_states"]),
             momentary_states=tuple(int(place) for place in description["momentary_states"]),
-            silenced_guards=tuple(
-                (int(guard), int(place)) for guard, place in description["silenced_guards"]
+            disabled_guards=tuple(
+                (int(guard), int(place)) for guard, place in description["disabled_guards"]
             ),
             locating_guards=tuple(int(guard) for guard in description["locating_guards"]),
             **_sizes_of_ranks(description["ranks"]),
@@ -358,7 +358,7 @@ def _describe(system: HybridSystem, tapes: Mapping[str, Tape]) -> dict[str, Any]
         "hysteresis_modes": [list(places) for places in system.hysteresis_modes],
         "recaptured_states": list(system.recaptured_states),
         "momentary_states": list(system.momentary_states),
-        "silenced_guards": [list(places) for places in system.silenced_guards],
+        "disabled_guards": [list(places) for places in system.disabled_guards],
         "locating_guards": list(system.locating_guards),
         "ranks": None if system.ranks is None else dataclasses.asdict(system.ranks),
         "tangents": system.tangents,

@@ -156,7 +156,7 @@ class LoopSizes:
       while the previous value does not change (-1: none).
     - ``recaptured_states``: the indices in ``z`` of the captured values that belong to hysteresis modes.
     - ``momentary_states``: the indices in ``z`` that are set to 0 at the end of every instant.
-    - ``silenced_guards``: guards, each with an index of ``momentary_states``. While that value is nonzero,
+    - ``disabled_guards``: guards, each with an index of ``momentary_states``. While that value is nonzero,
       the guard does not fire.
     - ``locating_guards``: the guards that only locate mode changes.
     - ``guard_ranks``: the rank of each guard; empty if all events are processed together.
@@ -184,7 +184,7 @@ class LoopSizes:
     hysteresis_modes: tuple[tuple[int, int, int], ...] = ()
     recaptured_states: tuple[int, ...] = ()
     momentary_states: tuple[int, ...] = ()
-    silenced_guards: tuple[tuple[int, int], ...] = ()
+    disabled_guards: tuple[tuple[int, int], ...] = ()
     locating_guards: tuple[int, ...] = ()
     guard_ranks: tuple[int, ...] = ()
     ranks_before_ticks: tuple[int, ...] = (-1,)
