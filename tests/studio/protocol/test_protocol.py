@@ -19,7 +19,7 @@ from armblocks.studio.sheet.edits import EDITS
 
 
 def test_every_request_has_a_handler_of_its_reply_type(tmp_path: Path) -> None:
-    handlers = Hub(ProjectFolder(tmp_path)).answers.handlers
+    handlers = Hub(ProjectFolder(tmp_path)).request_handlers.handlers
     assert set(handlers) == set(messages_of(Request).values())
     replies = {request: get_type_hints(handler)["return"] for request, handler in handlers.items()}
     different = {request: reply for request, reply in replies.items() if reply != expected(request)}

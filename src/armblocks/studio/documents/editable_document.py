@@ -35,7 +35,7 @@ class Outcome(NamedTuple, Generic[Value]):
     gesture: str = ""
 
 
-class Edited(History[Value], ABC):
+class EditableDocument(History[Value], ABC):
     """A value that several clients may edit; see :class:`~armblocks.studio.documents.history.History`."""
 
     kind: ClassVar[DocumentKind]

@@ -33,7 +33,7 @@ from typing import Annotated, Any, Generic
 from pydantic import TypeAdapter, ValidationError
 
 from armblocks.errors import ArmblocksError, FormatError, counted
-from armblocks.studio.documents.file_kind import EditedT, FileKind
+from armblocks.studio.documents.file_kind import DocumentT, FileKind
 from armblocks.studio.documents.journal import Journal, Record, read_journal
 from armblocks.studio.documents.older_journals import converted
 from armblocks.studio.documents.project_folder import Fingerprint
@@ -45,11 +45,11 @@ _ALTERATIONS: TypeAdapter[Alteration] = TypeAdapter(Annotated[Alteration, AnyOf(
 
 
 @dataclass(kw_only=True)
-class JournaledFile(Generic[EditedT]):
+class JournaledFile(Generic[DocumentT]):
     """A diagram or robot recovered from its journal, and the path of the journal."""
 
     key: str
-    document: EditedT
+    document: DocumentT
     path: str | None
     origin: str
     on_disk: Fingerprint | None
@@ -149,7 +149,7 @@ class FileJournal:
         self._journal.close(keep=keep)
 
 
-def journaled_file(path: Path, kind: FileKind[Any, EditedT]) -> JournaledFile[EditedT]:
+def journaled_file(path: Path, kind: FileKind[Any, DocumentT]) -> JournaledFile[DocumentT]:
     """Return the document of a journal with as many of its edits as can be replayed.
 
     Raises ``FormatError`` if the journal contains no complete snapshot.
@@ -164,13 +164,13 @@ def journaled_file(path: Path, kind: FileKind[Any, EditedT]) -> JournaledFile[Ed
 
 
 def _replayed(
-    records: Sequence[Record], path: Path, whole: int, kind: FileKind[Any, EditedT]
-) -> JournaledFile[EditedT]:
+    records: Sequence[Record], path: Path, whole: int, kind: FileKind[Any, DocumentT]
+) -> JournaledFile[DocumentT]:
     head = records[0]["head"]
     number, text = _snapshot(records, str(path))
     recovered = JournaledFile(
         key=str(head["key"]),
-        document=kind.edited(kind.from_text(text, path.name), number),
+        document=kind.document(kind.from_text(text, path.name), number),
         path=head["path"],
         origin=head["origin"],
         on_disk=_fingerprint(head["on_disk"]),
@@ -224,9 +224,9 @@ def _step_counts(does: str, undo_count: int, redo_count: int) -> tuple[int, int]
             return undo_count + 1, 0
 
 
-class _Replay(Generic[EditedT]):
+class _Replay(Generic[DocumentT]):
     def __init__(
-        self, recovered: JournaledFile[EditedT], kind: FileKind[Any, EditedT], *, first: bool
+        self, recovered: JournaledFile[DocumentT], kind: FileKind[Any, DocumentT], *, first: bool
     ) -> None:
         self._recovered = recovered
         self._kind = kind

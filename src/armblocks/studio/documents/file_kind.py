@@ -9,14 +9,14 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
 
-from armblocks.studio.documents.edited import Edited
+from armblocks.studio.documents.editable_document import EditableDocument
 from armblocks.studio.documents.history import Value
 from armblocks.studio.protocol.messages.documents import DocumentKind
 
-EditedT = TypeVar("EditedT", bound=Edited[Any])
+DocumentT = TypeVar("DocumentT", bound=EditableDocument[Any])
 
 
-class FileKind(ABC, Generic[Value, EditedT]):
+class FileKind(ABC, Generic[Value, DocumentT]):
     """Creation, reading and writing of one kind of file. Reading methods raise ``ArmblocksError``."""
 
     name: ClassVar[DocumentKind]
@@ -31,7 +31,7 @@ class FileKind(ABC, Generic[Value, EditedT]):
         """Return the shipped example or robot of this name."""
 
     @abstractmethod
-    def edited(self, value: Value, version: int = 0) -> EditedT:
+    def document(self, value: Value, version: int = 0) -> DocumentT:
         """Return a document with undo history for a value."""
 
     @abstractmethod

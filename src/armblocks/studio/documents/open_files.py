@@ -20,7 +20,7 @@ from typing import Any, Generic, TypeVar
 
 from armblocks.errors import FormatError, InputError, UnknownNameError
 from armblocks.studio.documents.file_journal import SNAPSHOT_EVERY, FileJournal, JournaledFile
-from armblocks.studio.documents.file_kind import EditedT, FileKind
+from armblocks.studio.documents.file_kind import DocumentT, FileKind
 from armblocks.studio.documents.journal import SYNC_SECONDS
 from armblocks.studio.documents.project_folder import DiskState, Fingerprint, ProjectFolder
 from armblocks.studio.documents.recoverable_files import RecoverableFiles
@@ -35,11 +35,11 @@ WATCH_SECONDS = 1.0
 
 
 @dataclasses.dataclass(eq=False, kw_only=True)
-class OpenFile(Generic[EditedT]):
+class OpenFile(Generic[DocumentT]):
     """An edited document with its file and its journal."""
 
     key: str
-    document: EditedT
+    document: DocumentT
     path: str | None = None
     origin: str = ""
     """The shipped example or robot from which it was created."""
@@ -160,7 +160,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         key: str = "",
     ) -> OpenedT:
         """Open a value as a document, under the given key or a new key."""
-        open_file = self._add(self.kind.edited(value), key or secrets.token_hex(8))
+        open_file = self._add(self.kind.document(value), key or secrets.token_hex(8))
         open_file.path, open_file.origin, open_file.on_disk = path, origin, on_disk
         return open_file
 

@@ -14,9 +14,9 @@ from armblocks.studio.documents.dropped import dropped_bytes
 from armblocks.studio.documents.open_files import OpenFile
 from armblocks.studio.documents.presenter import Opening, Place, Presenter
 from armblocks.studio.documents.project_folder import ProjectFolder
-from armblocks.studio.protocol.answers import Answers
 from armblocks.studio.protocol.clients import Clients, StudioClient
 from armblocks.studio.protocol.messages import documents as document_messages
+from armblocks.studio.protocol.request_handlers import RequestHandlers
 
 
 class DocumentRequests:
@@ -32,24 +32,24 @@ class DocumentRequests:
         self._clients = clients
         self._presenters = presenters
 
-    def register(self, answers: Answers) -> None:
+    def register(self, handlers: RequestHandlers) -> None:
         """Register the handlers of the requests about documents."""
-        answers.on(document_messages.Open, self._open)
-        answers.on(document_messages.OpenShipped, self._open_shipped)
-        answers.on(document_messages.Drop, self._drop)
-        answers.on(document_messages.New, self._new)
-        answers.on(document_messages.Attach, self._attach)
+        handlers.on(document_messages.Open, self._open)
+        handlers.on(document_messages.OpenShipped, self._open_shipped)
+        handlers.on(document_messages.Drop, self._drop)
+        handlers.on(document_messages.New, self._new)
+        handlers.on(document_messages.Attach, self._attach)
         for alteration in (
             document_messages.Change,
             document_messages.Undo,
             document_messages.Redo,
             document_messages.Reload,
         ):
-            answers.on(alteration, self._alter)
-        answers.on(document_messages.IgnoreFileChange, self._ignore_file_change)
-        answers.on(document_messages.Save, self._save)
-        answers.on(document_messages.Close, self._close)
-        answers.on(document_messages.Recover, self._recover)
+            handlers.on(alteration, self._alter)
+        handlers.on(document_messages.IgnoreFileChange, self._ignore_file_change)
+        handlers.on(document_messages.Save, self._save)
+        handlers.on(document_messages.Close, self._close)
+        handlers.on(document_messages.Recover, self._recover)
 
     def __contains__(self, key: str) -> bool:
         return any(key in presenter.files for presenter in self._presenters.values())

@@ -11,24 +11,24 @@ if TYPE_CHECKING:
     from armblocks.studio.protocol.clients import StudioClient
 
 RequestT = TypeVar("RequestT", bound=Request[Any])
-Answer = Callable[["StudioClient", RequestT], Awaitable[Any]]
+Handler = Callable[["StudioClient", RequestT], Awaitable[Any]]
 
 
-class Answers:
+class RequestHandlers:
     """One handler for each class of requests. A test checks completeness and the types of the replies."""
 
     def __init__(self) -> None:
-        self._handlers: dict[type[Request[Any]], Answer[Any]] = {}
+        self._handlers: dict[type[Request[Any]], Handler[Any]] = {}
 
-    def on(self, request: type[RequestT], answer: Answer[RequestT]) -> None:
+    def on(self, request: type[RequestT], handler: Handler[RequestT]) -> None:
         """Register the handler of a class of requests; the handler returns the value of the reply."""
-        self._handlers[request] = answer
+        self._handlers[request] = handler
 
     async def reply_to(self, client: StudioClient, request: Request[ReplyT]) -> ReplyT:
         """Return the value of the reply to a request. Raises ``ArmblocksError`` if the request is refused."""
         return await self._handlers[type(request)](client, request)
 
     @property
-    def handlers(self) -> Mapping[type[Request[Any]], Answer[Any]]:
+    def handlers(self) -> Mapping[type[Request[Any]], Handler[Any]]:
         """Return the handler of each class of requests."""
         return self._handlers

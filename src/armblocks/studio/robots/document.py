@@ -7,7 +7,7 @@ import warnings
 from armblocks.errors import ArmblocksWarning
 from armblocks.robot import Link, Robot
 from armblocks.studio.documents.aspects import Aspect
-from armblocks.studio.documents.edited import Edited, Outcome
+from armblocks.studio.documents.editable_document import EditableDocument, Outcome
 from armblocks.studio.protocol.messages.documents import Change
 from armblocks.studio.protocol.messages.pose_edits import PoseEdit
 from armblocks.studio.protocol.messages.robot_edits import RobotEdit
@@ -17,8 +17,8 @@ from armblocks.studio.robots.link_columns import LINK_COLUMNS
 from armblocks.studio.robots.pose_edits import POSE_EDITS
 
 
-class RobotDocument(Edited[Robot]):
-    """One open robot; see :class:`~armblocks.studio.documents.edited.Edited`."""
+class RobotDocument(EditableDocument[Robot]):
+    """One open robot; see :class:`~armblocks.studio.documents.editable_document.EditableDocument`."""
 
     kind = "robot"
     edits = RobotEdit

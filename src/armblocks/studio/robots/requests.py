@@ -16,9 +16,9 @@ from armblocks.rendering.arm_drawing import arm_picture_svg
 from armblocks.robot import Robot
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.documents.requests import DocumentRequests
-from armblocks.studio.protocol.answers import Answers
 from armblocks.studio.protocol.clients import StudioClient
 from armblocks.studio.protocol.messages import robots as robot_messages
+from armblocks.studio.protocol.request_handlers import RequestHandlers
 from armblocks.studio.protocol.robot_scene import RobotScene
 from armblocks.studio.robots.presenter import RobotPresenter
 from armblocks.studio.robots.readings import readings
@@ -46,14 +46,14 @@ class RobotRequests:
         self._robots = presenter.files
         self._diagrams = diagrams
 
-    def register(self, answers: Answers) -> None:
+    def register(self, handlers: RequestHandlers) -> None:
         """Register the handlers of the requests about robots."""
-        answers.on(robot_messages.RobotOfBlock, self._open_of_block)
-        answers.on(robot_messages.AskRobotTables, self._tables)
-        answers.on(robot_messages.AskScene, self._scene)
-        answers.on(robot_messages.AskPose, self._pose)
-        answers.on(robot_messages.AskPicture, self._picture)
-        answers.on(robot_messages.AskReadings, self._readings)
+        handlers.on(robot_messages.RobotOfBlock, self._open_of_block)
+        handlers.on(robot_messages.AskRobotTables, self._tables)
+        handlers.on(robot_messages.AskScene, self._scene)
+        handlers.on(robot_messages.AskPose, self._pose)
+        handlers.on(robot_messages.AskPicture, self._picture)
+        handlers.on(robot_messages.AskReadings, self._readings)
 
     async def _open_of_block(self, client: StudioClient, request: robot_messages.RobotOfBlock) -> str:
         robot = self._block_robot(request.document, request.inside, request.block)

@@ -32,7 +32,7 @@ class RobotKind(FileKind[Robot, RobotDocument]):
         """A shipped robot, or a robot file of the project."""
         return formats.load_robot(self._folder.robot_path(name, formats.list_robots()))
 
-    def edited(self, value: Robot, version: int = 0) -> RobotDocument:
+    def document(self, value: Robot, version: int = 0) -> RobotDocument:
         """A robot in the editor."""
         return RobotDocument(value, version=version)
 

@@ -10,9 +10,9 @@ from armblocks.errors import FormatError, UnknownNameError
 from armblocks.face.arm import Arm
 from armblocks.robot import Configuration
 from armblocks.studio.documents.project_folder import ProjectFolder, check_file_name
-from armblocks.studio.protocol.answers import Answers
 from armblocks.studio.protocol.clients import StudioClient
 from armblocks.studio.protocol.messages import teaching as teaching_messages
+from armblocks.studio.protocol.request_handlers import RequestHandlers
 from armblocks.studio.robots.motions import Plan, plan, planned_motion, workspace
 from armblocks.studio.robots.open_robots import OpenRobots
 from armblocks.studio.robots.reaching import reached
@@ -28,13 +28,13 @@ class TeachingRequests:
         self._folder = folder
         self._robots = robots
 
-    def register(self, answers: Answers) -> None:
+    def register(self, handlers: RequestHandlers) -> None:
         """Register the handlers of these requests."""
-        answers.on(teaching_messages.AskReach, self._reach)
-        answers.on(teaching_messages.AskMotion, self._motion)
-        answers.on(teaching_messages.AskMotionRows, self._rows)
-        answers.on(teaching_messages.SaveMotion, self._save)
-        answers.on(teaching_messages.AskWorkspace, self._workspace)
+        handlers.on(teaching_messages.AskReach, self._reach)
+        handlers.on(teaching_messages.AskMotion, self._motion)
+        handlers.on(teaching_messages.AskMotionRows, self._rows)
+        handlers.on(teaching_messages.SaveMotion, self._save)
+        handlers.on(teaching_messages.AskWorkspace, self._workspace)
 
     async def _reach(self, _: StudioClient, request: teaching_messages.AskReach) -> teaching_messages.Reached:
         return await self._computed(request.document, lambda arm, _: reached(arm, request.q, request.target))

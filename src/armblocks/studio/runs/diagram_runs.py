@@ -9,10 +9,10 @@ from typing import Any
 
 from armblocks.diagram import Diagram
 from armblocks.errors import InputError, UnknownNameError
-from armblocks.studio.protocol.answers import Answers
 from armblocks.studio.protocol.clients import Clients, StudioClient
 from armblocks.studio.protocol.message import Message
 from armblocks.studio.protocol.messages import runs as run_messages
+from armblocks.studio.protocol.request_handlers import RequestHandlers
 from armblocks.studio.runs.process import RunProcess
 from armblocks.studio.runs.record import RunRecord
 from armblocks.studio.runs.report import report_of
@@ -39,11 +39,11 @@ class DiagramRuns:
         self._names: dict[str, PathNames] = {}
         self._send_tasks: set[asyncio.Task[None]] = set()
 
-    def register(self, answers: Answers) -> None:
+    def register(self, handlers: RequestHandlers) -> None:
         """Register the handlers of the requests about runs."""
-        answers.on(run_messages.Run, self._run)
+        handlers.on(run_messages.Run, self._run)
         for command in (run_messages.Control, run_messages.SetSpeed, run_messages.Rewind, run_messages.Tune):
-            answers.on(command, self._command)
+            handlers.on(command, self._command)
 
     def run_key(self, document: str) -> str | None:
         """The key of the run of a diagram, or ``None``."""

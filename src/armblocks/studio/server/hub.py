@@ -23,11 +23,11 @@ from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.documents.requests import DocumentRequests
 from armblocks.studio.documents.state_folder import StateFolder
 from armblocks.studio.documents.trusted_files import TrustedFiles
-from armblocks.studio.protocol.answers import Answers
 from armblocks.studio.protocol.clients import Clients, InvalidRequestError, StudioClient
 from armblocks.studio.protocol.envelope import Envelope, Reply
 from armblocks.studio.protocol.message import Fault
 from armblocks.studio.protocol.messages.studio import FileList, Files, Ping, Welcome
+from armblocks.studio.protocol.request_handlers import RequestHandlers
 from armblocks.studio.robots.open_robots import OpenRobots
 from armblocks.studio.robots.presenter import RobotPresenter
 from armblocks.studio.robots.requests import RobotRequests
@@ -79,9 +79,9 @@ class Hub:
         self.documents = DocumentRequests(
             folder, self._clients, {"diagram": self._diagram_presenter, "robot": robots}
         )
-        self.answers = Answers()
-        self.answers.on(Ping, self._ping)
-        self.answers.on(Files, self._files)
+        self.request_handlers = RequestHandlers()
+        self.request_handlers.on(Ping, self._ping)
+        self.request_handlers.on(Files, self._files)
         for handlers in (
             self.documents,
             SheetQueries(folder, self.documents, self._diagrams, self._resolve_robot, lines),
@@ -90,7 +90,7 @@ class Hub:
             TeachingRequests(folder, open_robots),
             self.runs,
         ):
-            handlers.register(self.answers)
+            handlers.register(self.request_handlers)
         self._watch_tasks: list[asyncio.Task[None]] = []
 
     def prepare(self) -> None:
@@ -145,7 +145,7 @@ class Hub:
             return
         number, fault, value = envelope.number, None, None
         try:
-            value = await self.answers.reply_to(client, envelope.request)
+            value = await self.request_handlers.reply_to(client, envelope.request)
         except ArmblocksError as error:
             fault = Fault(what=error.what, where=error.where, allowed=error.allowed, fix=error.fix)
         except Exception as error:

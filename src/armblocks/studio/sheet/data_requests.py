@@ -16,10 +16,10 @@ from armblocks.formats.table_files import TABLE_SUFFIXES, columns_of
 from armblocks.studio.documents.dropped import dropped_bytes
 from armblocks.studio.documents.project_data import SOURCE_SUFFIXES, ProjectData
 from armblocks.studio.documents.trusted_files import digest_of
-from armblocks.studio.protocol.answers import Answers
 from armblocks.studio.protocol.clients import StudioClient
 from armblocks.studio.protocol.message import Fault
 from armblocks.studio.protocol.messages import data_files as data_messages
+from armblocks.studio.protocol.request_handlers import RequestHandlers
 from armblocks.studio.sheet.table_preview import table_preview
 
 _INVISIBLE = re.compile(
@@ -40,13 +40,13 @@ class DataRequests:
         self._folder = data.folder
         self._recheck = recheck
 
-    def register(self, answers: Answers) -> None:
+    def register(self, handlers: RequestHandlers) -> None:
         """Register the handlers of the requests about data files."""
-        answers.on(data_messages.DataFileList, self._files)
-        answers.on(data_messages.PreviewTable, self._preview)
-        answers.on(data_messages.StoreFile, self._store)
-        answers.on(data_messages.ReadSource, self._source)
-        answers.on(data_messages.TrustSource, self._trust)
+        handlers.on(data_messages.DataFileList, self._files)
+        handlers.on(data_messages.PreviewTable, self._preview)
+        handlers.on(data_messages.StoreFile, self._store)
+        handlers.on(data_messages.ReadSource, self._source)
+        handlers.on(data_messages.TrustSource, self._trust)
 
     async def _files(
         self, _: StudioClient, request: data_messages.DataFileList

@@ -38,7 +38,7 @@ class DiagramKind(FileKind[Diagram, Document]):
             raise UnknownNameError("example", name, example_names)
         return placed(formats.load_diagram(name, BLOCKS))
 
-    def edited(self, value: Diagram, version: int = 0) -> Document:
+    def document(self, value: Diagram, version: int = 0) -> Document:
         """An open diagram."""
         return Document(
             value, self._resolve_robot, version=version, read_diagram=self.from_text, data=self._data

@@ -8,7 +8,7 @@ from dataclasses import replace
 from armblocks.diagram import Diagram
 from armblocks.formats.data_files import DataFiles
 from armblocks.studio.documents.aspects import Aspect, changed_aspects
-from armblocks.studio.documents.edited import Edited, Outcome
+from armblocks.studio.documents.editable_document import EditableDocument, Outcome
 from armblocks.studio.protocol.messages.documents import Change
 from armblocks.studio.protocol.messages.sheet_edits import (
     DiagramEdit,
@@ -25,8 +25,8 @@ from armblocks.studio.sheet.renames import MovedBlocks
 from armblocks.studio.sheet.scope_triggers import with_consistent_trigger
 
 
-class Document(Edited[Diagram]):
-    """One open diagram; see :class:`~armblocks.studio.documents.edited.Edited`."""
+class Document(EditableDocument[Diagram]):
+    """One open diagram; see :class:`~armblocks.studio.documents.editable_document.EditableDocument`."""
 
     kind = "diagram"
     edits = DiagramEdit

@@ -13,10 +13,10 @@ from armblocks.diagram.propagated_names import propagated_names
 from armblocks.errors import UnknownNameError
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.documents.requests import DocumentRequests
-from armblocks.studio.protocol.answers import Answers
 from armblocks.studio.protocol.clients import StudioClient
 from armblocks.studio.protocol.messages import sheets as sheet_messages
 from armblocks.studio.protocol.messages.sheet_edits import SetMask
+from armblocks.studio.protocol.request_handlers import RequestHandlers
 from armblocks.studio.sheet.bookmarks import bookmarks_of
 from armblocks.studio.sheet.clipping import clipped
 from armblocks.studio.sheet.edits import connection
@@ -47,18 +47,18 @@ class SheetQueries:
         self._resolve_robot = resolve_robot
         self._lines = lines
 
-    def register(self, answers: Answers) -> None:
+    def register(self, handlers: RequestHandlers) -> None:
         """Register the handlers of the requests about sheets."""
-        answers.on(sheet_messages.ShowSheet, self._show_sheet)
-        answers.on(sheet_messages.RouteWires, self._route)
-        answers.on(sheet_messages.AskOutline, self._outline)
-        answers.on(sheet_messages.AskMask, self._mask)
-        answers.on(sheet_messages.AskParameterSets, self._parameter_sets)
-        answers.on(sheet_messages.AskBookmarks, self._bookmarks)
-        answers.on(sheet_messages.Copy, self._copy)
-        answers.on(sheet_messages.Find, self._find)
-        answers.on(sheet_messages.TypedValue, self._typed_value)
-        answers.on(sheet_messages.TypedSettings, self._typed_settings)
+        handlers.on(sheet_messages.ShowSheet, self._show_sheet)
+        handlers.on(sheet_messages.RouteWires, self._route)
+        handlers.on(sheet_messages.AskOutline, self._outline)
+        handlers.on(sheet_messages.AskMask, self._mask)
+        handlers.on(sheet_messages.AskParameterSets, self._parameter_sets)
+        handlers.on(sheet_messages.AskBookmarks, self._bookmarks)
+        handlers.on(sheet_messages.Copy, self._copy)
+        handlers.on(sheet_messages.Find, self._find)
+        handlers.on(sheet_messages.TypedValue, self._typed_value)
+        handlers.on(sheet_messages.TypedSettings, self._typed_settings)
 
     def _sheet(self, document: str, path: Sequence[str] = ()) -> Diagram:
         return inside(self._diagrams[document].document.diagram, path)
