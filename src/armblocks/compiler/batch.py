@@ -127,14 +127,14 @@ def _add_block(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
     declared += [(f"ptr noalias{' readonly' if p[0] == 'i' else ''}", f"%{p}") for p in pointer_names(tape)]
     body = Body(module, lanes)
     if is_long(tape):
-        undecided = emit_parts(body, tape, name, declared, stores, inputs_of, store)
+        unsupported = emit_parts(body, tape, name, declared, stores, inputs_of, store)
     else:
         registers = emit_operations(body, tape, inputs_of(body))
         for k in stores:
             store(body, registers, k)
-        undecided = None
-        if body.undecided is not None:
-            undecided = body.let(f"bitcast {body.bit} {body.undecided} to i{lanes}")
+        unsupported = None
+        if body.unsupported is not None:
+            unsupported = body.let(f"bitcast {body.bit} {body.unsupported} to i{lanes}")
     if lanes == 1:
         result, inlined = "void", "noinline"
         body.do("ret void")
@@ -144,7 +144,8 @@ def _add_block(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
         # inlining would add metadata to every access.
         result, inlined = "i1", "alwaysinline"
         declared = [(kind.split()[0], argument) for kind, argument in declared]
-        body.do(f"ret i1 {'false' if undecided is None else body.let(f'icmp ne i{lanes} {undecided}, 0')}")
+        is_any = "false" if unsupported is None else body.let(f"icmp ne i{lanes} {unsupported}, 0")
+        body.do(f"ret i1 {is_any}")
     arguments = ", ".join(f"{kind} {argument}" for kind, argument in declared)
     head = f"define internal {result} @{name}({arguments}) nounwind {inlined} {{\nentry:\n"
     module.add(name, head + "\n".join(body.lines) + "\n}")

@@ -55,7 +55,7 @@ class Body:
         self.word = self.type("i64")
         self.bit = self.type("i1")
         self.lines: list[str] = []
-        self.undecided: str | None = None
+        self.unsupported: str | None = None
         """The condition of lanes that must be evaluated again with one lane; None if there are none."""
         self._count = 0
 
@@ -186,9 +186,9 @@ class Body:
         """Disjunction of conditions."""
         return self.let(f"or {self.bit} {a}, {b}")
 
-    def mark_undecided(self, condition: str) -> None:
+    def mark_unsupported(self, condition: str) -> None:
         """Mark lanes in which this body's results are invalid and must be computed again with one lane."""
-        self.undecided = condition if self.undecided is None else self.either(self.undecided, condition)
+        self.unsupported = condition if self.unsupported is None else self.either(self.unsupported, condition)
 
     # Sums and products without error, as unevaluated pairs.
 

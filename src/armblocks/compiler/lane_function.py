@@ -10,14 +10,14 @@ from armblocks.compiler.tape_parts import emit_parts, is_long
 
 
 def emit_lane_function(
-    module: Module, tape: Tape, name: str, lanes: int, *, reports_undecided: bool = False
+    module: Module, tape: Tape, name: str, lanes: int, *, reports_unsupported: bool = False
 ) -> None:
     """Add ``void @name(ptr in0, …, ptr out0, …)``: the tape in each lane.
 
     Each pointer points to rows of one double for each lane, aligned to the size of a row, with one row for
     each number of the slot. Outputs must not overlap inputs or each other. Unlike the functions of a batch,
     lanes with arguments that vector functions do not support, such as the sine of 1e300, are not evaluated
-    again. Their results are invalid; the caller must avoid such arguments. With ``reports_undecided`` the
+    again. Their results are invalid; the caller must avoid such arguments. With ``reports_unsupported`` the
     function returns these lanes: an integer (i64) with a bit for each lane.
     """
     pointers = [("ptr noalias readonly", f"%i{k}") for k in range(len(tape.input_sizes))]
@@ -55,18 +55,18 @@ def emit_lane_function(
         body = Body(module, lanes)
         if is_long(tape):
             groups = {place: (tape.outputs[slot][index],) for place, (slot, index) in places.items()}
-            undecided = emit_parts(body, tape, name, pointers, groups, inputs_of, store)
+            unsupported = emit_parts(body, tape, name, pointers, groups, inputs_of, store)
         else:
             registers = emit_operations(body, tape, inputs_of(body))
             for place in places:
                 store(body, registers, place)
-            undecided = None
-            if reports_undecided and body.undecided is not None:
-                undecided = body.let(f"bitcast {body.bit} {body.undecided} to i{lanes}")
+            unsupported = None
+            if reports_unsupported and body.unsupported is not None:
+                unsupported = body.let(f"bitcast {body.bit} {body.unsupported} to i{lanes}")
         result = "void"
-        if reports_undecided:
+        if reports_unsupported:
             result = "i64"
-            body.do(f"ret i64 {body.let(f'zext i{lanes} {undecided} to i64') if undecided else '0'}")
+            body.do(f"ret i64 {body.let(f'zext i{lanes} {unsupported} to i64') if unsupported else '0'}")
         else:
             body.do("ret void")
         arguments = ", ".join(f"{kind} {pointer}" for kind, pointer in pointers)

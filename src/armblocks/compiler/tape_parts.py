@@ -144,23 +144,23 @@ def emit_parts(
     declared = ", ".join([f"{kind} {argument}" for kind, argument in arguments] + ["ptr noalias %memory"])
     passed = [f"{kind.split()[0]} {argument}" for kind, argument in arguments] + [f"ptr {memory.address}"]
     bits = f"i{lanes}"
-    undecided: str | None = None
+    unsupported: str | None = None
     for number, part in enumerate(divided.parts):
         body = Body(module, lanes)
         _emit_part(body, tape, divided, part, inputs_of(body), store_group)
-        symbol, result = f"{name}.{number}", "void" if body.undecided is None else bits
+        symbol, result = f"{name}.{number}", "void" if body.unsupported is None else bits
         call = f"call {result} @{symbol}({', '.join(passed)})"
-        if body.undecided is None:
+        if body.unsupported is None:
             body.do("ret void")
             caller.do(call)
         else:
-            body.do(f"ret {bits} {body.let(f'bitcast {body.bit} {body.undecided} to {bits}')}")
+            body.do(f"ret {bits} {body.let(f'bitcast {body.bit} {body.unsupported} to {bits}')}")
             new = caller.let(call)
-            undecided = new if undecided is None else caller.let(f"or {bits} {new}, {undecided}")
+            unsupported = new if unsupported is None else caller.let(f"or {bits} {new}, {unsupported}")
         head = f"define internal {result} @{symbol}({declared}) nounwind noinline {{\nentry:\n"
         module.add(symbol, head + "\n".join(body.lines) + "\n}")
     memory.free()
-    return undecided
+    return unsupported
 
 
 def _emit_part(

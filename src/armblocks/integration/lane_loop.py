@@ -35,7 +35,7 @@ def lane_code(
 
     def write() -> str:
         module = Module()
-        emit_lane_function(module, tape(), "lane_derivative", lanes, reports_undecided=True)
+        emit_lane_function(module, tape(), "lane_derivative", lanes, reports_unsupported=True)
         program = Program(lanes)
         define_lane_loop(program, "runs", tableau, sizes)
         add_program(module, program)

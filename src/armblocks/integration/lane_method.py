@@ -44,8 +44,11 @@ class LaneMethod:
         self._shared = shared
         self._p = memory.after(workspace.p)
         self._none = LaneArray(r, Constant(Kind.ADDRESS, None))
-        self.undecided = r.integer(0)
-        """The lanes with an evaluation that is not valid, a bit for each."""
+        self.unsupported = r.integer(0)
+        """The lanes with arguments that the vector functions do not support, a bit for each lane.
+
+        Their results are invalid.
+        """
         rtol, atol = in_all_lanes(shared[Shared.RTOL]), in_all_lanes(shared[Shared.ATOL])
         self.max_step = in_all_lanes(shared[Shared.MAX_STEP])
         self.sums = StepSums(r, self.n, self.x, self.y, self.K, self.number, rtol, atol)
@@ -68,7 +71,7 @@ class LaneMethod:
         self.memory[Row.POINT] = minimum(time, self.memory[Row.CLAMP])
         point = self.memory.after(Row.POINT)
         bits = self.r.call(lane_derivative, point, state, self._none, self._none, self._p, self.K(row))
-        self.undecided.value = self.undecided.value | bits
+        self.unsupported.value = self.unsupported.value | bits
 
     def short_change(self) -> Lanes:
         """The change of the derivative below which a step is needlessly short."""

@@ -250,7 +250,7 @@ class LaneFunctions:
             memory[Row.GROWTH] = select(starting, GROW, memory[Row.GROWTH])
         memory[Row.STARTING] = select(starting, 0.0, memory[Row.STARTING])
         memory[Row.RUNNING] = select(starting, 1.0, memory[Row.RUNNING])
-        failed = not_finite | method.undecided.value & starting.bits()
+        failed = not_finite | method.unsupported.value & starting.bits()
 
         def check(lane: Integer) -> None:
             counts = Lane(addresses, lane).integers(LanePlace.COUNTS)

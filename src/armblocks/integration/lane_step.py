@@ -1,5 +1,7 @@
-"""One trial step of the loop with a run in each lane: the operations of
-:mod:`armblocks.integration.step_control` and :mod:`armblocks.integration.segments` for all lanes at a time.
+"""One trial step of the loop that computes a run in each lane of the vector registers.
+
+The operations are those of :mod:`armblocks.integration.step_control` and
+:mod:`armblocks.integration.segments`, for all lanes at a time.
 """
 
 from __future__ import annotations
@@ -57,14 +59,14 @@ class LaneStep:
             status = self.r.constant_integer(Status.NON_FINITE)
             self.r.call(self.loop.end_runs, self.memory, self.addresses, self.failed.value, status)
 
-    def _decided(self) -> Mask:
-        """Running lanes whose stages are valid; the others fail."""
-        undecided = self.method.undecided.value & self.running.bits()
+    def _valid_lanes(self) -> Mask:
+        """The running lanes whose arguments the vector functions support; the other lanes fail."""
+        unsupported = self.method.unsupported.value & self.running.bits()
         memory, r, loop = self.memory, self.r, self.loop
-        with r.when(undecided != 0, rarely=True):
-            self.failed.value = self.failed.value | undecided
+        with r.when(unsupported != 0, rarely=True):
+            self.failed.value = self.failed.value | unsupported
             for lane in r.range(0, loop.lanes):
-                with r.when(((undecided >> lane) & 1) != 0):
+                with r.when(((unsupported >> lane) & 1) != 0):
                     memory.reals[lane + Row.RUNNING * loop.lanes] = 0.0
         return memory[Row.RUNNING] > 0.0
 
@@ -76,7 +78,7 @@ class LaneStep:
         norm = method.explicit.error_norm(h, error)
         bounded = minimum(maximum(norm, 1e-30), 1e30)
         ideal = SAFETY * inverse_root(bounded, method.tableau.error_order + 1)
-        running = self._decided()
+        running = self._valid_lanes()
         accepted = running & (norm < 1.0) & method.sums.all_finite(method.y)
         self._check_stiffness(accepted)
         self._check_short_steps(accepted, new_time, h)
@@ -104,7 +106,7 @@ class LaneStep:
         h = new_time - time
         method.explicit.stages(time, h, new_time)
         finite = method.sums.all_finite(method.y, method.K(method.tableau.end_row))
-        running = self._decided()
+        running = self._valid_lanes()
         self.failed.value = self.failed.value | (running & ~finite).bits()
         self._accept(running & finite, new_time, h)
 
@@ -118,13 +120,13 @@ class LaneStep:
         with r.when(due.any):
             limited = method.is_at_border()
             stiff, non_stiff = memory[Row.STIFF].bits(), memory[Row.NON_STIFF].bits()
-            more, calm = stiff + 1, non_stiff + 1
-            kept = select(calm >= NON_STIFF_CHECKS, _zero(stiff), stiff)
-            new_stiff = select(due, select(limited, more, kept), stiff)
-            new_calm = select(due, select(limited, _zero(calm), calm), non_stiff)
+            more_stiff, more_non_stiff = stiff + 1, non_stiff + 1
+            remaining = select(more_non_stiff >= NON_STIFF_CHECKS, _zero(stiff), stiff)
+            new_stiff = select(due, select(limited, more_stiff, remaining), stiff)
+            new_non_stiff = select(due, select(limited, _zero(more_non_stiff), more_non_stiff), non_stiff)
             memory[Row.STIFF] = new_stiff.from_bits()
-            memory[Row.NON_STIFF] = new_calm.from_bits()
-            reached = due & limited & (more >= STIFF_CHECKS)
+            memory[Row.NON_STIFF] = new_non_stiff.from_bits()
+            reached = due & limited & (more_stiff >= STIFF_CHECKS)
             detection = self.addresses[SharedPlace.COUNTS].integers[SharedCount.STIFFNESS_DETECTION]
             with r.when(reached.any & (detection != 0), rarely=True):
                 memory[Row.ALLOWED] = select(reached, 0.0, memory[Row.ALLOWED])
@@ -170,8 +172,8 @@ class LaneStep:
                 inside = due & (memory[Row.NEXT_SAMPLE] < new_time)
                 with r.when(inside.any):
                     method.explicit.extra_stages(self.time, h)
-                    undecided = method.undecided.value & accepted.bits()
-                    self.failed.value = self.failed.value | undecided
+                    unsupported = method.unsupported.value & accepted.bits()
+                    self.failed.value = self.failed.value | unsupported
             memory[Row.NEW_TIME], memory[Row.TRIED] = new_time, h
             r.call(self.loop.write_samples, memory, self.addresses, due.bits())
 

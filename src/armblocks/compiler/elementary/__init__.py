@@ -73,9 +73,9 @@ def _call(body: Body, opcode: Opcode, values: Sequence[str]) -> str:
         inner = Body(body.module, body.lanes)
         parameters = [f"%x{k}" for k in range(len(values))]
         value = _FUNCTIONS[opcode](inner, *parameters)
-        if inner.undecided is not None:
+        if inner.unsupported is not None:
             half = inner.let(f"insertvalue {result} poison, {body.real} {value}, 0")
-            value = inner.let(f"insertvalue {result} {half}, {body.bit} {inner.undecided}, 1")
+            value = inner.let(f"insertvalue {result} {half}, {body.bit} {inner.unsupported}, 1")
         inner.do(f"ret {result} {value}")
         head = ", ".join(f"{body.real} {parameter}" for parameter in parameters)
         head = f"define internal {result} @{symbol}({head}) nounwind {{"
@@ -85,5 +85,5 @@ def _call(body: Body, opcode: Opcode, values: Sequence[str]) -> str:
     returned = body.let(f"call {result} @{symbol}({', '.join(f'{body.real} {value}' for value in values)})")
     if not has_rare_cases:
         return returned
-    body.mark_undecided(body.let(f"extractvalue {result} {returned}, 1"))
+    body.mark_unsupported(body.let(f"extractvalue {result} {returned}, 1"))
     return body.let(f"extractvalue {result} {returned}, 0")

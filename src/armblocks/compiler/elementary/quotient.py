@@ -56,7 +56,7 @@ def _modulo(body: Body, a: str, b: str) -> str:
     rest = body.select(valid, rest, body.number(float("nan")))
     large = body.both(valid, body.compare("oge", quotient, body.number(2.0**53)))
     if body.lanes > 1:
-        body.mark_undecided(large)
+        body.mark_unsupported(large)
         return rest
 
     _define_large(body.module)

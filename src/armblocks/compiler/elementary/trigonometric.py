@@ -91,7 +91,7 @@ def _reduce(body: Body, magnitude: str) -> _Reduced:
     quarter = body.bits(rounded)
     huge = body.compare("ogt", magnitude, body.number(_MAX_MODERATE_ANGLE))
     if body.lanes > 1:
-        body.mark_undecided(huge)
+        body.mark_unsupported(huge)
         return _Reduced(angle, rest, quarter)
 
     _define_reduction(body.module)
