@@ -48,7 +48,7 @@ class DiagramWriter:
                 key: {**members_of(block_extras.get(key)), **self._block(block), **_commented(key, diagram)}
                 for key, block in diagram.blocks.items()
             },
-            "connections": [str(wire) for wire in diagram.connections],
+            "connections": [str(connection) for connection in diagram.connections],
             **({"frame_lines": [str(line) for line in diagram.frame_lines]} if diagram.frame_lines else {}),
             **({"logged": [str(ref) for ref in diagram.logged]} if diagram.logged else {}),
             **(
@@ -64,7 +64,7 @@ class DiagramWriter:
         }
 
     def _block(self, block: Block) -> dict[str, object]:
-        """A block; an inner diagram is not among the parameters, which limits the nesting depth."""
+        """A block. An inner diagram is a member beside ``parameters``, which saves a level of nesting."""
         formulas = dict(block.formulas)
         values = {rule: block.parameter_value(rule.name) for rule in block.own_parameters()}
         parameter_values = {

@@ -1,14 +1,17 @@
 """Native functions of the delay buffer: store and interpolate the history of delayed signals.
 
 The history is a table at the end of the run's array of doubles. A row has a time, a flag for the middle of a
-step, and the value and exact derivative of every delayed signal. Each step adds two rows, its middle and its
-end; the quintic Hermite interpolant through three values and derivatives has the accuracy of the step. A
-signal may vary faster than the states, for example a square root or a fast sine of time. The step is then
-subdivided until the interpolant matches the signal within the tolerances. Where a derivative is not finite,
-the parabola through the three values replaces it. Where a signal or its derivative jumps, two rows have the
-same time: the left and the right limit. A line (one delayed scalar) reads only the rows before the next jump
-until its delayed time reaches the jump. Its value is therefore smooth within a step, and the loop ends a step
-exactly at the jump.
+step, and the value and exact derivative of every delayed signal.
+
+Steps: each step adds two rows, its middle and its end. The quintic Hermite interpolant through three values
+and derivatives has the accuracy of the step. A signal may vary faster than the states, for example a square
+root or a fast sine of time. The step is then subdivided until the interpolant matches the signal within the
+tolerances. Where a derivative is not finite, the derivative of the parabola through the three values replaces
+it.
+
+Jumps: where a signal or its derivative jumps, two rows have the same time, the left and the right limit. A
+line (one delayed scalar) reads only the rows before the next jump until its delayed time reaches the jump.
+Its value is therefore smooth within a step, and the loop ends a step exactly at the jump.
 """
 
 from __future__ import annotations
@@ -26,7 +29,7 @@ SAME_ABOVE = 1.0 + 2.0**-50
 """Two times are the same instant if their ratio is at most this factor."""
 MAX_SUBINTERVALS = 256
 """Maximum number of subintervals of one step. The subintervals become shorter toward the singularity of a
-square root, by up to 48 powers of two, and longer after it."""
+square root, down to about 2^-48 of the time, and longer after it."""
 ROWS_OF_A_STEP = 2 * MAX_SUBINTERVALS + 6
 """Maximum number of rows that one step adds, including events at its end and the row for comparison."""
 NO_DERIVATIVE = sys.float_info.max

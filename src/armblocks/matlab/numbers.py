@@ -91,7 +91,7 @@ class NumberArithmetic:
         return np.logical_and(left != 0.0, right != 0.0)
 
     def logical_or(self, left: Array, right: Array) -> Array:
-        """1 where one is not 0, else 0."""
+        """1 where at least one is not 0, else 0."""
         return np.logical_or(left != 0.0, right != 0.0)
 
     def constant(self, array: NDArray[np.float64]) -> Array:
@@ -114,6 +114,7 @@ class NumberArithmetic:
         """The sum of a vector, or the sums of the columns of a matrix."""
         if value.size:
             return self.fold(np.add, value)
+        # A matrix without rows has a sum of 0 for each column.
         return np.zeros((1, value.shape[1])) if value.shape[0] == 0 and value.shape[1] > 1 else scalar(0.0)
 
     def norm(self, value: Array) -> Array:
@@ -129,7 +130,7 @@ class NumberArithmetic:
         return np.array(entries, dtype=np.float64).reshape((-1, 1) if model.shape[1] == 1 else (1, -1))
 
     def constant_number(self, value: Array) -> float:
-        """A constant number; NaN for anything else."""
+        """The element of an array with one element, else NaN."""
         return float(value[0, 0]) if value.size == 1 else math.nan
 
     def from_rows(self, rows: Sequence[Sequence[Any]]) -> Array:
@@ -180,7 +181,7 @@ class Numbers:
         return value
 
     def negative(self, location: Location, value: object) -> Array:
-        """The negative ``-value``; 0 stays 0."""
+        """``-value``. The negative of the number 0 is 0, not -0."""
         array = array_of(location, value, "the operand of '-'")
         self.budget.spend(location, array.size)
         return 0.0 - array if array.size == 1 and array[0, 0] == 0 else -array

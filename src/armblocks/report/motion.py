@@ -75,8 +75,8 @@ def motions(diagram: Diagram, result: SimulationResult) -> tuple[Motion, ...]:
 def moving_arms(diagram: Diagram, result: SimulationResult) -> tuple[MovingArm, ...]:
     """The arms of a diagram and their signals, which are the same for every run.
 
-    Blocks that read the ``q`` of a simulated arm are the same arm, also if their robots have other masses or
-    drives. An example is a controller with a model of the arm.
+    Blocks that read the ``q`` of a simulated arm belong to this arm, also if their robots have other masses
+    or drives. An example is a controller with a model of the arm.
     """
     diagram = flat_diagram(diagram)
     groups: dict[tuple[Robot, str], list[str]] = {}
@@ -94,7 +94,7 @@ def moving_arms(diagram: Diagram, result: SimulationResult) -> tuple[MovingArm, 
         robot for (robot, _), names in groups.items() if any(_has_robot_view(diagram, n) for n in names)
     }
     for (robot, path), names in groups.items():
-        # If a diagram has several q of one arm (reference and simulated), the simulated arm is drawn.
+        # Of several q of one arm (reference and simulated), only those of a robot view are drawn.
         if robot in robots_with_views and not any(_has_robot_view(diagram, n) for n in names):
             continue
         arms.append(_moving_arm(robot, path, _sources_first(diagram, names), result))

@@ -38,18 +38,18 @@ def converted(robot: Robot, convention: DhConvention) -> Robot:
         return robot
     shifts = [transl(row.a, 0.0, 0.0) @ trotx(row.alpha) for row in rows]
     if convention is DhConvention.MODIFIED:
-        numbers = [(0.0, 0.0), *((row.alpha, row.a) for row in rows[:-1])]
+        alpha_and_a = [(0.0, 0.0), *((row.alpha, row.a) for row in rows[:-1])]
         new_from_old = shifts  # pose of a link's old frame in its new frame, which precedes the shift
         frames = {"tool": shifts[-1] @ robot.tool}
         base_shift = Transform()
     else:
-        numbers = [*((row.alpha, row.a) for row in rows[1:]), (0.0, 0.0)]
+        alpha_and_a = [*((row.alpha, row.a) for row in rows[1:]), (0.0, 0.0)]
         new_from_old = [*(shift.inverse() for shift in shifts[1:]), Transform()]
         frames = {"base": robot.base @ shifts[0]}
         base_shift = shifts[0].inverse()
     links = [
         _with_row(link, replace(row, alpha=alpha, a=a, convention=convention), shift)
-        for link, row, (alpha, a), shift in zip(robot.links, rows, numbers, new_from_old)
+        for link, row, (alpha, a), shift in zip(robot.links, rows, alpha_and_a, new_from_old)
     ]
     shift_of: dict[str | None, Transform] = {None: base_shift}
     shift_of.update((link.name, shift) for link, shift in zip(robot.links, new_from_old))

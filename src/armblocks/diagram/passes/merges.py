@@ -2,8 +2,8 @@
 
 Input: Merge blocks whose inputs are held outputs of conditional subsystems.
 
-Result: ``MergedOutput`` blocks without a gate; their inputs ``running1``, ``running2`` and so on are 1 for
-active subsystems.
+Result: ``MergedOutput`` blocks without a gate (hidden inputs of a conditional subsystem). Their inputs
+``running1``, ``running2`` and so on are 1 while the subsystem of the input is active.
 """
 
 from __future__ import annotations
@@ -48,7 +48,10 @@ def resolve_merges(net: Netlist) -> Netlist:
 
 
 def _active_signal(net: Netlist, path: str, port: str) -> PortRef | None:
-    """The signal that is 1 while the subsystem of an input is active; ``None`` if it never is."""
+    """The signal that is 1 while the subsystem of an input is active.
+
+    ``None`` if the subsystem is commented out.
+    """
     content = net.at(path, port)
     if isinstance(content, PortRef) and isinstance(net.blocks[content.block], Grounded):
         return None

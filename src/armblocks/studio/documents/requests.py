@@ -134,8 +134,8 @@ class DocumentRequests:
         return await self._show_all(client, presenter.dropped(data, request.name))
 
     async def _show_all(self, client: StudioClient, opening: Opening[Any]) -> list[str]:
-        """Show the first document of a file in the client; its list of documents contains the other
-        documents."""
+        """Show the first document of a file in the client. The other documents are open, and appear in the
+        client's list of documents."""
         await self.show(client, opening.opened[0], notes=opening.notes)
         return [open_file.key for open_file in opening.opened]
 
@@ -156,7 +156,7 @@ class DocumentRequests:
         elif not presenter.files.perform(open_file, request):
             return number
         await self._notify_change(open_file, before, number)
-        if open_file.document.dirty != was_dirty:  # the lists of clients that do not show the document
+        if open_file.document.dirty != was_dirty:  # clients that do not show the document list it as changed
             await self.notify_list()
         return open_file.document.version
 
@@ -187,8 +187,8 @@ class DocumentRequests:
 
     async def _recover(self, client: StudioClient, request: document_messages.Recover) -> str | None:
         files = [presenter.files for presenter in self._presenters.values()]
-        recoverable = next((kind for kind in files if request.document in kind.recoverable), files[0])
-        open_file = await recoverable.recover(request)
+        owner = next((of_kind for of_kind in files if request.document in of_kind.recoverable), files[0])
+        open_file = await owner.recover(request)
         if open_file is not None:
             return await self.show(client, open_file)
         await self.notify_list()
@@ -209,7 +209,7 @@ class DocumentRequests:
         )
 
     async def notify_state(self, open_file: OpenFile[Any]) -> None:
-        """Notify the clients of a document of its state; its content has not changed."""
+        """Send the state of a document, whose content has not changed, to the clients that show it."""
         await self._notify_versions(open_file, open_file.document.value, open_file.document.version)
 
     async def _notify_change(self, open_file: OpenFile[Any], before: Any, number: int) -> None:
