@@ -40,13 +40,19 @@ _BISECTIONS = 90
 class Margins:
     """Stability margins of a loop ``1 + L``.
 
-    ``gain``, also as ``gain_decibels``: the factor nearest to 1 by which L may be multiplied before the loop
-    reaches the stability boundary; below 1 it is a decrease. ``phase`` in degrees, ``delay`` in s. A margin
-    is ``inf`` if no such change makes the loop unstable. ``gain_frequency``, ``phase_frequency`` and
-    ``delay_frequency`` (rad/s) are the frequencies of the margins, ``nan`` without one. ``modulus``: the
-    minimum distance of L from -1, the inverse of the peak of ``1 / (1 + L)``. ``stable``: whether the closed
-    loop is stable. ``gain_crossings`` (frequency, factor) and ``phase_crossings`` (frequency, degrees): all
-    crossings.
+    A margin is ``inf`` if no such change brings the loop to the stability boundary. Its frequency is then
+    ``nan``.
+
+    - ``gain``, also as ``gain_decibels``: the factor nearest to 1 by which L may be multiplied before the
+      loop reaches the stability boundary. A factor below 1 is a decrease.
+    - ``phase`` (degrees): the phase lag nearest to 0 with which the loop reaches this boundary; negative for
+      a lead.
+    - ``delay`` (s): the smallest dead time with which the loop reaches this boundary.
+    - ``gain_frequency``, ``phase_frequency``, ``delay_frequency`` (rad/s): the frequencies of the margins.
+    - ``modulus``: the minimum distance of L from -1, the inverse of the peak of ``1 / (1 + L)``.
+    - ``modulus_frequency`` (rad/s): the frequency of this minimum.
+    - ``stable``: whether the closed loop is stable.
+    - ``gain_crossings`` (frequency, factor), ``phase_crossings`` (frequency, degrees): all crossings.
     """
 
     gain: float

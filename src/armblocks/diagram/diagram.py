@@ -136,14 +136,17 @@ def block_in_scope(name: str, block: Block, scope: Scope) -> Block:
 class Diagram(metaclass=ArgumentErrors):
     """An immutable diagram of blocks and connections. ``DiagramBuilder.build`` creates and checks it.
 
-    ``blocks`` is sorted by name and ``connections`` by ends, so that equal diagrams compare equal. ``layout``
-    may name only some blocks, ``bends`` only the connections with a user-drawn route, see
-    :func:`armblocks.drawing.wires.bent`. ``notes`` are annotations by name. ``mask`` has the parameters that
-    the diagram declares (see :mod:`armblocks.diagram.mask`) and ``mask_values`` their values (by default the
-    default values). The values of block parameters that are formulas are computed from ``mask_values``.
-    ``link`` names the entry of a library file from which the diagram comes, ``servos.json#JointServo``, or is
-    empty. ``extras`` preserves unknown keys of a file: it has the keys ``""`` (the document), ``"blocks"``
-    (by block name), and further keys that a file format adds.
+    - ``blocks``, ``connections``: sorted by name and by ends, so that equal diagrams compare equal.
+    - ``layout``: the places of blocks; it may name only some of them.
+    - ``bends``: the user-drawn routes of connections, see :func:`armblocks.drawing.wires.bent`.
+    - ``notes``: annotations by name.
+    - ``mask``: the parameters that the diagram declares, see :mod:`armblocks.diagram.mask`.
+    - ``mask_values``: their values, by default the default values. The values of block parameters that are
+      formulas are computed from them.
+    - ``link``: the entry of a library file from which the diagram comes, ``servos.json#JointServo``, or
+      empty.
+    - ``extras``: unknown keys of a file, so that they are not lost. It has the keys ``""`` (the document),
+      ``"blocks"`` (by block name), and further keys that a file format adds.
     """
 
     name: str

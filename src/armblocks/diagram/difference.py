@@ -82,11 +82,14 @@ class PlacedPort:
 class DiagramDifference(metaclass=ArgumentErrors):
     """All differences between two diagrams and their subsystems; false if there are none.
 
-    ``types`` are blocks of another type under the same name; their parameters are listed too, with ``None``
-    where one type has no such parameter. A formula is compared as text. ``masks`` are changed mask
-    declarations of the diagram at ``path``, ``comments`` changed comments of blocks, ``signal_names`` those
-    of signals. ``parameter_sets`` are values of parameter sets, with the name ``set: path``. ``logged_*`` are
-    outputs that are recorded without a Scope; ``notes`` are annotations, without their positions.
+    - ``types``: blocks of another type under the same name. Their parameters are listed too, with ``None``
+      where one type has no such parameter.
+    - ``parameters``: changed values. A formula is compared as text.
+    - ``masks``: changed mask declarations of the diagram at ``path``.
+    - ``comments``, ``signal_names``: changed comments of blocks, and changed names of signals.
+    - ``parameter_sets``: values of parameter sets, with the name ``set: path``.
+    - ``logged_added``, ``logged_removed``: outputs that are recorded without a Scope.
+    - ``notes``: annotations, without their positions.
     """
 
     added: tuple[PlacedBlock, ...] = ()
@@ -120,11 +123,13 @@ class DiagramDifference(metaclass=ArgumentErrors):
 def diagram_difference(before: Diagram, after: Diagram) -> DiagramDifference:
     """The changes that lead from ``before`` to ``after``.
 
-    Compared are blocks with their types, parameters and comments, connections, frame lines, logged outputs,
-    settings, descriptions and the text of annotations, including subsystems. Not compared are the layout, the
-    bookmarks, the trigger of the scopes, the name of the diagram (a file without one is named after the file)
-    and unknown keys of a file. A removed and an added block count as one renamed block if type, parameters
-    and all connections agree. The connected blocks may be renamed too.
+    - Compared are blocks with their types, parameters and comments, connections, frame lines, logged outputs,
+      settings, descriptions and the text of annotations, including subsystems.
+    - Not compared are the layout, the bookmarks, the trigger of the scopes, the name of the diagram (a file
+      without one is named after the file) and unknown keys of a file.
+
+    A removed and an added block count as one renamed block if type, parameters and all connections agree. The
+    connected blocks may be renamed too.
     """
     for diagram in (before, after):
         check_type(diagram, Diagram, "a Diagram", where="diagram_difference")

@@ -31,8 +31,9 @@ def load_trajectory(path: str | PathLike[str], *, dt: float | None = None) -> Jo
 
     Units in headers, such as ``q1 [deg]`` or ``qd2 [mm/s]``, are converted. Between rows the motion is the
     quintic with the values of both rows. Without speeds and accelerations, the motion is the cubic spline
-    through the positions, at rest at both ends. ``dt``: time between samples, s; ``None``: the rows of the
-    file.
+    through the positions, at rest at both ends.
+
+    ``dt`` (s) is the time between samples; by default the samples are the rows of the file.
 
     Raises ``FormatError`` and ``UnknownNameError`` as :func:`~armblocks.load_table`, and InputError for
     missing columns.

@@ -50,11 +50,14 @@ def write_report(
 ) -> ReportFiles:
     """Write ``report.html``, ``diagram.svg``, ``figures/*``, ``data.*`` and the files of To File blocks.
 
-    The folder is created if absent. ``formats`` of the figures: svg, png. ``data``: csv, parquet, npz, mat.
-    The default is svg and csv, also png if matplotlib is installed, and parquet if pyarrow is installed. Each
-    file is written atomically, the page last. Raises UnknownNameError for an unsupported format,
-    MissingLibraryError for a format whose library is not installed, DiagramError if two blocks write the same
-    file, and FormatError if the folder cannot be written.
+    The folder is created if absent. Each file is written atomically, the page last.
+
+    - ``formats``: of the figures, svg and png. The default is svg, also png if matplotlib is installed.
+    - ``data``: csv, parquet, npz and mat. The default is csv, also parquet if pyarrow is installed.
+
+    Raises UnknownNameError for an unsupported format, MissingLibraryError for a format whose library is not
+    installed, DiagramError if two blocks write the same file, and FormatError if the folder cannot be
+    written.
     """
     formats = usable_figure_formats() if formats is None else formats
     data = usable_data_formats() if data is None else data

@@ -64,9 +64,11 @@ class Spring(ABC, metaclass=ArgumentErrors, methods=False):
 class JointSpring(Spring):
     """A spring at a joint with one coordinate q: the torque on the joint is ``-stiffness (q - rest)``.
 
-    ``joint``: the name of the joint, equal to the name of its link; couplings may determine the joint.
-    ``stiffness``: N m/rad, or N/m of a prismatic joint, zero or more. ``rest``: the coordinate without
-    torque, rad or m. The energy is ``stiffness (q - rest)^2 / 2``. A joint may have several springs.
+    - ``joint``: the name of the joint, equal to the name of its link; couplings may determine the joint.
+    - ``stiffness``: N m/rad, or N/m of a prismatic joint, zero or more.
+    - ``rest``: the coordinate without torque, rad or m.
+
+    The energy is ``stiffness (q - rest)^2 / 2``. A joint may have several springs.
     """
 
     joint: str
@@ -88,10 +90,14 @@ class LineSpring(Spring):
     """A spring, or a gas cylinder, between two points: the origins of frames on two links.
 
     The points attract each other with the force ``preload + stiffness (L - length)``, N, where L is their
-    distance, m; a negative force pushes them apart. ``stiffness``: N/m, zero or more; 0 is a constant force.
-    ``length``: the distance at which the force is ``preload``, m. The energy is
+    distance, m; a negative force pushes them apart. The energy is
     ``preload (L - length) + stiffness (L - length)^2 / 2``. Without a distance between the points the force
     has no direction, and results are NaN.
+
+    - ``first``, ``second``: the two frames.
+    - ``stiffness``: N/m, zero or more; 0 is a constant force.
+    - ``length``: the distance at which the force is ``preload``, m.
+    - ``preload``: N.
     """
 
     first: Attachment

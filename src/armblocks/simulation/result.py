@@ -28,11 +28,14 @@ class SignalFigure(Protocol):
 class SimulationResult(RunData):
     """Signals of one run. ``result["block/port"]`` is ``(N, *shape)``, a view.
 
-    ``time (N,)`` s. ``signals (ny, N)``: ``signals_layout`` has the names, shapes and units of its rows.
-    ``states (N, nx)``: ``states_layout`` has the names of its columns. ``parameters``: the values at the end
-    of the run, after ``parameter_changes``. ``final_state``: the state from which another run continues;
-    ``None`` for a failed run. ``jumps``: both sides of each jump between the samples. ``log``: the log
-    file, if any. The result then has a selection of the file's rows with all extremes of the logged signals.
+    - ``time`` (N,) s.
+    - ``signals`` (ny, N): ``signals_layout`` has the names, shapes and units of its rows.
+    - ``states`` (N, nx): ``states_layout`` has the names of its columns.
+    - ``parameters``: the values at the end of the run, after ``parameter_changes``.
+    - ``final_state``: the state from which another run continues; ``None`` for a failed run.
+    - ``jumps``: both sides of each jump between the samples.
+    - ``log``: the log file, if any. The result then has a selection of the file's rows with all extremes of
+      the logged signals.
     """
 
     def to_dataframe(self, *, jumps: bool = False) -> pd.DataFrame:

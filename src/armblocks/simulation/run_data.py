@@ -26,13 +26,19 @@ Array = NDArray[np.float64]
 class RunReport(metaclass=ArgumentErrors):
     """The statistics of a run.
 
-    ``solver``: name of the integrator, ``"none"`` without integration. ``reason``: reason for its choice.
-    ``steps``, ``rejected``: numbers of accepted and rejected steps. ``evaluations``: number of evaluations of
-    the derivative. ``ticks``: number of instants at which a clock ticked. ``events``: number of guards that
-    fired. ``calls``: number of calls of Python functions at ticks. ``call_time``: time in these calls, s.
-    ``preparation_time``: time to compile or load the native code, s. ``wall_time``: time of the run itself,
-    s. ``real_time_factor``: simulated time over ``wall_time``. ``complete``: whether the stop time was
-    reached. ``message``: remarks for the user (reason of the end, stiffness), else empty.
+    - ``solver``: name of the integrator, ``"none"`` without integration.
+    - ``reason``: reason for its choice.
+    - ``steps``, ``rejected``: numbers of accepted and rejected steps.
+    - ``evaluations``: number of evaluations of the derivative.
+    - ``ticks``: number of times at which a clock ticked.
+    - ``events``: number of guards that fired.
+    - ``calls``: number of calls of Python functions at ticks.
+    - ``call_time``: time in these calls, s.
+    - ``preparation_time``: time to compile or load the native code, s.
+    - ``wall_time``: time of the run itself, s.
+    - ``real_time_factor``: simulated time over ``wall_time``.
+    - ``complete``: whether the stop time was reached.
+    - ``message``: remarks for the user (reason of the end, stiffness), else empty.
     """
 
     solver: str
@@ -71,12 +77,14 @@ class LoggedFile:
 class RunData(metaclass=ArgumentErrors):
     """Signals of one run. ``result["block/port"]`` is ``(N, *shape)``, a view.
 
-    ``time (N,)`` s. ``signals (ny, N)``: ``signals_layout`` has the names, shapes and units of its rows.
-    ``states (N, nx)``: ``states_layout`` has the names of its columns. ``parameters``: the values at the end
-    of the run, after ``parameter_changes``. ``final_state``: the state from which another run continues;
-    ``None`` for a failed run. ``given_jumps``: both sides of each jump between the samples. ``log``:
-    the log file, if any. The result then has a selection of the file's rows with all extremes of the logged
-    signals.
+    - ``time`` (N,) s.
+    - ``signals`` (ny, N): ``signals_layout`` has the names, shapes and units of its rows.
+    - ``states`` (N, nx): ``states_layout`` has the names of its columns.
+    - ``parameters``: the values at the end of the run, after ``parameter_changes``.
+    - ``final_state``: the state from which another run continues; ``None`` for a failed run.
+    - ``given_jumps``: both sides of each jump between the samples.
+    - ``log``: the log file, if any. The result then has a selection of the file's rows with all extremes of
+      the logged signals.
     """
 
     name: str

@@ -40,8 +40,9 @@ class Workspace(WorkspaceCells):
     ) -> Picture:
         """Slices with a measure in colours, by default the first measure; ``"count"`` shows the samples.
 
-        ``normal`` and ``at``: one slice, as :meth:`slice`. By default the slices through the base normal to y
-        and the slice with the most cells normal to z are side by side. ``width``: px.
+        - ``normal``, ``at``: one slice, as :meth:`slice`. By default the slices through the base normal to y
+          and the slice with the most cells normal to z are side by side.
+        - ``width``: px.
         """
         from armblocks.face.workspace.pictures import workspace_picture
 

@@ -63,25 +63,31 @@ def workspace(
 ) -> Workspace:
     """The region that the tool reaches, with maps of ``measures``, from ``samples`` configurations.
 
-    The configurations are uniform in the joint limits (quasi-random; ``seed`` selects the sequence), or in
-    ``ranges``, pairs (lowest, highest) by the name of the coordinate, rad or m. A rotation without limits is
-    sampled over one turn, and a rotation of a ball joint is uniform. Samples beyond the limits of joints that
-    couplings determine do not count. Positions of the tool, or of ``frame``, are counted in cubic cells of
-    the side ``cell`` (m). Only the first ``points`` samples are stored, for point clouds.
+    - ``samples``, ``seed``: the number of configurations, which are uniform in the joint limits
+      (quasi-random); ``seed`` selects their sequence. A rotation without limits is sampled over one turn, and
+      a rotation of a ball joint is uniform. Samples beyond the limits of joints that couplings determine do
+      not count.
+    - ``measures``: names of the list below. Each cell has their largest, smallest and mean values.
+    - ``axes``: rows of the Jacobian, ``"all"``, ``"trans"`` or ``"rot"``; by default ``"all"`` for six
+      degrees of freedom or more, else ``"trans"``.
+    - ``frame``: the frame whose positions are counted, by default the tool.
+    - ``cell`` (m): the side of the cubic cells in which the positions are counted.
+    - ``ranges``: pairs (lowest, highest) by the name of the coordinate, rad or m, in place of the joint
+      limits.
+    - ``torque`` (n,), ``centre`` (3,) m, ``qd``, ``qdd`` (n,): for the measure ``"payload"``.
+    - ``points``: the number of samples, from the first, that are stored for point clouds.
 
-    Measures; each cell has their largest, smallest and mean values:
+    Measures:
 
     - ``"manipulability"``: Yoshikawa's product of the singular values of the Jacobian;
     - ``"singularity"``: the smallest singular value, which is the distance to the nearest singular Jacobian;
     - ``"condition"``: the smallest divided by the largest singular value;
     - ``"limits"``: the minimum distance to a joint limit over half the range, 1 in the middle, 0 at a limit;
-    - ``"payload"``: the largest mass (kg) at the frame that the ``torque`` limits (n,) hold, by default those
-      of the robot. ``centre`` (3,) m: its position in the axes of the frame. At rest, or with the speeds
-      ``qd`` and accelerations ``qdd`` (n,).
+    - ``"payload"``: the largest mass (kg) at the frame that the ``torque`` limits hold, by default those of
+      the robot. ``centre``: its position in the axes of the frame. At rest, or with the speeds ``qd`` and
+      accelerations ``qdd``.
 
-    ``axes``: rows of the Jacobian, ``"all"``, ``"trans"`` or ``"rot"``; by default ``"all"`` for six degrees
-    of freedom or more, else ``"trans"``. Raises RobotError for closed loops and for translations without
-    limits, InputError for too many cells.
+    Raises RobotError for closed loops and for translations without limits, InputError for too many cells.
     """
     where = f"workspace of robot '{arm.name}'"
     check_robot(arm, where)
