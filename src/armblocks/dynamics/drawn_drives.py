@@ -13,7 +13,7 @@ Unlike :mod:`armblocks.dynamics.prescribed_motion`, single degrees of freedom of
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from casadi import SX, Function, jtimes, mtimes, vertcat
@@ -21,12 +21,19 @@ from casadi import SX, Function, jtimes, mtimes, vertcat
 from armblocks.dynamics.ball_joints import position_rates
 from armblocks.dynamics.constrained import independent_relations, symmetric_solver
 from armblocks.dynamics.constraint_equations import constraint_equations
+from armblocks.dynamics.coupled_motion import coupled_inertia
 from armblocks.dynamics.crba import crba
 from armblocks.dynamics.drawn_motion import DrawnMotion, Load
 from armblocks.dynamics.joint_motion import entries, joint_motions
 from armblocks.dynamics.lockable_mechanism import consistent_state
 from armblocks.dynamics.mechanism import RANK_TOLERANCE, Array, mechanism
-from armblocks.dynamics.rnea import rnea
+from armblocks.dynamics.reduction import (
+    generalised_forces,
+    reduced_columns,
+    tree_coordinates,
+    tree_speeds,
+)
+from armblocks.dynamics.rnea import Wrench, rnea
 from armblocks.robot.robot import Robot
 from armblocks.robot.tree import KinematicTree
 
@@ -67,15 +74,10 @@ class DrawnDrives:
         free, driven, tree = self._free, self._driven, self.motion.tree_with(inertias)
         frames = self.motion.frames(q, qd)
         placed = [(tree.attached(load.at.link, load.at.pose), load.force, load.moment) for load in loads]
-        joints = joint_motions(tree, q)
         at_drives = SX.zeros(self.robot.nv)
         at_drives[driven] = given[driven]
-        bias = SX(
-            vertcat(
-                *rnea(tree, joints, entries(qd), entries(at_drives), tree.gravity, frames.on_bodies(placed))
-            )
-        )
-        M = _inertia_matrix(tree, q)
+        bias = self._bias(tree, q, qd, at_drives, frames.on_bodies(placed))
+        M = coupled_inertia(self.robot, tree, q) if self.robot.couplings else _inertia_matrix(tree, q)
         J, J_bias = self._constraints(q, qd)
         x, multipliers = self._free_motion(M, J, tau[free] - bias[free], -J_bias - mtimes(J, at_drives))
         qdd, forces = SX(at_drives), SX(tau)
@@ -87,6 +89,19 @@ class DrawnDrives:
             needed = needed - mtimes(J.T, multipliers)
         forces[driven] = needed[driven]
         return qdd, forces
+
+    def _bias(self, tree: KinematicTree, q: SX, qd: SX, qdd: SX, on_bodies: Mapping[int, Wrench]) -> SX:
+        """The generalised forces (n, 1) of the accelerations ``qdd``, of gravity and of loads."""
+        coordinates, coupled = self.robot.coordinate_map, bool(self.robot.couplings)
+        if coupled:
+            q, qd, qdd = (
+                tree_coordinates(coordinates, q),
+                tree_speeds(coordinates, qd),
+                tree_speeds(coordinates, qdd),
+            )
+        joints = joint_motions(tree, q)
+        bias = SX(vertcat(*rnea(tree, joints, entries(qd), entries(qdd), tree.gravity, on_bodies)))
+        return generalised_forces(coordinates, bias) if coupled else bias
 
     def _free_motion(self, M: SX, J: SX, force: SX, rates: SX) -> tuple[SX, SX]:
         """``x`` with ``M_ff x = force + J_f' multipliers`` and ``J_f x = rates``."""
@@ -113,7 +128,10 @@ class DrawnDrives:
             return SX(0, self.robot.nv), SX(0, 1)
         # dJ/dt qd is a derivative with respect to q at constant speeds: both are symbols.
         at, speeds = SX.sym("q", self.robot.nq), SX.sym("qd", self.robot.nv)
-        rows = constraint_equations(self.motion.tree, at).subset(self._relations).jacobian
+        coordinates, coupled = self.robot.coordinate_map, bool(self.robot.couplings)
+        of_tree = tree_coordinates(coordinates, at) if coupled else at
+        rows = constraint_equations(self.motion.tree, of_tree).subset(self._relations).jacobian
+        rows = reduced_columns(coordinates, rows) if coupled else rows
         rates = vertcat(*position_rates(self.robot, entries(at), entries(speeds)))
         bias_of_rows = jtimes(mtimes(rows, speeds), at, rates)
         relations = Function("relations", [at, speeds], [rows, bias_of_rows])

@@ -15,11 +15,13 @@ from armblocks.dynamics.constrained import (
     projected,
     restoring_rates,
 )
+from armblocks.dynamics.coupled_motion import coupled_accelerations
 from armblocks.dynamics.forward import forward_dynamics
 from armblocks.dynamics.frame_motions import FramesOfTree
 from armblocks.dynamics.joint_motion import entries
 from armblocks.dynamics.loads import with_inertias
 from armblocks.dynamics.mechanism import Array
+from armblocks.dynamics.reduction import tree_coordinates, tree_speeds
 from armblocks.dynamics.rnea import Wrench
 from armblocks.robot.constraints import Attachment
 from armblocks.robot.robot import Robot
@@ -75,7 +77,11 @@ class DrawnMotion:
         return q, qd
 
     def frames(self, q: SX, qd: SX, qdd: SX | None = None) -> FramesOfTree:
-        """The motions of frames at a state."""
+        """The motions of frames at a state of the independent coordinates."""
+        if self.robot.couplings:
+            coordinates = self.robot.coordinate_map
+            q, qd = tree_coordinates(coordinates, q), tree_speeds(coordinates, qd)
+            qdd = None if qdd is None else tree_speeds(coordinates, qdd)
         return FramesOfTree(self.tree, q, entries(qd), None if qdd is None else entries(qdd))
 
     def accelerations(self, q: SX, qd: SX, tau: SX, loads: Sequence[Load], inertias: Sequence[SX]) -> SX:
@@ -85,6 +91,8 @@ class DrawnMotion:
         wrenches = frames.on_bodies(placed)
         if not self._relations:
             tree = self.tree_with(inertias)
+            if self.robot.couplings:
+                return coupled_accelerations(self.robot, tree, q, qd, tau, wrenches)
             return SX(vertcat(*forward_dynamics(tree, q, entries(qd), entries(tau), wrenches)))
         # The bias of the relations is a derivative with respect to q at constant values of all others.
         at, speeds, given = (

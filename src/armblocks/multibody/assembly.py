@@ -15,6 +15,15 @@ from functools import cached_property
 
 from armblocks.diagram.passes.netlist import Netlist
 from armblocks.errors import DiagramError, RobotError
+from armblocks.multibody.couplings import (
+    Combination,
+    Relation,
+    check_motion_inputs,
+    coupling_relations,
+    eliminated,
+    independence,
+    robot_couplings,
+)
 from armblocks.multibody.frames import Frames, Groups, rigid_groups, spanning_joints
 from armblocks.multibody.motion_sequence import reversed_motions, robot_joint
 from armblocks.multibody.parts import (
@@ -52,6 +61,20 @@ class PlacedJoint:
 
 
 @dataclass(frozen=True, kw_only=True)
+class DependentJoint:
+    """A joint of the tree with one coordinate, which couplings determine from q and qd of the robot.
+
+    ``factors``: for each term the index in q, the index in qd, and the factor. ``offset`` (rad or m) is added
+    to the sum of the terms of q.
+    """
+
+    path: str
+    part: JointPart
+    factors: tuple[tuple[int, int, float], ...]
+    offset: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class PlacedElement:
     """A force element or a sensor, with the places of its frames."""
 
@@ -75,6 +98,8 @@ class DrawnMechanism:
 
     ``robot``: its masses are those of ``bodies`` at the start of a run. ``closed``: the paths of the joints
     that are closures, without coordinates. ``animated``: whether the run records the poses of the bodies.
+    ``dependents``: the joints that couplings determine, which are not entries of q; ``relations``: the
+    couplings.
     """
 
     robot: Robot
@@ -83,6 +108,13 @@ class DrawnMechanism:
     elements: tuple[PlacedElement, ...]
     closed: tuple[str, ...]
     animated: bool
+    dependents: tuple[DependentJoint, ...] = ()
+    relations: tuple[Relation, ...] = ()
+
+    @property
+    def constrained(self) -> bool:
+        """Whether closures or couplings make the joints depend on each other."""
+        return bool(self.robot.closures or self.robot.couplings)
 
 
 def drawn_mechanism(
@@ -136,6 +168,13 @@ class _Assembly:
         }
         """The link of each group, and the pose of the link's frame in the group."""
         self.cuts: list[_Edge] = []
+        self.relations = coupling_relations(net, parts, frames, self.groups)
+        for joint in dict.fromkeys(joint for relation in self.relations for joint in relation.joints):
+            self.joints[joint] = dataclasses.replace(self.joints[joint], needs_coordinate=True)
+        self.dependent: Mapping[str, Combination] = (
+            eliminated(self.relations, independence(parts), net.label) if self.relations else {}
+        )
+        check_motion_inputs(net, parts, self.dependent)
 
     def mechanism(self) -> DrawnMechanism | None:
         tree, chords = self._tree()
@@ -154,14 +193,17 @@ class _Assembly:
                 allowed=f"at most {MAX_LINKS}",
                 fix="join bodies by Weld Joints or Rigid Transforms, which make one body of them",
             )
-        robot = self._robot(links, (*closures, *welds))
+        robot = self._robot(links, (*closures, *welds, *robot_couplings(self.dependent)))
+        joints = tuple(self._placed(robot, (*tree, *self.cuts)))
         return DrawnMechanism(
             robot=robot,
             bodies=tuple(body for edge in (*tree, *self.cuts) for body in self._placed_bodies(edge)),
-            joints=tuple(self._placed(robot, (*tree, *self.cuts))),
+            joints=joints,
             elements=elements,
             closed=tuple(edge.path for edge in chords if edge not in self.cuts),
             animated=self._settings().animated,
+            dependents=tuple(self._dependents(joints)),
+            relations=self.relations,
         )
 
     # -- the tree
@@ -357,6 +399,15 @@ class _Assembly:
                 path=edge.path, part=edge.part, reversed=edge.reversed, position=position, speed=speed
             )
             position, speed = position + link.joint.nq, speed + link.joint.nv
+
+    def _dependents(self, joints: Sequence[PlacedJoint]) -> Iterator[DependentJoint]:
+        """The joints that couplings determine."""
+        places = {joint.path: (joint.position, joint.speed) for joint in joints}
+        for path, combination in self.dependent.items():
+            factors = tuple((*places[other], factor) for other, factor in combination.factors.items())
+            yield DependentJoint(
+                path=path, part=self.joints[path], factors=factors, offset=combination.constant
+            )
 
     def _elements(self) -> tuple[PlacedElement, ...]:
         return tuple(

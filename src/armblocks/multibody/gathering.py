@@ -10,16 +10,18 @@ path. Signals, states and parameters thus have the paths of the drawn blocks.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import cast
 
 from armblocks.diagram import Block, PortRef
 from armblocks.diagram.passes.netlist import Netlist, Replacements
 from armblocks.dynamics.base_parameters import regrouped
+from armblocks.dynamics.coupled_motion import coordinate_without_inertia
 from armblocks.dynamics.forward import check_accelerations_exist
 from armblocks.errors import DiagramError, RobotError
 from armblocks.multibody.assembly import DrawnMechanism, drawn_mechanism, world_block
 from armblocks.multibody.body_inertias import BodyInertias
+from armblocks.multibody.dependent_joints import DependentJointStates
 from armblocks.multibody.driven_joints import DrivenJointStates
 from armblocks.multibody.drives import check_drives, unreachable_positions
 from armblocks.multibody.element_states import ElementLoads
@@ -81,6 +83,16 @@ class _Gathered:
         self.blocks[world] = plant
         for joint in drawn.joints:
             self._add_joint(world, drawn, joint.path, start)
+        for joint in drawn.dependents:
+            self.blocks[joint.path] = DependentJointStates(
+                joint=self.net.blocks[joint.path],
+                place=joint.part,
+                closed=True,
+                unreachable=unreachable_positions(drawn),
+            )
+            for port, quantity in (("mechanism qdd", "qdd"), ("mechanism q", "q"), ("mechanism qd", "qd")):
+                self._connect(world, joint.path, port, quantity)
+            self._drive(world, joint.path, "generalised force", "force")
         for path in dict.fromkeys(body.path for body in drawn.bodies):
             self.blocks[path] = BodyInertias(body=self.net.blocks[path])
             self._drive(world, path, "inertia", "inertia")
@@ -95,7 +107,7 @@ class _Gathered:
 
     def _add_joint(self, world: str, drawn: DrawnMechanism, path: str, start: Start) -> None:
         joint = next(joint for joint in drawn.joints if joint.path == path)
-        closed = bool(drawn.robot.closures)
+        closed = drawn.constrained
         q, qd = drawn_start(joint, start)
         driven = joint.part.has_motion_input
         states = (DrivenJointStates if driven else JointStates)(
@@ -146,26 +158,44 @@ class _Gathered:
         try:
             tree = regrouped(KinematicTree.of(drawn.robot))
             driven = {k for joint in drawn.joints for k in driven_speeds(joint)}
-            check_accelerations_exist(tree, [k for k in range(drawn.robot.nv) if k not in driven])
+            free = [k for k in range(drawn.robot.nv) if k not in driven]
+            if drawn.robot.couplings:
+                self._check_coupled_inertia(drawn, tree, free)
+                return
+            check_accelerations_exist(tree, free)
         except RobotError as error:
             paths = (joint.path for joint in drawn.joints)
             path = next((path for path in paths if error.where.endswith(f", link '{path}'")), "")
-            raise DiagramError(
-                "no body with mass moves with the joint, so that its acceleration is undefined",
-                where=self.net.label(path) if path in self.net.blocks else error.where,
-                allowed="mass, and for a rotation inertia, beyond every joint",
-                fix="add a solid to a frame beyond the joint, or replace the joint by a Weld Joint",
-            ) from error
+            where = self.net.label(path) if path in self.net.blocks else error.where
+            raise _no_inertia(where) from error
+
+    def _check_coupled_inertia(self, drawn: DrawnMechanism, tree: KinematicTree, free: Sequence[int]) -> None:
+        """Raise ``DiagramError`` if no mass moves with a joint, its dependent joints included."""
+        without = coordinate_without_inertia(drawn.robot, tree, free)
+        if without is not None:
+            joint = next(j for j in drawn.joints if j.speed <= without < j.speed + j.part.nv)
+            raise _no_inertia(self.net.label(joint.path))
+
+
+def _no_inertia(where: str) -> DiagramError:
+    return DiagramError(
+        "no body with mass moves with the joint, so that its acceleration is undefined",
+        where=where,
+        allowed="mass, and for a rotation inertia, beyond every joint",
+        fix="add a solid to a frame beyond the joint, or replace the joint by a Weld Joint",
+    )
 
 
 def _without_targets(drawn: DrawnMechanism) -> DrawnMechanism:
     """The mechanism without the targets of its joints, on which its equations do not depend."""
     none = Targets(q=(), qd=())
-    joints = (
-        dataclasses.replace(joint, part=dataclasses.replace(joint.part, targets=none))
-        for joint in drawn.joints
+    joints, dependents = (
+        tuple(
+            dataclasses.replace(joint, part=dataclasses.replace(joint.part, targets=none)) for joint in group
+        )
+        for group in (drawn.joints, drawn.dependents)
     )
-    return dataclasses.replace(drawn, joints=tuple(joints))
+    return dataclasses.replace(drawn, joints=joints, dependents=dependents)
 
 
 def _with_tunable_targets(part: JointPart) -> JointPart:

@@ -92,6 +92,7 @@ class Mechanism(Block):
                 *((("given qdd", joint.part.nv),) if joint.part.has_motion_input else ()),
             )
         ]
+        ports += [_port(joint.path, "force", 1) for joint in self.mechanism.dependents]
         loads = [element for element in self.mechanism.elements if element.part.exerts]
         ports += [_port(element.path, "loads", 6 * len(element.frames)) for element in loads]
         bodies = dict.fromkeys(body.path for body in self.mechanism.bodies)
@@ -108,11 +109,13 @@ class Mechanism(Block):
             if self._has_coordinates(joint):
                 ports.append(_port(joint.path, "q", joint.part.nq))
                 ports.append(_port(joint.path, "q rates", joint.part.nq))
-            if self.robot.closures:
+            if self.mechanism.constrained:
                 ports.append(_port(joint.path, "qd", joint.part.nv))
                 ports.append(_port(joint.path, "qd rates", joint.part.nv))
             if joint.part.has_motion_input:
                 ports.append(_port(joint.path, "drive", joint.part.nv))
+        for joint in self.mechanism.dependents:
+            ports += [_port(joint.path, quantity, 1) for quantity in ("qdd", "q", "qd")]
         for element in self.mechanism.elements:
             count = len(element.frames)
             ports.append(_port(element.path, "motion", KINEMATICS_SIZE * count))
@@ -133,7 +136,7 @@ class Mechanism(Block):
         return ports if self.mechanism.animated else ()
 
     def _has_coordinates(self, joint: PlacedJoint) -> bool:
-        return bool(self.robot.closures) or joint.part.nq != joint.part.nv
+        return self.mechanism.constrained or joint.part.nq != joint.part.nv
 
     def record_ports(self) -> tuple[Port, ...]:
         if not self.mechanism.animated:
@@ -169,6 +172,8 @@ class Mechanism(Block):
         tau = SX.zeros(robot.nv)
         for joint in self.mechanism.joints:
             tau[_speeds(joint)] = _tree_forces(joint, q, u[port_of(joint.path, "force")])
+        at_dependents = self._forces_of_dependents(u)
+        tau = tau if at_dependents is None else tau + at_dependents
         loads, inertias = list(self._loads(u)), self._inertias(u)
         drives = tau
         if self.driven:
@@ -176,6 +181,7 @@ class Mechanism(Block):
             qdd, drives = self._drives().accelerations(
                 consistent_q, consistent_qd, tau, given, loads, inertias
             )
+            drives = drives if at_dependents is None else drives - at_dependents
         else:
             qdd = equations.accelerations(consistent_q, consistent_qd, tau, loads, inertias)
         if robot.closures:
@@ -194,6 +200,7 @@ class Mechanism(Block):
                 "drive": _drawn_speeds(joint, q, drives[speeds]),
             }
             values |= {port_of(joint.path, name): value for name, value in of_joint.items()}
+        values |= self._dependent_motions(consistent_q, consistent_qd, qdd)
         moving: FramesOfTree | None = None
         for element in self.mechanism.elements:
             values[port_of(element.path, "motion")] = self._kinematics(frames, element)
@@ -244,6 +251,28 @@ class Mechanism(Block):
             return self._motion().state(q, qd, self._inertias(u))
         is_unit = self.robot.nq == self.robot.nv
         return (q if is_unit else SX(vertcat(*normalised(self.robot, entries(q))))), qd
+
+    def _forces_of_dependents(self, u: Signals) -> SX | None:
+        """The generalised forces (nv, 1) of the forces at dependent joints; None without such joints."""
+        if not self.mechanism.dependents:
+            return None
+        forces = SX.zeros(self.robot.nv)
+        for joint in self.mechanism.dependents:
+            for _, speed, factor in joint.factors:
+                forces[speed] = forces[speed] + factor * u[port_of(joint.path, "force")]
+        return forces
+
+    def _dependent_motions(self, q: SX, qd: SX, qdd: SX) -> dict[str, SX]:
+        """Coordinates, speeds and accelerations of the dependent joints, by port."""
+        values: dict[str, SX] = {}
+        for joint in self.mechanism.dependents:
+            sums = [SX(joint.offset), SX(0.0), SX(0.0)]
+            for position, speed, factor in joint.factors:
+                terms = (q[position], qd[speed], qdd[speed])
+                sums = [total + factor * term for total, term in zip(sums, terms)]
+            for quantity, value in zip(("q", "qd", "qdd"), sums):
+                values[port_of(joint.path, quantity)] = value
+        return values
 
     def _loads(self, u: Signals) -> Iterator[Load]:
         for element in self.mechanism.elements:

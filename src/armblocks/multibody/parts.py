@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
+import numpy as np
 from casadi import SX
+from numpy.typing import NDArray
 
 from armblocks.diagram import Port, Signals
 from armblocks.robot import Closure
@@ -135,6 +137,40 @@ class JointPart:
         return driven
 
 
+@dataclass(frozen=True, kw_only=True)
+class CouplingPart:
+    """A linear relation between two joints with one axis, at the frame ports ``B`` and ``F``.
+
+    ``joints``: the kinds of the joints to the bodies of B and of F, ``revolute`` or ``prismatic``. The motion
+    of F is a factor (:class:`CouplingLaw`) times the motion of B, plus ``offset`` (rad or m). Both are
+    relative to the body that carries both joints, about or along the z axes of B and F.
+    """
+
+    joints: tuple[str, str]
+    offset: float = 0.0
+
+
+class AxisOfCoupling(NamedTuple):
+    """The z axis of a frame of a coupling, in the body that carries both joints.
+
+    ``point`` (3,): the origin of the frame at joint coordinate 0, m. ``direction`` (3,): a unit vector.
+    """
+
+    point: NDArray[np.float64]
+    direction: NDArray[np.float64]
+
+
+class CouplingLaw(Protocol):
+    """A block that is a coupling."""
+
+    def follower_per_base(self, base: AxisOfCoupling, follower: AxisOfCoupling) -> float:
+        """The motion of F (rad or m) per motion of B, about or along their z axes; 0 is not permitted.
+
+        Raises InputError, with the reason, for axes that the coupling does not permit.
+        """
+        ...
+
+
 @dataclass(frozen=True)
 class FrameMotion:
     """The motion of a frame in the World Frame: all vectors have world axes.
@@ -190,4 +226,4 @@ class ForcePart:
     accelerations: bool = False
 
 
-Part = WorldPart | SettingsPart | NodePart | RigidPart | BodyPart | JointPart | ForcePart
+Part = WorldPart | SettingsPart | NodePart | RigidPart | BodyPart | JointPart | ForcePart | CouplingPart

@@ -13,6 +13,7 @@ from armblocks.diagram.passes.netlist import Netlist
 from armblocks.dynamics.mechanism import mechanism
 from armblocks.errors import AssemblyError, DiagramError, RobotError
 from armblocks.multibody.assembly import DrawnMechanism, PlacedJoint
+from armblocks.multibody.coupled_start import check_coupled_targets, write_coupled_targets
 from armblocks.multibody.drives import check_number_of_drives, start_of_input
 from armblocks.multibody.motion_sequence import reversed_motions
 from armblocks.robot.joints import AxisMotion, Motion
@@ -44,7 +45,9 @@ def start_of(net: Netlist, drawn: DrawnMechanism) -> Start:
             q[positions] = _of_tree(joint, targets.q)
         if targets.velocity_priority != "none":
             qd[speeds] = _speeds_of_tree(joint)
+    write_coupled_targets(net, drawn, q, qd)
     if not robot.closures:
+        check_coupled_targets(net, drawn, q, qd)
         return Start(q, qd)
     functions = mechanism(robot)
     moved = _start_of_motion_inputs(net, drawn, q)
@@ -74,6 +77,7 @@ def start_of(net: Netlist, drawn: DrawnMechanism) -> Start:
             allowed="velocity targets of high priority that do not contradict each other",
             fix="give fewer joints a velocity target of high priority: one for each degree of freedom",
         ) from error
+    check_coupled_targets(net, drawn, q, qd)
     return Start(q, qd)
 
 
