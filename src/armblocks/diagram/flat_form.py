@@ -19,12 +19,15 @@ from armblocks.equations import Shape
 class FlatForm:
     """A flat diagram, and its relation to the hierarchy. Names are paths from the top level.
 
-    ``levels``: the diagram of every subsystem by its path, with ``""`` for the top. ``contents``: the signal
-    or bus at output ports that pass on signals of other ports. ``aliases``: other names of signals, such as a
-    subsystem's ports. ``views``: the views, by block. ``declared_shapes``: ports with a declared shape.
-    ``origins``: for blocks that the passes add, such as the control of a conditional subsystem, the block of
-    the hierarchy from which each is derived. All except ``levels`` are empty for a diagram that is already
-    flat.
+    - ``levels``: the diagram of every subsystem by its path, with ``""`` for the top.
+    - ``contents``: the signal or bus at output ports that pass on signals of other ports.
+    - ``views``: the views, by block.
+    - ``aliases``: other names of signals, such as a subsystem's ports.
+    - ``declared_shapes``: ports with a declared shape.
+    - ``origins``: for blocks that the passes add, such as the control of a conditional subsystem, the block
+      of the hierarchy from which each is derived.
+
+    All except ``levels`` are empty for a diagram that is already flat.
     """
 
     diagram: Diagram

@@ -52,11 +52,14 @@ class RobotHolder(Protocol):
 class Parameter(metaclass=ArgumentErrors):
     """One parameter of a block type.
 
-    ``tunable``: the value is an input of the compiled system (numbers and arrays only; an array's shape is
-    constant). ``dimensions``: the allowed numbers of axes of an array (0 is a scalar). ``minimum``,
-    ``above``, ``maximum`` bound every entry; ``finite`` rejects infinities (NaN is always rejected).
-    ``roots``: an array of zeros or poles, which may be empty; complex roots become rows (real, imaginary).
-    ``of_type``: the class that an object of kind ``ROBOT``, ``DIAGRAM``, ``TABLE`` or ``FUNCTION`` must have.
+    - ``tunable``: the value is an input of the compiled system (numbers and arrays only; an array's shape is
+      constant).
+    - ``dimensions``: the allowed numbers of axes of an array (0 is a scalar).
+    - ``minimum``, ``above``, ``maximum``: bounds of every entry.
+    - ``finite``: infinities are rejected (NaN is always rejected).
+    - ``roots``: an array of zeros or poles, which may be empty. Complex roots become rows (real, imaginary).
+    - ``of_type``: the class that an object of kind ``ROBOT``, ``DIAGRAM``, ``TABLE`` or ``FUNCTION`` must
+      have.
     """
 
     name: str

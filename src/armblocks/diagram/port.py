@@ -13,12 +13,13 @@ from armblocks.equations import Shape
 class Port(metaclass=ArgumentErrors):
     """One input or output of a block.
 
-    ``shape`` is the only allowed shape, or ``None`` if it follows from the connections. ``unit`` is SI, or
-    ``""`` if the port has no unit or the unit of its signal. ``names`` are the names of the entries of a
-    vector, such as joints, if the block has names for them. ``before_events``: an output with the value
-    before the events of its block at the same instant, such as the state of an integrator before a reset.
-    ``internal``: a port between blocks of a flat diagram that a pass has added; a run does not record its
-    signal.
+    - ``shape``: the only allowed shape, or ``None`` if it follows from the connections.
+    - ``unit``: SI, or ``""`` if the port has no unit or the unit of its signal.
+    - ``names``: the names of the entries of a vector, such as joints, if the block has names for them.
+    - ``before_events``: an output with the value before the events of its block at the same instant, such as
+      the state of an integrator before a reset.
+    - ``internal``: a port between blocks of a flat diagram that a pass has added. A run does not record its
+      signal.
     """
 
     name: str
@@ -34,14 +35,16 @@ class Port(metaclass=ArgumentErrors):
 class State(metaclass=ArgumentErrors):
     """One state or mode of a block; the integrator stores its value, the block does not.
 
-    ``follows``: whether a mode is a following mode, that is, a function of the present signals. Following
-    modes are made consistent before any event (an edge, a trigger, a reset) is processed. Other modes are
-    stateful. ``hysteresis``: whether a following mode also depends on its previous value: the value before
-    the instant, or before the latest event at this instant. A discrete state with ``hysteresis`` is captured
-    at the same times. ``stored_while``: a mode of the same block; while it is 0, the previous value does not
-    change. ``momentary``: whether a discrete state becomes 0 at the end of every instant.
-    ``captured_when_enabled``: whether a discrete state is also captured when the subsystem of the block is
-    enabled.
+    - ``follows``: whether a mode is a following mode, that is, a function of the present signals. Following
+      modes are made consistent before any event (an edge, a trigger, a reset) is processed. Other modes are
+      stateful.
+    - ``hysteresis``: whether a following mode also depends on its previous value: the value before the
+      instant, or before the latest event at this instant. A discrete state with ``hysteresis`` is captured at
+      the same times.
+    - ``stored_while``: a mode of the same block. While it is 0, the previous value does not change.
+    - ``momentary``: whether a discrete state becomes 0 at the end of every instant.
+    - ``captured_when_enabled``: whether a discrete state is also captured when the subsystem of the block is
+      enabled.
     """
 
     name: str
@@ -69,11 +72,12 @@ def name_before(mode: str) -> str:
 class Guard:
     """A quantity of a block whose zero crossings are events; each entry of a vector is a separate guard.
 
-    ``direction``: +1 for upward crossings, -1 for downward, 0 for both. ``action``: effect on the run where
-    it is positive: ``stop`` ends the run, ``fail`` is an error, ``warn`` is reported at the end. ``locates``:
-    whether a zero crossing only locates a change of a following mode. ``disabled_by``: the momentary
-    state that disables the guard while it is not 0. At the end of the instant, the guard is initialised again
-    with its sign at that time.
+    - ``direction``: +1 for upward crossings, -1 for downward, 0 for both.
+    - ``action``: effect on the run where the guard is positive: ``stop`` ends the run, ``fail`` is an error,
+      ``warn`` is reported at the end.
+    - ``locates``: whether a zero crossing only locates a change of a following mode.
+    - ``disabled_by``: the momentary state that disables the guard while it is not 0. At the end of the
+      instant, the guard is initialised again with its sign at that time.
     """
 
     name: str

@@ -21,11 +21,16 @@ MAX_ELEMENT = 1_000_000
 class ScopeTrigger(metaclass=ArgumentErrors):
     """A trigger of the scopes: they show a window about a time at which a signal crosses a level.
 
-    ``signal`` is the path of an output, ``"controller/error/y"``, and ``element`` the index of an entry of
-    this signal, from 0. The signal may be missing: the trigger then waits. ``level`` has the SI unit of the
-    signal. ``span`` is the width of the window (s), and ``position`` the part of it before the trigger (0 to
-    1). ``hold_off`` is the time after a trigger during which further crossings are ignored (s). ``on`` is
-    false for a trigger that is switched off and keeps its settings. Raises ``DiagramError``.
+    - ``on``: false for a trigger that is switched off and keeps its settings.
+    - ``signal``: the path of an output, ``"controller/error/y"``. The signal may be missing: the trigger then
+      waits.
+    - ``element``: the index of an entry of this signal, from 0.
+    - ``level``: in the SI unit of the signal.
+    - ``span``: the width of the window, s.
+    - ``position``: the part of the window before the trigger, 0 to 1.
+    - ``hold_off``: the time after a trigger during which further crossings are ignored, s.
+
+    Raises ``DiagramError``.
     """
 
     on: bool = True

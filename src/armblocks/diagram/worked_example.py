@@ -53,11 +53,14 @@ def driver(type_name: str, **parameters: Any) -> ExampleBlock:
 class WorkedExample:
     """A small diagram that demonstrates one block.
 
-    ``shows``: a caption of one or two sentences. ``parameters`` of the block (robots by name). ``inputs`` by
-    port; an omitted port gets a suitable signal. ``shown``: the signals of the scope; by default the inputs
-    and outputs of the block. ``x_axis`` and ``y_axis``: the signals of an x-y plot instead. ``extra_blocks``:
-    additional, unconnected blocks. ``lines``: frame lines, pairs of frame ports ``"block/port"``, or
-    ``"port"`` of the example's block. ``stop_time`` (s) of the run and ``sample_time`` (s) of the record.
+    - ``shows``: a caption of one or two sentences.
+    - ``parameters``: of the block (robots by name).
+    - ``inputs``: by port; an omitted port gets a suitable signal.
+    - ``shown``: the signals of the scope, by default the inputs and outputs of the block.
+    - ``x_axis``, ``y_axis``: the signals of an x-y plot instead.
+    - ``extra_blocks``: additional, unconnected blocks.
+    - ``lines``: frame lines, pairs of frame ports ``"block/port"``, or ``"port"`` of the example's block.
+    - ``stop_time``, ``sample_time``: end of the run and interval of the record, s.
     """
 
     shows: str = ""

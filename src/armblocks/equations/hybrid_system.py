@@ -37,11 +37,13 @@ class SampleClock:
 class Delays:
     """The ``nd`` delayed scalars: inputs, delays, and indices of the delayed values in ``z``.
 
-    ``inputs``: from ``t, x, z, w, p`` the delayed signals and their exact time derivatives, ``(2 nd,)``.
-    ``times``: from the same arguments the delays, ``(nd,)`` s. ``bounds``: from ``p`` the lower and upper
-    limits of the delays, above 0, ``(2 nd,)`` s. ``values`` and ``derivatives``: the indices in ``z`` of the
-    values at ``t - tau``, and of their time derivatives for ``fixed`` delays. They are the only entries of
-    ``z`` that change between instants. Before the start, a signal has its value in ``initial_discrete``.
+    - ``values``, ``derivatives``: the indices in ``z`` of the values at ``t - tau``, and of their time
+      derivatives for ``fixed`` delays. They are the only entries of ``z`` that change between instants.
+    - ``inputs``: from ``t, x, z, w, p`` the delayed signals and their exact time derivatives, ``(2 nd,)``.
+    - ``times``: from the same arguments the delays, ``(nd,)`` s.
+    - ``bounds``: from ``p`` the lower and upper limits of the delays, above 0, ``(2 nd,)`` s.
+
+    Before the start, a signal has its value in ``initial_discrete``.
     """
 
     values: tuple[int, ...]

@@ -25,13 +25,16 @@ def _no_reader(data: bytes, name: str) -> Mapping[str, Robot]:
 class RobotFormat:
     """One file format of robots.
 
-    ``suffixes``: in lower case with the dot. ``max_bytes``: the maximum size of a file. ``read``: a function
-    of a file's bytes and its name for messages, which returns the robots by their names in the file and
-    raises ``FormatError``. A format whose files refer to other files, or that reports findings, has
-    ``read_in_context`` instead, with a :class:`FileContext` as third argument. ``correct``: a function of a
-    file's bytes, its name and its findings, which corrects findings with an unambiguous remedy.
-    ``recognises``: for a format that shares its suffix with another format, whether a file's bytes are of
-    this format.
+    - ``suffixes``: in lower case with the dot.
+    - ``max_bytes``: the maximum size of a file.
+    - ``read``: a function of a file's bytes and its name for messages, which returns the robots by their
+      names in the file and raises ``FormatError``.
+    - ``read_in_context``: instead of ``read``, for a format whose files refer to other files, or that reports
+      findings. The third argument is a :class:`FileContext`.
+    - ``correct``: a function of a file's bytes, its name and its findings, which corrects findings with an
+      unambiguous remedy.
+    - ``recognises``: for a format that shares its suffix with another format, whether a file's bytes are of
+      this format.
     """
 
     name: str
