@@ -17,7 +17,8 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
-from fuzz_laws import LAWS, InconclusiveError, findings
+from fuzz_case import InconclusiveError
+from fuzz_laws import LAWS, findings
 from random_diagrams import Recipe, random_recipe, reductions
 
 from armblocks.errors import ArmblocksError

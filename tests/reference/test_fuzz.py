@@ -6,7 +6,8 @@ import warnings
 
 import numpy as np
 import pytest
-from fuzz_laws import LAWS, InconclusiveError, findings
+from fuzz_case import InconclusiveError
+from fuzz_laws import LAWS, findings
 from fuzzing import NO_FINDING, checked, reduced
 from random_diagrams import Node, Recipe, random_recipe
 
