@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.analysis.scaling import Scaled
+from armblocks.analysis.scaling import ScaledSystem
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -36,7 +36,7 @@ class SystemMatrix:
     error. Rounding errors are added to the variances as if they were independent.
     """
 
-    def __init__(self, system: Scaled) -> None:
+    def __init__(self, system: ScaledSystem) -> None:
         n = self.order = system.A.shape[0]
         self.values = np.block([[system.A, system.B], [system.C, system.D]])
         self.relative_error = max(n, 1) * EPSILON

@@ -18,7 +18,7 @@ MAX_LOGARITHM = 200.0
 """Maximum binary logarithm of a factor, so that no square of an entry overflows."""
 
 
-class Scaled(NamedTuple):
+class ScaledSystem(NamedTuple):
     """A system in units in which its entries have similar magnitudes.
 
     ``inputs`` (nu,) and ``outputs`` (ny,) are the factors, powers of two, of the columns of B and D and of
@@ -68,7 +68,7 @@ def balancing_factors(A: Array, B: Array, C: Array) -> Array:
     return factors
 
 
-def scaled(A: Array, B: Array, C: Array, D: Array) -> Scaled:
+def scaled(A: Array, B: Array, C: Array, D: Array) -> ScaledSystem:
     """The same system with states, inputs and outputs scaled by powers of two.
 
     The states of each irreducible diagonal block of A are balanced. A factor for each of these blocks, each
@@ -89,7 +89,7 @@ def scaled(A: Array, B: Array, C: Array, D: Array) -> Scaled:
     groups = [*parts, *([n + k] for k in range(max(nu, ny)))]
     columns, rows = _group_factors(matrix, groups, len(parts), nu, ny)
     matrix = matrix * columns / rows[:, None]
-    return Scaled(
+    return ScaledSystem(
         matrix[:n, :n], matrix[:n, n:], matrix[n:, :n], matrix[n:, n:], columns[n:], 1.0 / rows[n:], parts
     )
 

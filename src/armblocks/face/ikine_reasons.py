@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from armblocks.face.ikine_coordinates import dependent_excess, periodic_coordinates
 from armblocks.face.ikine_result import IkineResult
-from armblocks.face.ikine_search import ArmSearch, Options, Prepared
+from armblocks.face.ikine_search import ArmSearch, Options, SearchArrays
 from armblocks.inverse_kinematics.layout import Count, Number, Setting, Status
 from armblocks.inverse_kinematics.solver import Solutions
 
@@ -37,7 +37,7 @@ class Reasons:
     """The reasons of failures: further searches of the targets without a solution."""
 
     def __init__(
-        self, arm: ArmSearch, targets: Array, found: Solutions, options: Options, prepared: Prepared
+        self, arm: ArmSearch, targets: Array, found: Solutions, options: Options, prepared: SearchArrays
     ) -> None:
         self.arm, self.targets, self.found = arm, targets, found
         self.options, self.prepared = options, prepared
@@ -99,7 +99,7 @@ class Reasons:
         return cast("int", self.arm.robot.position_of_speed[speed])
 
     def _once(
-        self, rows: NDArray[np.intp], starts: Array, prepared: Prepared, damping: float = 0.0
+        self, rows: NDArray[np.intp], starts: Array, prepared: SearchArrays, damping: float = 0.0
     ) -> Solutions:
         """One attempt for each of the targets from a given start; with ``damping`` to the nearest pose."""
         settings = prepared.settings.copy()
@@ -136,7 +136,7 @@ class Reasons:
         self.found.q[found[inside]] = turned[inside]
         self.found.numbers[found[inside]] = free.numbers[reached][inside]
 
-    def _free(self) -> Prepared:
+    def _free(self) -> SearchArrays:
         options = self.options._replace(limits=False)
         return self.arm.prepared(options)
 

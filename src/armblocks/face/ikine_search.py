@@ -41,7 +41,7 @@ class Options(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Prepared:
+class SearchArrays:
     """The arrays of a search for given options."""
 
     settings: Array
@@ -63,20 +63,22 @@ class ArmSearch:
         self.where = f"ikine of robot '{robot.name}'"
         self.names = tuple(entry.name for entry in robot.positions)
         self._fkine = fkine
-        self._prepared: dict[Options, Prepared] = {}
+        self._prepared: dict[Options, SearchArrays] = {}
         self._tables: dict[tuple[bool, int], tuple[Array, Array, float]] = {}
 
-    def run(self, targets: Array, starts: Array | None, prepared: Prepared, threads: int = 1) -> Solutions:
+    def run(
+        self, targets: Array, starts: Array | None, prepared: SearchArrays, threads: int = 1
+    ) -> Solutions:
         """Search for the targets (N, 16) from ``starts`` (N, nq), or from the table."""
         return self.search.solve(
             targets, starts, prepared.settings.copy(), prepared.bounds, prepared.table, threads
         )
 
-    def prepared(self, options: Options) -> Prepared:
+    def prepared(self, options: Options) -> SearchArrays:
         """The arrays of a search with these options."""
         return self._prepared.get(options) or self._prepare(options)
 
-    def _prepare(self, options: Options) -> Prepared:
+    def _prepare(self, options: Options) -> SearchArrays:
         q, poses, size = self._table(options.limits, options.seed)
         lowest, highest = self._limits(options.limits)
         table = StartTable.of(q, poses)
@@ -95,7 +97,7 @@ class ArmSearch:
             periodic=periodic_coordinates(self.robot),
             largest_step=self._largest_steps(size),
         )
-        prepared = Prepared(
+        prepared = SearchArrays(
             settings=settings_array(settings, table),
             bounds=self.search.bounds_array(bounds),
             table=table,

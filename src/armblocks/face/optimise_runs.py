@@ -36,7 +36,7 @@ class ScenarioGroup:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Measured:
+class PointMeasures:
     """The measures ``(N, S, nm)`` of N points and S scenarios, NaN for runs without measures, and the first
     message of such a run."""
 
@@ -94,7 +94,7 @@ class Runs:
         self.count = 0
         """The number of computed runs."""
 
-    def measured(self, points: Array) -> Measured:
+    def measured(self, points: Array) -> PointMeasures:
         """The measures at points ``(N, n)``."""
         values = np.full((len(points), self.scenarios, self.columns), np.nan)
         message = ""
@@ -103,7 +103,7 @@ class Runs:
             values[:, group.places] = rows.reshape(len(points), group.places.size, -1)
             message = message or text
         self.count += values.shape[0] * values.shape[1]
-        return Measured(values=values, message=message)
+        return PointMeasures(values=values, message=message)
 
     def parameters(self, group: ScenarioGroup, points: Array) -> RunParameters:
         """The parameters of all runs of a group: all its scenarios at the first point, and so on."""

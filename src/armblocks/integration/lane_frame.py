@@ -52,7 +52,7 @@ class Row(IntEnum):
     END = 19
 
 
-class Shared(IntEnum):
+class SharedNumber(IntEnum):
     """Indices of doubles that all runs have in common."""
 
     STEP = 0

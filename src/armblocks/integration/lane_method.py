@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from armblocks.integration.butcher_tableau import ButcherTableau
 from armblocks.integration.explicit_method import NEAR_BORDER
-from armblocks.integration.lane_frame import LaneWorkspace, Row, Shared
+from armblocks.integration.lane_frame import LaneWorkspace, Row, SharedNumber
 from armblocks.integration.step_control import SHORT_CHANGE, resolved_change
 from armblocks.integration.step_sums import ExplicitSums, StepSums
 from armblocks.routines.arithmetic import in_all_lanes, maximum, minimum
@@ -49,8 +49,8 @@ class LaneMethod:
 
         Their results are invalid.
         """
-        rtol, atol = in_all_lanes(shared[Shared.RTOL]), in_all_lanes(shared[Shared.ATOL])
-        self.max_step = in_all_lanes(shared[Shared.MAX_STEP])
+        rtol, atol = in_all_lanes(shared[SharedNumber.RTOL]), in_all_lanes(shared[SharedNumber.ATOL])
+        self.max_step = in_all_lanes(shared[SharedNumber.MAX_STEP])
         self.sums = StepSums(r, self.n, self.x, self.y, self.K, self.number, rtol, atol)
         self.explicit = ExplicitSums(self.sums, tableau, self.evaluate)
 
@@ -75,7 +75,7 @@ class LaneMethod:
 
     def short_change(self) -> Lanes:
         """The change of the derivative below which a step is needlessly short."""
-        power = resolved_change(self.r, self._shared[Shared.RTOL], self.tableau.error_order)
+        power = resolved_change(self.r, self._shared[SharedNumber.RTOL], self.tableau.error_order)
         return in_all_lanes(minimum(self.r.constant(SHORT_CHANGE), power))
 
     def is_at_border(self) -> Mask:

@@ -13,7 +13,7 @@ from armblocks.integration.explicit_method import (
     STIFF_CHECKS,
     ExplicitMethod,
 )
-from armblocks.integration.lane_frame import Row, Shared, SharedCount, SharedPlace
+from armblocks.integration.lane_frame import Row, SharedCount, SharedNumber, SharedPlace
 from armblocks.integration.lane_method import shortest_step
 from armblocks.integration.lane_runs import LaneFunctions
 from armblocks.integration.step_control import (
@@ -94,7 +94,7 @@ class LaneStep:
 
     def _fixed(self) -> None:
         r, memory, method, time = self.r, self.memory, self.method, self.time
-        spacing = in_all_lanes(self.addresses[SharedPlace.SHARED].reals[Shared.STEP])
+        spacing = in_all_lanes(self.addresses[SharedPlace.SHARED].reals[SharedNumber.STEP])
         grid = method.variable(memory[Row.GRID])
         with r.loop() as search:
             behind = self.running & (grid.value * spacing <= time)

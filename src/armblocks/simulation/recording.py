@@ -55,7 +55,7 @@ class Samples:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Recorded:
+class ValidSamples:
     """Samples with finite signals: ``time (N,)`` s, ``states (N, nx)`` and ``signals (ny, N)``.
 
     ``jumps`` are both sides of the jumps between the samples. ``failure`` is the error for the next sample if
@@ -137,12 +137,14 @@ class Recording:
             jumps=self._jumps(parts, time, signals),
         )
 
-    def valid_samples(self) -> Recorded:
+    def valid_samples(self) -> ValidSamples:
         """All samples before the first signal that is not finite; of a logged run, the view in memory."""
         compiled = self._compiled
         if self._log is not None:
             time, states, signals = self._log.view(compiled.signals_layout.size)
-            return Recorded(time=time, states=states, signals=signals, jumps=self._jumps([], time, signals))
+            return ValidSamples(
+                time=time, states=states, signals=signals, jumps=self._jumps([], time, signals)
+            )
         parts = self._rows(0) or [self.parts[-1].rows()]
         time = _concatenated([rows.time for rows in parts])
         states = _concatenated([rows.states for rows in parts])
@@ -153,7 +155,7 @@ class Recording:
         failure, count = (None, time.size) if error is None else error
         time, states, signals = time[:count], states[:count], signals[:, :count]
         jumps = self._jumps(parts, time, signals)
-        return Recorded(time=time, states=states, signals=signals, jumps=jumps, failure=failure)
+        return ValidSamples(time=time, states=states, signals=signals, jumps=jumps, failure=failure)
 
     def _jumps(self, parts: list[Rows], time: Array, signals: Array) -> Jumps:
         """The jumps between samples; they are evaluated at their first use."""

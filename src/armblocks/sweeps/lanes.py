@@ -13,7 +13,7 @@ from armblocks.compiler.native import NativeCode
 from armblocks.compiler.target import host_target
 from armblocks.equations import SimulationOptions
 from armblocks.integration.butcher_tableau import ButcherTableau
-from armblocks.integration.lane_frame import LanePlace, LaneWorkspace, Shared, SharedCount, SharedPlace
+from armblocks.integration.lane_frame import LanePlace, LaneWorkspace, SharedCount, SharedNumber, SharedPlace
 from armblocks.integration.lane_loop import lane_code
 from armblocks.integration.system import CompiledSystem
 from armblocks.simulation.plan import Plan
@@ -99,9 +99,9 @@ class LaneRuns:
         memory = np.zeros((size + 1) * lanes)
         unused = -memory.ctypes.data // 8 % lanes  # a row is aligned to its size
         self._memory = memory[unused : unused + size * lanes]
-        self._shared = np.zeros(Shared.END)
-        self._shared[Shared.STEP], self._shared[Shared.MAX_STEP] = plan.step, plan.max_step
-        self._shared[Shared.RTOL], self._shared[Shared.ATOL] = options.rtol, options.atol
+        self._shared = np.zeros(SharedNumber.END)
+        self._shared[SharedNumber.STEP], self._shared[SharedNumber.MAX_STEP] = plan.step, plan.max_step
+        self._shared[SharedNumber.RTOL], self._shared[SharedNumber.ATOL] = options.rtol, options.atol
         self._counts = np.zeros(SharedCount.END, dtype=np.int64)
         self._counts[SharedCount.MAX_STEPS] = max_steps
         self._counts[SharedCount.STIFFNESS_DETECTION] = plan.stiff is not None

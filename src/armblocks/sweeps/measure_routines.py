@@ -12,13 +12,11 @@ from collections.abc import Callable, Mapping
 
 from armblocks.routines.arithmetic import maximum, minimum, select, square_root
 from armblocks.routines.memory import Reals
-from armblocks.routines.routine import Function, Program, Routine
+from armblocks.routines.routine import Program, Routine
 from armblocks.routines.values import Boolean, Integer, Real
 
 OPTIONS = 4
 """Number of options of a measure."""
-
-Measured = Function[[Reals, Reals, Integer, Reals], Real]
 
 
 def minimum_value(r: Routine, t: Reals, y: Reals, n: Integer, options: Reals) -> Real:

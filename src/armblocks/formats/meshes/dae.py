@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.errors import FormatError, counted
-from armblocks.formats.meshes.node_tree import Placed, flattened
+from armblocks.formats.meshes.node_tree import MeshNode, flattened
 from armblocks.formats.meshes.polygons import Integers, check_number, corners_at, fans, strip
 from armblocks.formats.xml_elements import Element, read_elements, shortened
 from armblocks.spatial import rotation_about
@@ -77,7 +77,7 @@ class _Dae:
             )
         return target
 
-    def node(self, key: Hashable) -> Placed:
+    def node(self, key: Hashable) -> MeshNode:
         """A ``<node>``, or an ``<instance_node>`` with the node that it refers to."""
         node = cast("Element", key)
         transform = np.eye(4)
@@ -94,7 +94,7 @@ class _Dae:
                 corners += self.skin(self.target(child, "url", "controller"))
             else:
                 transform = transform @ _transform(child)
-        return Placed(transform, corners, children)
+        return MeshNode(transform, corners, children)
 
     def skin(self, controller: Element) -> list[Floats]:
         """The triangles of a skin in the pose of its binding."""

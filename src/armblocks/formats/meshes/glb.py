@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.formats.json_document import Node, read_document
-from armblocks.formats.meshes.node_tree import Placed, flattened
+from armblocks.formats.meshes.node_tree import MeshNode, flattened
 from armblocks.formats.meshes.polygons import Integers, check_number, corners_at, fans, invalid_mesh, strip
 
 MAX_JSON_BYTES = 8 * 2**20
@@ -80,14 +80,16 @@ class _Glb:
                 for child in _elements(node.members(), "children")
             }
             roots = [k for k in range(len(self.nodes)) if k not in inner]
-        return flattened([-1], lambda key: Placed(_UP, (), roots) if key == -1 else self.node(key), self.name)
+        return flattened(
+            [-1], lambda key: MeshNode(_UP, (), roots) if key == -1 else self.node(key), self.name
+        )
 
-    def node(self, key: Hashable) -> Placed:
+    def node(self, key: Hashable) -> MeshNode:
         """Node number ``key``."""
         node = self.nodes[cast("int", key)].members()
         meshes = [self.mesh(_at(self.meshes, node["mesh"], "mesh"))] if "mesh" in node else []
         children = [_index(child, self.nodes, "node") for child in _elements(node, "children")]
-        return Placed(_transform(node), meshes, children)
+        return MeshNode(_transform(node), meshes, children)
 
     def mesh(self, mesh: Node) -> NDArray[np.float64]:
         """The corners of all primitives of a mesh that are triangles."""

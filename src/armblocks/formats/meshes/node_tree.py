@@ -16,7 +16,7 @@ MAX_NODES = 20_000
 """Maximum number of placed nodes. A node that several others refer to counts several times."""
 
 
-class Placed(NamedTuple):
+class MeshNode(NamedTuple):
     """``transform`` (4, 4) in the parent's frame; ``corners``: (F, 3, 3) each; ``children``: keys."""
 
     transform: NDArray[np.float64]
@@ -25,7 +25,7 @@ class Placed(NamedTuple):
 
 
 def flattened(
-    roots: Sequence[Hashable], node_of: Callable[[Hashable], Placed], name: str
+    roots: Sequence[Hashable], node_of: Callable[[Hashable], MeshNode], name: str
 ) -> NDArray[np.float64]:
     """The corners (F, 3, 3) of all nodes below ``roots``, in the frame of the roots' parent.
 
@@ -33,7 +33,7 @@ def flattened(
     Raises ``FormatError`` beyond the limits.
     """
     placed: list[NDArray[np.float64]] = []
-    nodes: dict[Hashable, Placed] = {}
+    nodes: dict[Hashable, MeshNode] = {}
     waiting = [(key, np.eye(4), 1) for key in roots]
     visits = triangles = 0
     while waiting:
