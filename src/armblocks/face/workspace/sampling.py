@@ -72,8 +72,8 @@ def workspace(
       degrees of freedom or more, else ``"trans"``.
     - ``frame``: the frame whose positions are counted, by default the tool.
     - ``cell`` (m): the side of the cubic cells in which the positions are counted.
-    - ``ranges``: pairs (lowest, highest) by the name of the coordinate, rad or m, in place of the joint
-      limits.
+    - ``ranges``: pairs (lowest, highest) by the name of the coordinate, rad or m, within the joint limits.
+      The configurations are then in these ranges.
     - ``torque`` (n,), ``centre`` (3,) m, ``qd``, ``qdd`` (n,): for the measure ``"payload"``.
     - ``points``: the number of samples, from the first, that are stored for point clouds.
 
