@@ -17,6 +17,7 @@ from armblocks.blocks import (
     FromFile,
     Gain,
     Integrator,
+    LogicalOperator,
     Polynomial,
     Ramp,
     RateLimiterContinuous,
@@ -27,11 +28,12 @@ from armblocks.blocks import (
     SecondOrderIntegratorLimited,
     Sign,
     SineWave,
+    Step,
     StickSlipFriction,
     Sum,
 )
 from armblocks.diagram import Block
-from armblocks.errors import InputError
+from armblocks.errors import InputError, SimulationError
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12, "stop_time": 3.0, "sample_time": 0.1}
 
@@ -146,3 +148,22 @@ def test_the_start_of_a_diagram_with_an_implicit_equation() -> None:
     # The sign changes at pi - 0.5, earlier by a change of the phase.
     assert result["x", "wave.phase"][-1] == pytest.approx(-2.0, abs=1e-8)
     assert np.array_equal(result["limited", "bias.bias"], np.ones(result.time.size))
+
+
+def test_a_condition_that_stands_at_its_limit_until_an_event() -> None:
+    """v is 0 until 0.4 s. For any other initial value, v ~= 0 holds from 0.3 s on."""
+
+    def diagram(initial: float) -> ab.Diagram:
+        builder = ab.DiagramBuilder("stands")
+        v = builder.add("v", Integrator(initial=initial), builder.add("u", Step(time=0.4)))
+        both = builder.add("both", LogicalOperator(), v, builder.add("on", Step(time=0.3)))
+        builder.add("x", Integrator(), both)
+        return builder.build()
+
+    with pytest.raises(SimulationError, match=r"several events coincide at 0\.4 s, one of 'both'"):
+        ab.sensitivity(diagram(0.0), "v.initial", "x", stop_time=1.0)
+    # Without a change of the initial value v leaves 0 when the step occurs.
+    result = ab.sensitivity(diagram(0.0), ["u.time", "u.final"], "x", stop_time=1.0)
+    assert result["x", "u.time"][-1] == pytest.approx(-1.0, abs=1e-9)
+    assert result["x", "u.final"][-1] == pytest.approx(0.0, abs=1e-9)
+    assert not ab.sensitivity(diagram(0.1), "v.initial", "x", stop_time=1.0)["x", "v.initial"].any()

@@ -53,6 +53,8 @@ SAME_INSTANT = 2.0**-48
 """Relative tolerance of equal times."""
 SAME_DERIVATIVE = 1e-6
 """Relative tolerance of equal time derivatives of events."""
+STANDING = 1e-12
+"""Relative time: a guard with a zero within this time after an instant was 0 before the instant as well."""
 JUST_BEFORE = 1.0 - 2.0**-49
 """Factor from a time to a time just before it, and before all breakpoints of the same instant."""
 NEVER = -1.0
@@ -69,6 +71,7 @@ class Instants:
         self.guards = len(system.guard_directions)
         self.time = c.add("instant", 1, NEVER)
         """The time of the present or latest instant, s."""
+        self.time_before = c.add("instant before", 1, NEVER)
         self.known, self.open = c.add("known", 1), c.add("open", 1)
         """Whether ``s_p`` of the instant is known, and whether S is S*, the derivative along the instant."""
         self.arms = c.add("arms", 2, 1.0)
@@ -76,6 +79,8 @@ class Instants:
         self.mixed, self.ticked = c.add("mixed", 2, [NEVER, 0.0]), c.add("ticked", 1)
         self.located = c.add("located", self.guards)
         self.instant_p = [c.add(f"instant by {name}", 1) for name in c.names]
+        self.before_p = [c.add(f"instant before by {name}", 1) for name in c.names]
+        """The derivatives of the time of the instant before the present one."""
         self.flow = c.value(system.derivative)
         delays.set_flow(self.flow)
         captured = c.value(system.update, SX.zeros(len(system.clocks)))
@@ -159,6 +164,7 @@ class Instants:
         located = logic_and(is_near, logic_and(self.g_rate != 0.0, c.t > 0.0))
         left_values = {
             "instant": c.t,
+            "instant before": self.time,
             "known": SX(0.0),
             "open": SX(0.0),
             "ticked": SX(0.0),
@@ -167,6 +173,7 @@ class Instants:
                 *(self.over_time(self.captured)[k] for k in self.left_limits), SX(0, 1)
             ),
             **{f"instant by {name}": SX(0.0) for name in c.names},
+            **{f"instant before by {name}": latest for name, latest in zip(c.names, self.instant_p)},
             **self.delays.begin(),
         }
         added = {
@@ -284,12 +291,23 @@ class Instants:
             mean = dot(if_else(marks, derivatives, 0.0), marks) / fmax(dot(marks, marks), 1.0)
             differs = fabs(derivatives - mean) > SAME_DERIVATIVE * (1.0 + fabs(mean))
             differs = logic_or(logic_and(logic_or(marks, later), differs), logic_and(follows, mean != 0.0))
+            leaves = vertcat(self._leaves_zero(k), SX.zeros(marks.numel() - self.guards))
+            differs = logic_or(differs, logic_and(marks, leaves))
             differing = logic_or(differing, differs)
             instants.append(if_else(self.known, known, mean))
         last = SX(0.0)
         for number in range(differing.numel()):
             last = if_else(differing[number], float(number + 1), last)
         return instants, if_else(self.known, 0.0, last)
+
+    def _leaves_zero(self, k: int) -> SX:
+        """Whether each guard was 0 before it began to move at the latest instant, and depends on parameter
+        ``k`` there: with any other value of the parameter it is not 0."""
+        c = self.columns
+        just_now = logic_and(self.time_before > 0.0, c.t - self.time_before <= STANDING * c.t)
+        by_guards = self.by_parameter(self.g, k)
+        moved = fabs(by_guards + self.g_rate * self.before_p[k])
+        return logic_and(just_now, moved > SAME_DERIVATIVE * (1.0 + fabs(by_guards)))
 
     def _fire_later(self, own: SX, others: SX) -> SX:
         """Whether each guard has a located zero now and a higher rank than the guards that fire."""
