@@ -142,11 +142,13 @@ from armblocks.blocks.mechanics.frames import MechanismConfiguration as Mechanis
 from armblocks.blocks.mechanics.frames import ReferenceFrame as ReferenceFrame
 from armblocks.blocks.mechanics.frames import RigidTransform as RigidTransform
 from armblocks.blocks.mechanics.frames import WorldFrame as WorldFrame
+from armblocks.blocks.mechanics.gear_constraint import GearConstraint as GearConstraint
 from armblocks.blocks.mechanics.gimbal_joint import GimbalJoint as GimbalJoint
 from armblocks.blocks.mechanics.lead_screw_joint import LeadScrewJoint as LeadScrewJoint
 from armblocks.blocks.mechanics.pin_slot_joint import PinSlotJoint as PinSlotJoint
 from armblocks.blocks.mechanics.planar_joint import PlanarJoint as PlanarJoint
 from armblocks.blocks.mechanics.prismatic_joint import PrismaticJoint as PrismaticJoint
+from armblocks.blocks.mechanics.rack_and_pinion_constraint import RackAndPinionConstraint as RackAndPinionConstraint
 from armblocks.blocks.mechanics.rectangular_joint import RectangularJoint as RectangularJoint
 from armblocks.blocks.mechanics.revolute_joint import RevoluteJoint as RevoluteJoint
 from armblocks.blocks.mechanics.revolved_solid import RevolvedSolid as RevolvedSolid

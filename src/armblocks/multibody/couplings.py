@@ -171,7 +171,10 @@ def _axis(
             fix="add a Rigid Transform that turns the z axis of the frame to the axis of the joint",
         )
     sign = 1.0 if float(z @ axis) > 0.0 else -1.0
-    return AxisOfCoupling(point=frame.p, direction=z), -sign if joint.reversed else sign
+    point = frame.p
+    if _kind(part) == "revolute":
+        point = at_carrier.p + float((frame.p - at_carrier.p) @ z) * z
+    return AxisOfCoupling(point=point, direction=z), -sign if joint.reversed else sign
 
 
 def _refuse_pairs(net: Netlist, path: str, part: CouplingPart, pairs: Sequence[tuple[str, str]]) -> None:

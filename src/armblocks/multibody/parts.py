@@ -153,7 +153,8 @@ class CouplingPart:
 class AxisOfCoupling(NamedTuple):
     """The z axis of a frame of a coupling, in the body that carries both joints.
 
-    ``point`` (3,): the origin of the frame at joint coordinate 0, m. ``direction`` (3,): a unit vector.
+    ``point`` (3,): the origin of the frame at joint coordinate 0, m; for a revolute joint, the point of the
+    joint's axis nearest to it. ``direction`` (3,): a unit vector.
     """
 
     point: NDArray[np.float64]
