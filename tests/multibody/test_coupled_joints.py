@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -33,7 +34,7 @@ class Belt(MechanicsBlock):
     """F turns by ``factor`` times the angle of B, plus an angle."""
 
     title: ClassVar[str] = "Belt"
-    factor: float = parameter(1.0, tunable=False, doc="angle of F per angle of B")
+    factor: float = parameter(1.0, tunable=False, finite=False, doc="angle of F per angle of B")
     angle: float = parameter(0.0, tunable=False, doc="angle of F where that of B is 0", unit="rad")
     kind: str = parameter("revolute", doc="kind of the joint of F")
 
@@ -283,7 +284,8 @@ def test_a_driven_crank_with_a_wheel_has_the_motion_that_its_torque_causes() -> 
             {},
             r"coupling 'belt' determines the motion of the joint from 'one', .* can have no motion input",
         ),
-        ({}, {}, {"factor": 0.0}, r"lock it: joint 'other' cannot move"),
+        ({}, {}, {"factor": 0.0}, r"'belt'.*the motion of F per motion of B is 0"),
+        ({}, {}, {"factor": -math.inf}, r"the motion of F per motion of B is -inf"),
         ({}, {}, {"kind": "prismatic"}, r"no body carries both a revolute joint .* prismatic"),
         ({}, {}, {}, r"the z axis of frame F is not parallel to the axis of joint 'other'"),
         ({}, {}, {"factor": 99.0}, r"the wheels are too far apart"),

@@ -34,6 +34,8 @@ from armblocks.spatial import Transform
 Array = NDArray[np.float64]
 PARALLEL_TOLERANCE = 1e-9
 """Largest sine of the angle between the axis of a joint and the z axis of the coupling's frame."""
+SMALLEST_FACTOR = 1e-8
+"""Smallest factor of a coupling, and the inverse of the largest; the unit is rad/rad, m/rad or m/m."""
 ROUNDING = 1e-9
 """Coefficients below this fraction of the largest coefficient of a coupling count as zero."""
 
@@ -108,6 +110,13 @@ def _relation(
         factor = law.follower_per_base(base, follower)
     except InputError as error:
         raise DiagramError(error.what, where=net.label(path), allowed=error.allowed, fix=error.fix) from error
+    if not SMALLEST_FACTOR <= abs(factor) <= 1.0 / SMALLEST_FACTOR:
+        raise DiagramError(
+            f"the motion of F per motion of B is {factor:g}",
+            where=net.label(path),
+            allowed=f"factors between {SMALLEST_FACTOR:g} and {1.0 / SMALLEST_FACTOR:g}, of either sign",
+            fix="correct the ratio or the radius",
+        )
     factors = ((other.path, follower_sign), (one.path, -factor * base_sign))
     return Relation(path, factors, part.offset)
 
