@@ -15,6 +15,7 @@ from armblocks.blocks import (
     Constant,
     EnabledSubsystem,
     Expression,
+    FirstOrderLag,
     Gain,
     Inport,
     Integrator,
@@ -179,6 +180,16 @@ def test_a_remainder_has_a_derivative_if_its_divisor_is_zero_or_becomes_zero() -
         result = ab.sensitivity(builder.build(), "v.gain", "y", stop_time=1.0, sample_time=0.1)
         v = result.run["v"]
         np.testing.assert_allclose(result["y", "v.gain"], -np.floor(-9.81 / v) * v, rtol=1e-12)
+
+
+def test_a_remainder_of_zero_by_zero_at_the_start_has_a_derivative() -> None:
+    """x' = k mod(x, x) - x. With the modes before the start, the remainder is 0 / 0."""
+    builder = ab.DiagramBuilder("zero by zero")
+    lag = builder.add("x", FirstOrderLag())
+    rest = builder.add("rest", Modulo(zero_crossing=False), lag, lag)
+    builder.connect(rest, lag["u"])
+    result = ab.sensitivity(builder.build(), "x.gain", "x", stop_time=1.0)
+    assert not result["x", "x.gain"].any()
 
 
 def test_a_formula_that_is_not_a_number_ends_a_run_with_derivatives_by_this_reason() -> None:

@@ -215,7 +215,7 @@ class Instants:
         left_side = logic_and(first, _any_marked(sources))
         t = if_else(left_side, c.t * JUST_BEFORE, c.t)
         flow = c.value_at(c.system.derivative, t, c.x, d.before_arrival(arrived), c.w)
-        along = [flow * (if_else(leaves, -1.0, enters) * instant) for instant in instants]
+        along = [_times(flow, if_else(leaves, -1.0, enters) * instant) for instant in instants]
         S = [known + step for known, step in zip(c.S, along)]
         Z = [self._with_left_limits(c.Z[k], first, instants[k]) for k in range(len(names))]
 
@@ -330,6 +330,12 @@ class Instants:
         c = self.columns
         moving = vertcat(*(self.times[index] for index in self.moving_breakpoints), SX(0, 1))
         return densify(jtimes(moving, c.p, c.seeds[k])) if self.moving_breakpoints else moving
+
+
+def _times(flow: SX, shift: SX) -> SX:
+    """The change of states along a shift of time: 0 without a shift, also where inconsistent modes give a
+    flow that is not a number."""
+    return if_else(shift == 0.0, 0.0, flow * shift)
 
 
 def _any_marked(marks: SX) -> SX:
