@@ -112,6 +112,21 @@ def test_a_constant_at_a_limit_or_at_a_jump_has_no_derivative(block: Block, valu
         assert np.isin(derivative(side), (-1.0, 0.0, 1.0)).all()
 
 
+def test_a_body_at_rest_at_a_limit_has_no_derivative_by_its_speed() -> None:
+    """It moves away with a positive speed, and stays with a negative speed."""
+
+    def derivative(speed: float) -> np.ndarray:
+        builder = ab.DiagramBuilder("rest")
+        body = SecondOrderIntegratorLimited(lower=0.0, initial_speed=speed)
+        builder.add("body", body, builder.add("no force", Constant(value=0.0)))
+        result = ab.sensitivity(builder.build(), "body.initial_speed", "body/x", stop_time=1.0)
+        return result["body/x", "body.initial_speed"]
+
+    with pytest.raises(InputError, match=r"'body' starts exactly at a limit"):
+        derivative(0.0)
+    assert derivative(0.1)[-1] == pytest.approx(1.0, rel=1e-12)
+
+
 def test_a_rate_limiter_that_starts_at_its_input() -> None:
     """It leaves the limit of its rate at once, unless its limits are 0."""
     builder = ab.DiagramBuilder("follows")

@@ -311,9 +311,12 @@ class _Start:
         return _Start(self.equations, p)
 
     def _lasts(self, far: _Start, near: _Start) -> bool:
-        """Whether modes that change with a parameter stay changed: whether no mode changes, or a guard that
-        is zero only for the unchanged parameter does not move. ``far`` and ``near`` are starts with two
-        changes of the parameter in the ratio 1 to ``CLOSER``."""
+        """Whether modes that change with a parameter stay changed.
+
+        They do if no mode changes, or if no guard that is zero only for the unchanged parameter moves, or if
+        one of these guards does not move. ``far`` and ``near`` are starts with two changes of the parameter
+        in the ratio 1 to ``CLOSER``.
+        """
         modes = list(self.system.modes)
         if np.array_equal(self.after.z[modes], far.after.z[modes]):
             return True
@@ -325,7 +328,8 @@ class _Start:
         with np.errstate(invalid="ignore"):  # infinite guards
             through_zero = (here > 0.0) & (np.abs(g[0] - rates[0] / CLOSER) <= 0.1 * np.abs(g[0]))
         moves = np.array([np.abs(rate) * SHORT**order > here for order, rate in enumerate(rates)][1:])
-        return bool((through_zero & ~moves.any(axis=0)).any())
+        moving = through_zero & moves.any(axis=0)
+        return bool((through_zero & ~moving).any() or not moving.any())
 
     @cached_property
     def _values(self) -> Array:
@@ -350,9 +354,9 @@ class _Start:
         """The derivatives of all values with respect to one parameter, with constant modes. ``side`` is the
         start with this parameter changed by ``step``."""
         ((zero, of_states, of_discrete, seed),) = self._initial_directions(slice(index, index + 1))
-        of_x, of_z = (side.after.x - self.after.x) / step, (side.after.z - self.after.z) / step
+        of_z = (side.after.z - self.after.z) / step
         of_z[list(self.system.modes)] = 0.0
-        direction = (zero, of_x, of_z, seed)
+        direction = (zero, of_states, of_z, seed)
         rate = self.equations.along(self.equations.values_along, self.after, self.p, direction)
         return np.concatenate([of_states, of_discrete, rate])
 
