@@ -132,12 +132,11 @@ def symbol(kind: type[Block], page: str) -> str:
 def docstring(kind: type[Block]) -> list[str]:
     """The docstring as Markdown: paragraphs of prose, and indented formulas unchanged."""
     lines: list[str] = []
-    for paragraph in inspect.cleandoc(kind.__doc__ or "").split("\n\n"):
+    for paragraph in kind.documentation():
         if paragraph.startswith("    "):
             lines += ["```text", inspect.cleandoc(paragraph), "```", ""]
         else:
-            text = paragraph[:-1] if paragraph.endswith("::") else paragraph
-            lines += [prose(text), ""]
+            lines += [prose(paragraph), ""]
     return lines[:-1]
 
 

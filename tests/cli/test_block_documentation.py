@@ -12,6 +12,7 @@ import armblocks as ab
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import Block
 from armblocks.formats import diagram_to_python
+from armblocks.studio.sheet.drawing_data import library
 from worked_examples import worked_example
 
 Invoke = Callable[..., Result]
@@ -23,6 +24,22 @@ def test_the_documentation_of_a_block_has_equation_ports_units_and_parameters(in
     assert "y = sin(2 pi (f1 t + (f2 - f1) t^2 / (2 T)))" in " ".join(text.split())
     for words in ("initial_frequency", "Hz", "(tunable)", "outputs", "builder.add("):
         assert words in text
+
+
+def test_lists_of_a_documentation_stay_lists(invoke: Invoke) -> None:
+    text = invoke("blocks", "PID").stdout
+    assert "\n\n- clamping stops the integral" in text
+    assert "\n- back_calculation adds" in text
+    (pid,) = (entry for entry in library() if entry.type == "PID")
+    assert "\n\n• clamping stops the integral while it drives the output further beyond a limit.\n•" in (
+        pid.documentation
+    )
+    # Paragraphs are refilled, and formulas keep their lines.
+    for kind in BLOCKS.values():
+        for paragraph in kind.documentation():
+            assert paragraph.startswith("    ") or all(
+                line.startswith("- ") for line in paragraph.splitlines()[1:]
+            )
 
 
 def test_a_block_is_found_by_its_title_and_in_any_case(invoke: Invoke) -> None:

@@ -14,6 +14,8 @@ from rich.text import Text
 from armblocks.cli.terminal import STRONG, results_console, table
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+
     from armblocks.diagram import Block, Parameter, Port
 
 
@@ -119,7 +121,7 @@ def _show(console: Console, kind: type[Block]) -> None:
 
     block = example_block(kind)
     console.print(Text.assemble((kind.type_name(), STRONG), f"  ({kind.title}; {BLOCKS.family_of(kind)})"))
-    for line in _paragraphs(inspect.cleandoc(kind.__doc__ or "")):
+    for line in _paragraphs(kind):
         console.print(line)
     if frames := block.frame_ports():
         rows = table(("frame ports", "left"), ("description", "left"))
@@ -148,12 +150,18 @@ def _show(console: Console, kind: type[Block]) -> None:
     )
 
 
-def _paragraphs(docstring: str) -> list[Text]:
-    """The docstring for a terminal: paragraphs are refilled, indented formulas are unchanged."""
-    paragraphs: list[Text] = []
-    for paragraph in docstring.replace("::\n", ":\n").replace("``", "").split("\n\n"):
-        is_formula = paragraph.startswith("    ")
-        paragraphs.append(Text("\n" + (paragraph if is_formula else " ".join(paragraph.split()))))
+def _paragraphs(kind: type[Block]) -> list[RenderableType]:
+    """The documentation for a terminal: each paragraph after an empty line, lists with a hanging indent."""
+    paragraphs: list[RenderableType] = []
+    for paragraph in kind.documentation():
+        text = paragraph.replace("``", "")
+        if not text.startswith("- "):
+            paragraphs.append(Text("\n" + text))
+            continue
+        entries = Table.grid(padding=(0, 1))
+        for entry in text.splitlines():
+            entries.add_row("-", Text(entry.removeprefix("- ")))
+        paragraphs += [Text(""), entries]
     return paragraphs
 
 

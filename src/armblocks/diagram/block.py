@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
+import re
 from abc import ABC
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
@@ -178,6 +180,22 @@ class Block(ABC, metaclass=ArgumentErrors, methods=False):
     def summary(cls) -> str:
         """A one-sentence description: the first line of the docstring."""
         return (cls.__doc__ or "").strip().splitlines()[0]
+
+    @classmethod
+    def documentation(cls) -> tuple[str, ...]:
+        """The paragraphs of the docstring.
+
+        A paragraph of prose is one line. A list has one line for each entry, which begins with a hyphen. A
+        formula has its lines, each with an indent of four spaces.
+        """
+        paragraphs: list[str] = []
+        for paragraph in inspect.cleandoc(cls.__doc__ or "").split("\n\n"):
+            if paragraph.startswith("    "):
+                paragraphs.append(paragraph)
+                continue
+            entries = [" ".join(entry.split()) for entry in re.split(r"\n(?=- )", paragraph)]
+            paragraphs.append(re.sub("::$", ":", "\n".join(entries)))
+        return tuple(paragraphs)
 
     def own_parameters(self) -> tuple[Parameter, ...]:
         """The parameters of this block: of its type and, for a subsystem, of its mask."""

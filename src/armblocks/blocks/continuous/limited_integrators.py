@@ -43,12 +43,16 @@ _SATURATED = Port("saturated", "1 at the upper limit, -1 at the lower limit, els
 class ResettableIntegrator(Block):
     """The integral over time with resets: y' = u, and y = initial at t = 0 and at each reset.
 
-    The block corresponds to Simulink's Integrator with its optional ports. With ``level`` and ``level hold``
-    y equals the present initial value while the trigger is not 0. The initial value may come from a port:
-    always (``external``), or only at resets (``external at resets``), so that this value may depend on y. The
-    ``state_port`` outputs the state before a reset, so that a loop through this port is not algebraic. At the
-    start, ``external`` gives y and the state port the value of the port; a loop through it is then algebraic.
-    With ``limit_output`` y stays between ``lower`` and ``upper``.
+    The block corresponds to Simulink's Integrator with its optional ports:
+
+    - With the resets ``level`` and ``level hold``, y equals the present initial value while the trigger is
+      not 0.
+    - The initial value may come from a port: always (``external``), or only at resets (``external at
+      resets``), so that this value may depend on y.
+    - The ``state_port`` outputs the state before a reset, so that a loop through this port is not algebraic.
+      At the start, ``external`` gives y and the state port the value of the port; a loop through it is then
+      algebraic.
+    - With ``limit_output`` y stays between ``lower`` and ``upper``.
     """
 
     title: ClassVar[str] = "Integrator with Reset"

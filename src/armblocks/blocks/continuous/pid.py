@@ -124,10 +124,15 @@ class PID(ContinuousPidBlock):
     """Proportional, integral and filtered derivative action: y = (P + I/s + D N s/(s + N)) u.
 
     This is the parallel form of Simulink's PID Controller. In the ideal form y = P (1 + I/s + D N s/(s + N))
-    u. States: ``integral`` and ``filter`` (filter' = N (D u - filter)). With ``limit_output`` the output
-    stays between two limits. ``clamping`` then stops the integral while it drives the output further beyond a
-    limit. ``back_calculation`` adds Kb (y - unlimited y) to the rate of the integral. ``tracking`` adds Kt
-    (tracking - y) to this rate, for a bumpless transfer from another controller.
+    u. States: ``integral`` and ``filter`` (filter' = N (D u - filter)).
+
+    With ``limit_output`` the output stays between two limits. The integral then changes according to
+    ``anti_windup``:
+
+    - ``clamping`` stops the integral while it drives the output further beyond a limit.
+    - ``back_calculation`` adds Kb (y - unlimited y) to the rate of the integral.
+
+    ``tracking`` adds Kt (tracking - y) to this rate, for a bumpless transfer from another controller.
     """
 
     title: ClassVar[str] = "PID Controller"

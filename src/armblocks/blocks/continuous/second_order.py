@@ -83,11 +83,12 @@ class SecondOrderIntegrator(Block):
 class SecondOrderIntegratorLimited(Block):
     """Position and speed between limits: x'' = u; at a limit of x the speed becomes 0 or the input ``dx0``.
 
-    As in Simulink, dx jumps to 0 when x reaches a limit, and x stays there while u points outwards. With
-    ``reinitialize`` dx jumps to the input ``dx0`` instead, which may depend on dx (a bounce). If the speed
-    after a bounce is at most ``rest_speed``, the block stops: x stays exactly at the limit until u points
-    inwards. A bouncing ball therefore comes to rest after a finite number of bounces (no Zeno behaviour). The
-    speed may have limits too; they must include 0 where x has a limit in the direction of motion.
+    - As in Simulink, dx jumps to 0 when x reaches a limit, and x stays there while u points outwards.
+    - With ``reinitialize`` dx jumps to the input ``dx0`` instead, which may depend on dx (a bounce). If the
+      speed after a bounce is at most ``rest_speed``, the block stops: x stays exactly at the limit until u
+      points inwards. A bouncing ball therefore comes to rest after a finite number of bounces (no Zeno
+      behaviour).
+    - The speed may have limits too; they must include 0 where x has a limit in the direction of motion.
     """
 
     title: ClassVar[str] = "Integrator, Second-Order Limited"

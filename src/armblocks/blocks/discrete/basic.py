@@ -50,12 +50,17 @@ _METHODS = {
 class DiscreteIntegrator(Block):
     """A discrete-time integrator: x(k+1) = x(k) + gain T u(k), within two limits, x(0) = initial.
 
-    The block corresponds to Simulink's Discrete-Time Integrator. Forward Euler: y(k) = x(k). Backward Euler:
-    y(k) = x(k) + gain T u(k). Trapezoidal: y(k) = x(k) + gain T u(k) / 2 and x(k+1) = y(k) + gain T u(k) / 2.
+    The block corresponds to Simulink's Discrete-Time Integrator. Its methods:
+
+    - forward Euler: y(k) = x(k)
+    - backward Euler: y(k) = x(k) + gain T u(k)
+    - trapezoidal: y(k) = x(k) + gain T u(k) / 2 and x(k+1) = y(k) + gain T u(k) / 2
+
     In a triggered subsystem the interval is T(k) = t(k) - t(k-1). Forward Euler is then y(k) = y(k-1) + gain
-    T(k) u(k-1), and the trapezoidal rule is y(k) = y(k-1) + gain T(k) (u(k-1) + u(k)) / 2. An external reset
-    sets x(k) to the initial value before the output of that tick is computed. The ``state_port`` outputs x(k)
-    before the reset, so that a loop through this port is not algebraic.
+    T(k) u(k-1), and the trapezoidal rule is y(k) = y(k-1) + gain T(k) (u(k-1) + u(k)) / 2.
+
+    An external reset sets x(k) to the initial value before the output of that tick is computed. The
+    ``state_port`` outputs x(k) before the reset, so that a loop through this port is not algebraic.
     """
 
     title: ClassVar[str] = "Discrete-Time Integrator"

@@ -113,10 +113,15 @@ class DiscretePID(SampledPidBlock):
 
     u is the error, i the integral action and f the state of the derivative filter. This is Simulink's
     Discrete PID Controller with forward Euler rules. The integral and the filter may each use
-    ``backward_euler`` or ``trapezoidal`` instead. While the output is limited, ``clamping`` stops the
-    integral if it drives the output further beyond the limit. ``back_calculation`` adds T Kb (y - unlimited
-    y) to the integral. ``tracking`` adds T Kt (tracking - y) to the integral. A reset happens at the first
-    tick after the trigger has crossed zero. In a triggered subsystem, T is t(k+1) - t(k).
+    ``backward_euler`` or ``trapezoidal`` instead.
+
+    While the output is limited, the integral changes according to ``anti_windup``:
+
+    - ``clamping`` stops the integral if it drives the output further beyond the limit.
+    - ``back_calculation`` adds T Kb (y - unlimited y) to the integral.
+
+    ``tracking`` adds T Kt (tracking - y) to the integral. A reset happens at the first tick after the trigger
+    has crossed zero. In a triggered subsystem, T is t(k+1) - t(k).
     """
 
     title: ClassVar[str] = "Discrete PID Controller"

@@ -34,11 +34,16 @@ _RESERVED = frozenset(name for name in RESERVED if TABLE[name].max_arguments == 
 class Expression(Block):
     """The value of a formula such as sin(u[1]) * k: y = formula(u, t, constants), compiled like any block.
 
-    A formula may contain the input ``u`` (or ``u1``, ``u2``, … for several inputs), elements ``u[1]``,
-    ``u[2]``, … with indices from 1, the time ``t``, ``pi`` and ``e``. It may also contain tunable constants:
-    their names are in ``names``, their values in ``values``. Operators and functions are the same as in all
-    formulas, such as ``+ - * / ^``, comparisons, ``&& || ~``, ``atan2``, ``min``, ``mod`` and ``if(condition,
-    yes, no)``. Vectors are evaluated element by element.
+    A formula may contain:
+
+    - the input ``u`` (or ``u1``, ``u2``, … for several inputs), and its elements ``u[1]``, ``u[2]``, … with
+      indices from 1,
+    - the time ``t``, ``pi`` and ``e``,
+    - tunable constants: their names are in ``names``, their values in ``values``,
+    - the operators and functions of all formulas, such as ``+ - * / ^``, comparisons, ``&& || ~``, ``atan2``,
+      ``min``, ``mod`` and ``if(condition, yes, no)``.
+
+    Vectors are evaluated element by element.
     """
 
     title: ClassVar[str] = "Fcn"

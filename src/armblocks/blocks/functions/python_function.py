@@ -40,13 +40,15 @@ def unchanged(u: object) -> object:
 class PythonFunction(Block):
     """The value of a Python function: y = function(its inputs, t).
 
-    Every argument without a default is an input of that name, except ``t``, the time (s). A scalar input
-    is a symbol; a vector or matrix is a NumPy array of symbols, which supports arithmetic, indices, ``@`` and
-    NumPy's functions. The function runs once, when the diagram is traced, and its equations are compiled and
-    differentiated like the equations of any block. The values of the inputs are not known at that time, so
-    the function cannot branch on them (``if u > 0``): use ``casadi.if_else``, ``fmin``, ``fmax`` and
-    ``fabs``. The result of the function must depend only on its arguments. It returns one value for each name
-    in ``results``.
+    The function runs once, when the diagram is traced, and its equations are compiled and differentiated like
+    the equations of any block.
+
+    - Every argument without a default is an input of that name, except ``t``, the time (s). A scalar input is
+      a symbol; a vector or matrix is a NumPy array of symbols, which supports arithmetic, indices, ``@`` and
+      NumPy's functions.
+    - The values of the inputs are not known at that time, so the function cannot branch on them (``if u >
+      0``): use ``casadi.if_else``, ``fmin``, ``fmax`` and ``fabs``.
+    - The result must depend only on the arguments. It is one value for each name in ``results``.
 
     The file of a diagram stores ``file.py:name`` and runs no code unless it is trusted. The studio shows the
     code, and runs the code in a separate process after you have trusted the present content of the file.

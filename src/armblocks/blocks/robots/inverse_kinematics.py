@@ -104,12 +104,14 @@ class Ikine(Block):
 class ResolvedRate(Block):
     """Joint speeds for a velocity of the tool, bounded near singular configurations: (v; w) = J(q) qd.
 
-    Resolved-rate motion control (Whitney, 1969) with damped least squares: near a singular configuration,
-    where the manipulability falls below ``region``, damping up to ``damping`` bounds the speeds, and the tool
-    velocity deviates from the commanded velocity. The manipulability is computed from the Jacobian whose
-    linear rows are divided by the size of the arm. All speeds are reduced in proportion, so that none exceeds
-    ``max_speed``. ``avoidance`` moves joints towards the middle of their ranges without moving the tool. This
-    requires more joints than degrees of freedom of the tool.
+    Resolved-rate motion control (Whitney, 1969) with damped least squares:
+
+    - Near a singular configuration, where the manipulability falls below ``region``, damping up to
+      ``damping`` bounds the speeds, and the tool velocity deviates from the commanded velocity. The
+      manipulability is computed from the Jacobian whose linear rows are divided by the size of the arm.
+    - All speeds are reduced in proportion, so that none exceeds ``max_speed``.
+    - ``avoidance`` moves joints towards the middle of their ranges without moving the tool. This requires
+      more joints than degrees of freedom of the tool.
     """
 
     title: ClassVar[str] = "Resolved Rate"

@@ -159,12 +159,14 @@ class ToFile(Block):
 class Spectrum(Block):
     """The spectrum of a signal: amplitudes, or power spectral density by Welch's method.
 
-    ``amplitude``: the amplitude of a sine at each frequency, A = 2 |X| / sum(w). ``power density``:
-    one-sided, 2 |X|^2 / (fs sum(w^2)); its integral over the frequency is the mean square of the signal. X
-    is the discrete Fourier transform of evenly spaced samples times the window w, and fs the sampling rate in
-    Hz. Several half-overlapping segments are averaged (Welch, IEEE Trans. Audio Electroacoustics 15, 1967).
-    Signals are interpolated linearly between the recorded sample times. There is no anti-aliasing filter:
-    choose a sufficiently small ``sample_time``.
+    - ``amplitude``: the amplitude of a sine at each frequency, A = 2 |X| / sum(w).
+    - ``power density``: one-sided, 2 |X|^2 / (fs sum(w^2)); its integral over the frequency is the mean
+      square of the signal.
+
+    X is the discrete Fourier transform of evenly spaced samples times the window w, and fs the sampling rate
+    in Hz. Several half-overlapping segments are averaged (Welch, IEEE Trans. Audio Electroacoustics 15,
+    1967). Signals are interpolated linearly between the recorded sample times. There is no anti-aliasing
+    filter: choose a sufficiently small ``sample_time``.
     """
 
     title: ClassVar[str] = "Spectrum"

@@ -23,13 +23,19 @@ from armblocks.diagram.signs import FaceSign, graph
 class FromFile(BlockWithRows):
     """A signal from a table: y = values of the rows around t, interpolated linearly or held.
 
-    In the file of a diagram, ``data`` names a CSV, NPZ, MAT or Parquet file, relative to the diagram's file,
-    and the columns of the times and of the values. In the studio the file is chosen in the block's dialog,
-    with a preview, or dropped on the sheet. In Python, ``data`` is the result of ``load_table``, or rows
-    (time, value, …). Each row is an event, so that no step passes over a row. The cost of a row does not
-    depend on the length of the table. Before the first row and after the last row, the values of that row are
-    held; or, with ``zero``, the signal is 0 before the first row and from the time of the last row on. Values
-    are not converted: the signal has the unit in its header, such as ``q1 [deg]``.
+    ``data`` is the table:
+
+    - In the file of a diagram it names a CSV, NPZ, MAT or Parquet file, relative to the diagram's file, and
+      the columns of the times and of the values.
+    - In the studio the file is chosen in the block's dialog, with a preview, or dropped on the sheet.
+    - In Python it is the result of ``load_table``, or rows (time, value, …).
+
+    Each row is an event, so that no step passes over a row. The cost of a row does not depend on the length
+    of the table.
+
+    Before the first row and after the last row, the values of that row are held; or, with ``zero``, the
+    signal is 0 before the first row and from the time of the last row on. Values are not converted: the
+    signal has the unit in its header, such as ``q1 [deg]``.
     """
 
     title: ClassVar[str] = "From File"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from types import MappingProxyType
@@ -102,6 +103,11 @@ def library() -> tuple[BlockType, ...]:
     return tuple(_block_type(kind) for kind in BLOCKS.values())
 
 
+def _plain(text: str) -> str:
+    """Documentation without marks of code, and with points before the entries of lists."""
+    return re.sub("^- ", "• ", text.replace("``", ""), flags=re.MULTILINE)
+
+
 def _block_type(kind: type[Block]) -> BlockType:
     block = _default(kind)
     box = box_at_placement("", block, Placement(x=0.0, y=0.0))
@@ -110,7 +116,7 @@ def _block_type(kind: type[Block]) -> BlockType:
         title=kind.title,
         family=BLOCKS.family_of(kind),
         summary=kind.summary(),
-        documentation=(kind.__doc__ or "").strip(),
+        documentation=_plain("\n\n".join(kind.documentation())),
         width=box.width,
         height=box.height,
         face=_face(box),
