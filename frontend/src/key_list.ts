@@ -31,7 +31,7 @@ export const KEYS: KeyGroup[] = [
   },
   {
     title: 'With the mouse on the sheet',
-    sources: ['canvas/pointer_drag.ts', 'canvas/subsystem_preview.tsx'],
+    sources: ['canvas/pointer_drag.ts', 'canvas/proposed_line.tsx', 'canvas/subsystem_preview.tsx'],
     keys: [
       ['Shift+drag', 'Disconnect a block and connect its neighbours'],
       ['Ctrl+drag, right drag', 'Duplicate blocks at the pointer; from a wire: branch'],
@@ -42,6 +42,7 @@ export const KEYS: KeyGroup[] = [
       ['Alt while dragging', 'Do not align the block with others'],
       ['drag a corner', 'Resize the selected block'],
       ['drag from a port', 'Draw a wire; on the empty sheet add a block at its end'],
+      ['click on a dashed wire, Enter', 'Connect a block with the free port in front of it'],
       ['double click', 'Open a block, or edit its name; after a run show the chart of a scope'],
       ['double click on a wire', 'Name its signal'],
       ['double click on the empty sheet', 'Add a block'],

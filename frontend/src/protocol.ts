@@ -1133,6 +1133,9 @@ export interface SheetBlock {
 }
 /**
  * A port on the edge of its block: position from the block's corner in px, and direction of its wire.
+ *
+ * The direction points out of the block for an output and into the block for an input. A frame port has a
+ * direction in both lists, each with the sign of its list.
  */
 export interface SheetPort {
   name: string;

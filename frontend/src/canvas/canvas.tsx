@@ -7,6 +7,7 @@ import {
   Controls,
   ReactFlow,
   ReactFlowProvider,
+  ViewportPortal,
   useReactFlow,
   type EdgeChange,
   type NodeChange,
@@ -41,6 +42,7 @@ import { Welcome } from './welcome'
 import { WireEdge, type WireEdgeType } from './wire_edge'
 
 const ArrangeBar = deferred(async () => (await import('./arrange_bar')).ArrangeBar)
+const ProposedLine = deferred(async () => (await import('./proposed_line')).ProposedLine)
 const WireValues = deferred(async () => (await import('../run/wire_values')).WireValues)
 const LargeSheet = deferred(async () => (await import('./large_sheet')).LargeSheet)
 const nodeTypes = { block: BlockNode, note: NoteNode }
@@ -197,6 +199,7 @@ function Sheet({ sheetKey }: { sheetKey: string }) {
         <Background variant={BackgroundVariant.Dots} gap={20} size={1} />
         {!empty && <Controls showInteractive={false} fitViewOptions={FIT} />}
         <DragPreview />
+        <Proposal />
         <WireValues selectedEdge={selectedEdge} lines={lines} />
         <SignalNames lines={lines} />
         <MotionContext value={motion}>{motion.isLarge && <LargeSheet />}</MotionContext>
@@ -204,6 +207,15 @@ function Sheet({ sheetKey }: { sheetKey: string }) {
       {severalSelected && <ArrangeBar />}
       {empty && <EmptySheet />}
     </div>
+  )
+}
+
+/** The proposed wire, in the coordinates of the sheet. */
+function Proposal() {
+  return (
+    <ViewportPortal>
+      <ProposedLine />
+    </ViewportPortal>
   )
 }
 

@@ -2,6 +2,7 @@ import { freeBelow, freeInView, type Rectangle } from '../model/free_place'
 import type { BlockType, Place, Wire } from '../protocol'
 import { isFrame, newThroughPorts } from '../model/wires'
 import { change, freeName, namesInUse, selectIfUnchanged, useStudio } from '../store'
+import { usePlaced } from './placed_block'
 import { sheetView } from './sheet_actions'
 
 /** Drag data from the library: a block type. */
@@ -68,6 +69,7 @@ export async function insertBlock(
   }).finally(() => awaitedNames.delete(name))
   if (version === undefined) return undefined
   selectIfUnchanged(selection, [name])
+  if (!wire && !connectTo) usePlaced.setState({ name, at: undefined })
   if (reveal) sheetView.reveal?.({ ...place, width: blockType.width, height: blockType.height })
   return name
 }

@@ -18,6 +18,7 @@ import { clearCopies } from './drag_preview'
 import { alignment, useGuides } from './guides'
 import { BLOCK_TYPE, insertBlock } from './insert'
 import { onEscape } from './pointer_drag'
+import { forgetPlaced, usePlaced } from './placed_block'
 import { moveNodes } from './sheet_actions'
 import type { SheetNode } from './sheet_graph'
 import type { WireEdgeType } from './wire_edge'
@@ -57,6 +58,7 @@ export function useSheetDrag(blocks: Record<string, SheetBlock>, notes: Record<s
   return { drag, setDrag, disconnected, insertable, effect, escape, setEffect, targetWire, setTargetWire }
 }
 
+type PointerEvents = MouseEvent | TouchEvent | React.MouseEvent
 export type SheetDrag = ReturnType<typeof useSheetDrag>
 /** The state of a drag, and the selection when the pointer was pressed. */
 type PressedDrag = SheetDrag & { press: { readonly current: Press } }
@@ -64,7 +66,7 @@ type PressedDrag = SheetDrag & { press: { readonly current: Press } }
 /** The start of a drag: its effect on wires depends on the pressed keys; Escape cancels the drag. */
 function startDrag(
   { effect, escape, setEffect, setTargetWire, setDrag, press }: PressedDrag,
-  { ctrlKey, metaKey, shiftKey, altKey }: MouseEvent | TouchEvent | React.MouseEvent,
+  { ctrlKey, metaKey, shiftKey, altKey }: PointerEvents,
   pressed: SheetNode,
   nodes: SheetNode[],
   dragged: SheetBlock[],
@@ -78,6 +80,7 @@ function startDrag(
     setTargetWire(null)
     useGuides.setState({ guides: [] })
     clearCopies()
+    forgetPlaced()
   }, escape.current.signal)
   if (ctrlKey || metaKey) {
     // With Ctrl, React Flow has added the pressed block to the selection.
@@ -106,25 +109,19 @@ export function dragHandlers(
 ) {
   const { effect, escape, setEffect, setTargetWire, setDrag } = sheetDrag
   /** Align the dragged blocks, unless Alt is pressed or the drag duplicates them. */
-  const aligned = (event: MouseEvent | TouchEvent | React.MouseEvent, nodes: SheetNode[]) =>
+  const aligned = (event: PointerEvents, nodes: SheetNode[]) =>
     event.altKey || effect.current.duplicated ? NOT_ALIGNED : alignment(nodes, blocks, zoom())
-  const whileDragging = (
-    event: MouseEvent | TouchEvent | React.MouseEvent,
-    node: SheetNode,
-    nodes: SheetNode[],
-  ) => {
+  const whileDragging = (event: PointerEvents, node: SheetNode, nodes: SheetNode[]) => {
     if (effect.current.cancelled) return
     const { dx, dy, guides } = aligned(event, nodes)
     useGuides.setState({ guides })
     if (dx || dy) setDrag((now) => ({ ...now, ...shifted(nodes, dx, dy) }))
     const block = node.id === effect.current.insertable ? blocks[node.id] : undefined
-    if (block) setTargetWire(keyOrNull(segmentBelow(block, node.position, edges, wires)?.wire))
+    const segment = block && segmentBelow(block, node.position, edges, wires)
+    if (block) setTargetWire(keyOrNull(segment?.wire))
+    showPlaced(nodes, segment !== undefined, effect.current, [dx, dy])
   }
-  const endDrag = (
-    event: MouseEvent | TouchEvent | React.MouseEvent,
-    node: SheetNode,
-    moved: SheetNode[],
-  ) => {
+  const endDrag = (event: PointerEvents, node: SheetNode, moved: SheetNode[]) => {
     escape.current.abort()
     if (effect.current.cancelled) {
       setEffect((effect.current = NO_EFFECT))
@@ -132,6 +129,7 @@ export function dragHandlers(
     }
     const { dx, dy } = aligned(event, moved)
     useGuides.setState({ guides: [] })
+    usePlaced.setState({ at: undefined })
     const positions = shifted(moved, dx, dy)
     const { disconnected, insertable, duplicated } = effect.current
     effect.current = NO_EFFECT
@@ -160,11 +158,7 @@ export function dragHandlers(
     setTargetWire(null)
   }
   return {
-    onNodeDragStart: (
-      event: MouseEvent | TouchEvent | React.MouseEvent,
-      node: SheetNode,
-      nodes: SheetNode[],
-    ): void => {
+    onNodeDragStart: (event: PointerEvents, node: SheetNode, nodes: SheetNode[]): void => {
       const dragged = blocksByName(
         blocks,
         nodes.map(({ id }) => id),
@@ -177,6 +171,20 @@ export function dragHandlers(
 }
 
 const NOT_ALIGNED = { dx: 0, dy: 0, guides: [] }
+
+/** Propose a wire for a single dragged block, unless the drag has another effect on wires. */
+function showPlaced(
+  nodes: SheetNode[],
+  isInserted: boolean,
+  { duplicated, disconnected }: DragEffect,
+  [dx, dy]: [number, number],
+): void {
+  const [node] = nodes
+  const isPlaced = node && nodes.length === 1 && !isInserted && !duplicated && !disconnected.length
+  if (isPlaced)
+    usePlaced.setState({ name: node.id, at: { x: node.position.x + dx, y: node.position.y + dy } })
+  else forgetPlaced()
+}
 
 /** The positions of dragged blocks and notes after a displacement. */
 const shifted = (nodes: SheetNode[], dx: number, dy: number): Places =>

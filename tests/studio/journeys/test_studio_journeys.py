@@ -18,6 +18,7 @@ from building import (
     double_click,
     drag_from_library,
     expect_no_frames,
+    middle,
     new_diagram,
     play_slowly,
     run,
@@ -98,7 +99,18 @@ def test_a_diagram_is_built_with_the_mouse_run_and_saved(page: Page, folder: Pat
     assert sheet is not None and dropped is not None
     centre = (dropped["x"] + dropped["width"] / 2, dropped["y"] + dropped["height"] / 2)
     assert centre == pytest.approx((sheet["x"] + 150, sheet["y"] + 150), abs=3)  # the grid has 5 px
-    drag_from_library(page, "Gain", 300, 150)
+    drag_from_library(page, "Gain", 250, 150)
+    # In front of a free port a wire is proposed, which a click adds; the second click has no effect.
+    proposed = page.get_by_role("button", name="Connect Sine Wave/y with Gain/u")
+    page.mouse.dblclick(*middle(proposed.locator(".area")))
+    expect(page.locator(".react-flow__edge")).to_have_count(1)
+    expect(proposed).to_have_count(0)
+    page.keyboard.press("Control+z")
+    expect(page.locator(".react-flow__edge")).to_have_count(0)
+    expect(proposed).to_have_count(1)
+    page.keyboard.press("Escape")
+    expect(proposed).to_have_count(0)
+    expect(page.locator(".notices [role=alert]")).to_have_count(0)
     drag_from_library(page, "Scope", 450, 150)
     expect(page.locator(".react-flow__node")).to_have_count(3)
     expect(page.locator(".port.unconnected")).to_have_count(2)

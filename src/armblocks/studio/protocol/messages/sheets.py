@@ -20,7 +20,11 @@ from armblocks.studio.protocol.messages.sheet_edits import (
 
 
 class SheetPort(Message):
-    """A port on the edge of its block: position from the block's corner in px, and direction of its wire."""
+    """A port on the edge of its block: position from the block's corner in px, and direction of its wire.
+
+    The direction points out of the block for an output and into the block for an input. A frame port has a
+    direction in both lists, each with the sign of its list.
+    """
 
     name: str
     doc: str
