@@ -112,6 +112,13 @@ def test_a_constant_at_a_limit_or_at_a_jump_has_no_derivative(block: Block, valu
         assert np.isin(derivative(side), (-1.0, 0.0, 1.0)).all()
 
 
+def test_the_time_at_which_a_ramp_begins_may_be_the_start_of_the_run() -> None:
+    builder = ab.DiagramBuilder("ramp")
+    builder.add("y", Gain(gain=3.0), builder.add("ramp", Ramp(slope=2.0)))
+    result = ab.sensitivity(builder.build(), "ramp.start", "y", stop_time=1.0)
+    assert result["y", "ramp.start"][1:] == pytest.approx(-6.0, rel=1e-12)
+
+
 def test_a_body_at_rest_at_a_limit_has_no_derivative_by_its_speed() -> None:
     """It moves away with a positive speed, and stays with a negative speed."""
 

@@ -99,12 +99,14 @@ class _Equations:
         values = evaluate_with_reads(function, arguments) if reads else function.call(list(arguments))
         return [np.array(value, dtype=np.float64).ravel() for value in values]
 
-    def along(self, function: Function, point: _Point, p: Array, direction: Sequence[Array]) -> Array:
+    def along(
+        self, function: Function, point: _Point, p: Array, direction: Sequence[Array], t: float = 0.0
+    ) -> Array:
         """The derivative of a column along changes of ``t, x, z, p``; ``function`` is one of the derivatives
         of this class. The unknowns follow from the implicit equations."""
         moved_t, moved_x, moved_z, moved_p = direction
         moved_w: Array = np.zeros(point.w.size)
-        at = [np.zeros(1), *point, p]
+        at = [np.array([t]), *point, p]
         if point.w.size:
             moved = self.numbers(self.residual_along, *at, moved_t, moved_x, moved_z, moved_w, moved_p)[0]
             try:
@@ -119,9 +121,9 @@ class _Equations:
         (matrix,) = self.numbers(self._functions["residual_jacobian"], np.zeros(1), *point, p)
         return matrix.reshape(n, n)
 
-    def at(self, name: str, point: _Point, p: Array, *arguments: Array) -> list[Array]:
+    def at(self, name: str, point: _Point, p: Array, *arguments: Array, t: float = 0.0) -> list[Array]:
         """The values of a function of the system."""
-        return self.numbers(self._functions[name], np.zeros(1), *point, p, *arguments)
+        return self.numbers(self._functions[name], np.array([t]), *point, p, *arguments)
 
     def solved(self, x: Array, z: Array, guess: Array, p: Array) -> _Point:
         """The point with the solution of the implicit equations. Raises ``_UnsolvedError``."""
@@ -297,12 +299,26 @@ class _Start:
                     far, near = self._changed(index, step), self._changed(index, step * CLOSER)
                 except _UnsolvedError:
                     continue
-                error, limit = self._error(index, step, far)
-                remaining, _ = self._error(index, step * CLOSER, near)
-                kinks = np.flatnonzero((error > limit) & (remaining > error / 2.0))
-                if kinks.size and self._lasts(far, near):
-                    found[elements[int(kinks[0])].rpartition("/")[0]] = None
+                kinks = self._has_kinks(index, step, far, near)
+                if kinks.any() and self._lasts(far, near):
+                    # A time at which a source begins, for example, does not last either.
+                    kinks &= self._modes_change(far) | self._has_kinks(index, step, far, near, SHORT)
+                    for k in map(int, np.flatnonzero(kinks)[:1]):
+                        found[elements[k].rpartition("/")[0]] = None
         return list(found)
+
+    def _has_kinks(
+        self, index: int, step: float, far: _Start, near: _Start, t: float = 0.0
+    ) -> NDArray[np.bool_]:
+        """Which values at a time have a kink or a jump between the unchanged parameter and its changes to
+        ``far`` and ``near``."""
+        error, limit = self._error(index, step, far, t)
+        remaining, _ = self._error(index, step * CLOSER, near, t)
+        return (error > limit) & (remaining > error / 2.0)
+
+    def _modes_change(self, side: _Start) -> bool:
+        modes = list(self.system.modes)
+        return not np.array_equal(self.after.z[modes], side.after.z[modes])
 
     def _changed(self, index: int, step: float) -> _Start:
         """The start with one parameter changed by a step."""
@@ -317,8 +333,7 @@ class _Start:
         one of these guards does not move. ``far`` and ``near`` are starts with two changes of the parameter
         in the ratio 1 to ``CLOSER``.
         """
-        modes = list(self.system.modes)
-        if np.array_equal(self.after.z[modes], far.after.z[modes]):
+        if not self._modes_change(far):
             return True
         g, rates = (
             self.equations.numbers(self.equations.guard_rates, np.zeros(1), *side.after, side.p)
@@ -331,33 +346,33 @@ class _Start:
         moving = through_zero & moves.any(axis=0)
         return bool((through_zero & ~moving).any() or not moving.any())
 
-    @cached_property
-    def _values(self) -> Array:
-        """The initial states and discrete variables, the signals and the flow at the start."""
-        return np.concatenate([self.initial, self._present(self.after)])
+    def _values(self, t: float) -> Array:
+        """The initial states and discrete variables, and the signals and the flow at a time."""
+        return np.concatenate([self.initial, self._present(self.after, t)])
 
-    def _present(self, point: _Point) -> Array:
+    def _present(self, point: _Point, t: float = 0.0) -> Array:
         """The signals and the flow."""
         names = ("signals", "derivative")
-        return np.concatenate([column for name in names for column in self.equations.at(name, point, self.p)])
+        columns = (column for name in names for column in self.equations.at(name, point, self.p, t=t))
+        return np.concatenate([*columns])
 
-    def _error(self, index: int, step: float, side: _Start) -> tuple[Array, Array]:
+    def _error(self, index: int, step: float, side: _Start, t: float) -> tuple[Array, Array]:
         """The difference between the derivatives of all values by a step of one parameter and by the
         equations, and the smallest difference that counts. ``side`` is the start after the step."""
-        values = self._values
+        values = self._values(t)
         with np.errstate(invalid="ignore", over="ignore"):  # infinite values have no difference
-            rate = self._rate(index, side, step)
-            error = np.abs((side._values - values) / step - rate)
+            rate = self._rate(index, side, step, t)
+            error = np.abs((side._values(t) - values) / step - rate)
             return error, KINK * (1.0 + np.abs(rate)) + ROUNDING * np.abs(values / step)
 
-    def _rate(self, index: int, side: _Start, step: float) -> Array:
+    def _rate(self, index: int, side: _Start, step: float, t: float) -> Array:
         """The derivatives of all values with respect to one parameter, with constant modes. ``side`` is the
         start with this parameter changed by ``step``."""
         ((zero, of_states, of_discrete, seed),) = self._initial_directions(slice(index, index + 1))
         of_z = (side.after.z - self.after.z) / step
         of_z[list(self.system.modes)] = 0.0
         direction = (zero, of_states, of_z, seed)
-        rate = self.equations.along(self.equations.values_along, self.after, self.p, direction)
+        rate = self.equations.along(self.equations.values_along, self.after, self.p, direction, t)
         return np.concatenate([of_states, of_discrete, rate])
 
     def _initial_directions(self, entries: slice) -> list[tuple[Array, Array, Array, Array]]:
