@@ -54,7 +54,8 @@ SAME_INSTANT = 2.0**-48
 SAME_DERIVATIVE = 1e-6
 """Relative tolerance of equal time derivatives of events."""
 STANDING = 1e-12
-"""Relative time: a guard with a zero within this time after an instant was 0 before the instant as well."""
+"""Relative time after an instant within which a guard that stood at 0 leaves it, and the largest value of a
+guard that stands at 0."""
 JUST_BEFORE = 1.0 - 2.0**-49
 """Factor from a time to a time just before it, and before all breakpoints of the same instant."""
 NEVER = -1.0
@@ -78,6 +79,8 @@ class Instants:
         """The values of the two added guards that end an instant; a change of sign makes a guard fire."""
         self.mixed, self.ticked = c.add("mixed", 2, [NEVER, 0.0]), c.add("ticked", 1)
         self.located = c.add("located", self.guards)
+        self.stands, self.stood = c.add("stands", self.guards), c.add("stood", self.guards)
+        """Whether each guard was 0 and did not move just before the present instant, and the one before."""
         self.instant_p = [c.add(f"instant by {name}", 1) for name in c.names]
         self.before_p = [c.add(f"instant before by {name}", 1) for name in c.names]
         """The derivatives of the time of the instant before the present one."""
@@ -169,6 +172,8 @@ class Instants:
             "open": SX(0.0),
             "ticked": SX(0.0),
             "located": located,
+            "stands": logic_and(fabs(self.g) <= STANDING, self.g_rate == 0.0),
+            "stood": self.stands,
             "rate of left limits": vertcat(
                 *(self.over_time(self.captured)[k] for k in self.left_limits), SX(0, 1)
             ),
@@ -304,7 +309,7 @@ class Instants:
         """Whether each guard was 0 before it began to move at the latest instant, and depends on parameter
         ``k`` there: with any other value of the parameter it is not 0."""
         c = self.columns
-        just_now = logic_and(self.time_before > 0.0, c.t - self.time_before <= STANDING * c.t)
+        just_now = logic_and(self.stood, c.t - self.time_before <= STANDING * c.t)
         by_guards = self.by_parameter(self.g, k)
         moved = fabs(by_guards + self.g_rate * self.before_p[k])
         return logic_and(just_now, moved > SAME_DERIVATIVE * (1.0 + fabs(by_guards)))
