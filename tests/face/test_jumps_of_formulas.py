@@ -13,16 +13,20 @@ from casadi import SX, Function
 import armblocks as ab
 from armblocks.blocks import (
     Constant,
+    DeadZoneDynamic,
     EnabledSubsystem,
     Expression,
     FirstOrderLag,
     Gain,
     Inport,
     Integrator,
+    Memory,
     Modulo,
     Outport,
+    Quantizer,
     Ramp,
     Rounding,
+    Sign,
     SineWave,
     Step,
     Sum,
@@ -190,6 +194,29 @@ def test_a_remainder_of_zero_by_zero_at_the_start_has_a_derivative() -> None:
     builder.connect(rest, lag["u"])
     result = ab.sensitivity(builder.build(), "x.gain", "x", stop_time=1.0)
     assert not result["x", "x.gain"].any()
+
+
+def test_signals_have_the_same_bits_in_a_run_with_derivatives() -> None:
+    """The stored multiple of the interval equals the present one only if both products are rounded."""
+    builder = ab.DiagramBuilder("tie")
+    wave = builder.add("wave", SineWave(amplitude=1.0, frequency=0.5, bias=-0.5))
+    steps = builder.add("steps", Quantizer(interval=0.1), wave)
+    stored = builder.add("stored", Memory(sample_time=0.1), steps)
+    zone = builder.add("zone", DeadZoneDynamic(), upper=steps, u=stored, lower=wave)
+    builder.add("sign", Sign(), builder.add("difference", Sum(signs="+-"), stored, steps))
+    builder.add(
+        "sum", Sum(signs="++"), zone, builder.add("formula", Expression(formula="floor(u * 3)"), steps)
+    )
+    diagram = builder.build()
+    settings = {"stop_time": 3.0, "sample_time": 0.05}
+    result = ab.sensitivity(diagram, "steps.interval", ["zone", "steps", "stored"], **settings)
+    plain = ab.simulate(diagram, **settings)
+    for name in plain.names:
+        assert np.array_equal(result.run[name], plain[name]), name
+    of_steps, of_stored = (result[name, "steps.interval"] for name in ("steps", "stored"))
+    above, below = plain["stored"] > plain["steps"], plain["stored"] < plain["wave"]
+    expected = np.where(above, of_stored - of_steps, np.where(below, of_stored, 0.0))
+    assert np.array_equal(result["zone", "steps.interval"], expected)
 
 
 def test_a_formula_that_is_not_a_number_ends_a_run_with_derivatives_by_this_reason() -> None:

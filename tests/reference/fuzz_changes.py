@@ -195,7 +195,8 @@ CHANGE = 1e-6
 
 
 def sensitivities_agree_with_differences(case: Case) -> Iterator[str]:
-    """The exact derivatives with respect to one parameter agree with differences of runs."""
+    """The exact derivatives with respect to two parameters agree with differences of runs, and the signals
+    with those of the run without derivatives."""
     system = compile_diagram(case.diagram).system
     numbers = [
         slot.name
@@ -229,6 +230,11 @@ def sensitivities_agree_with_differences(case: Case) -> Iterator[str]:
         except ArmblocksError as error:
             raise InconclusiveError(f"refused: {error}") from None
         step = CHANGE * (1.0 + abs(value))
+        beside = {signal: found.run[signal] for signal in names}
+        texts = list(different(beside, {signal: case.run[signal] for signal in names}, 1e-6))
+        if texts:
+            expect_well_posed(case, {**case.run, **beside})
+        yield from (f"the run with derivatives by '{name}': {text}" for text in texts)
         for signal in names:
             rows = [run[signal] for run in runs]
             if any(len(values) != len(case.times) for values in rows):

@@ -83,17 +83,19 @@ class _Located:
         self.old, self.chosen = system, chosen
         self.symbols = [*system.reset.arguments[:5], system.update.arguments[5], system.reset.arguments[5]]
         self.functions, self.searched = _functions(system)
-        results = [self._in_symbols(traced) for traced in self.functions]
-        self.function = Function("f", self.symbols, results, {"cse": True})
+        results = [self._in_symbols(traced, vertcat(*traced.results, SX(0, 1))) for traced in self.functions]
+        # The products that are separate values contain the same jumps.
+        products = [self._in_symbols(traced, traced.rounded) for traced in self.functions]
+        self.function = Function("f", self.symbols, [*results, *products], {"cse": True})
         self.jumps = JumpModes()
         (p,) = system.breakpoints.arguments
         breakpoints = Function("f", [p], [vertcat(*system.breakpoints.results, SX(0, 1))])
         (times,) = breakpoints.call([self.symbols[_PARAMETERS]], True, False)
         self.breakpoints = [times[k] for k in range(times.numel())]
 
-    def _in_symbols(self, traced: TracedFunction) -> SX:
+    def _in_symbols(self, traced: TracedFunction, column: SX) -> SX:
         letters = dict(zip("txzwpme", self.symbols))
-        function = Function("f", list(traced.arguments), [vertcat(*traced.results, SX(0, 1))])
+        function = Function("f", list(traced.arguments), [column])
         (column,) = function.call([letters[name] for name in traced.inputs.names], True, False)
         return densify(column)
 
@@ -204,7 +206,8 @@ class _Located:
         for number, (mode, (up, down)) in enumerate(zip(self.jumps.mode_of_guard, self.jumps.after)):
             fired = new_e[e.numel() + number]
             changed[mode] = if_else(fired == 0.0, changed[mode], if_else(fired > 0.0, up, down))
-        by_name = dict(zip((traced.name for traced in self.functions), columns))
+        names = [traced.name for traced in self.functions]
+        by_name = dict(zip(names, columns))
         reset = by_name["reset"]
         by_name |= {
             "update": vertcat(by_name["update"], modes),
@@ -212,13 +215,21 @@ class _Located:
             "contradictions": vertcat(by_name.get("contradictions", SX(0, 1)), wrong),
             "reset": vertcat(reset, changed),
         }
-        inside = Function("f", [t, x, z, modes, w, p, m, e, new_e], list(by_name.values()))
+        products = dict(zip(names, columns[len(names) :]))
+        inside = Function("f", [t, x, z, modes, w, p, m, e, new_e], [*by_name.values(), *products.values()])
         given = [t, x, new_z[: z.numel()], new_z[z.numel() :], w, p, m, new_e[: e.numel()], new_e]
-        values = dict(zip(by_name, inside.call(given, True, False)))
+        all_values = inside.call(given, True, False)
+        values, products = (
+            dict(zip(keys, part))
+            for keys, part in ((by_name, all_values), (products, all_values[len(by_name) :]))
+        )
         arguments = {"t": t, "x": x, "z": new_z, "w": w, "p": p, "m": m, "e": new_e}
         known = {traced.name: traced for traced in (old.guards, *self.functions)}
         known.setdefault("contradictions", dataclasses.replace(old.guards, name="contradictions"))
-        new = {name: _rebuilt(known[name], arguments, value) for name, value in values.items()}
+        new = {
+            name: _rebuilt(known[name], arguments, value, products.get(name, products["guards"]))
+            for name, value in values.items()
+        }
         return self._replaced(new, self._blocks(values, new_z[z.numel() :]))
 
     def _blocks(self, values: Mapping[str, SX], modes: SX) -> list[str]:
@@ -322,8 +333,8 @@ def _plain(node: _Node, operands: Sequence[SX]) -> SX:
     return operation_value(node.operation, operands)
 
 
-def _rebuilt(traced: TracedFunction, arguments: Mapping[str, SX], column: SX) -> TracedFunction:
-    """A function of a system with other arguments and results."""
+def _rebuilt(traced: TracedFunction, arguments: Mapping[str, SX], column: SX, rounded: SX) -> TracedFunction:
+    """A function of a system with other arguments, results and products that are separate values."""
     symbols = tuple(arguments[name] for name in traced.inputs.names)
     inputs = [Slot(name, () if name == "t" else (arguments[name].numel(),)) for name in traced.inputs.names]
     sizes = [slot.size for slot in traced.outputs]
@@ -339,4 +350,5 @@ def _rebuilt(traced: TracedFunction, arguments: Mapping[str, SX], column: SX) ->
         Signature(tuple(outputs)),
         symbols,
         tuple(map(densify, results)),
+        rounded,
     )

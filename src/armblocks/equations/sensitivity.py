@@ -238,7 +238,7 @@ class _AugmentedSystem:
                 outputs=signature(("J", derivatives.shape)),
                 results=(flatten(derivatives, derivatives.shape),),
             ),
-            update=c.function("update", {"m": m}, z=update),
+            update=c.function("update", {"m": m}, c.products(old.update, m), z=update),
             guards=c.function("guards", {}, g=guards),
             ranks=None if old.ranks is None or instants is None else instants.ranks(old.ranks),
             tangents=(old.states.size, old.discrete.size, len(old.guard_directions)),

@@ -89,6 +89,12 @@ class Columns:
         (result,) = function.call([t, x, z, w, self.p, *arguments], True, False)
         return densify(result)
 
+    def products(self, traced: TracedFunction, *arguments: SX) -> SX:
+        """The products of a system function that are separate values, as expressions in these symbols."""
+        function = Function("f", list(traced.arguments), [traced.rounded])
+        (result,) = function.call([self.t, self.x, self.z, self.w, self.p, *arguments], True, False)
+        return result
+
     def derivative_along(self, expression: SX, *, t: SX | float, x: SX, z: SX, w: SX, p: SX) -> SX:
         """The directional derivative of an expression in these symbols."""
         if not expression.numel():
@@ -115,8 +121,14 @@ class Columns:
         }
         return parts[letter]
 
-    def function(self, name: str, inputs: Mapping[str, SX], **results: SX) -> TracedFunction:
-        """A function of the augmented system, with flat symbols for all inputs."""
+    def function(
+        self, name: str, inputs: Mapping[str, SX], rounded: SX | None = None, **results: SX
+    ) -> TracedFunction:
+        """A function of the augmented system, with flat symbols for all inputs.
+
+        ``rounded``: the products that are separate values; by default those of the signals. With them the
+        signals have the same bits as in a run without derivatives.
+        """
         inside: dict[str, list[SX]] = {"t": [self.t]}
         inside |= {letter: self._parts(letter) for letter in "xzw"}
         inside |= {"p": [self.p]} | {letter: [column] for letter, column in inputs.items()}
@@ -130,12 +142,12 @@ class Columns:
                 plain.append(part)
                 parts_given.append(symbols[letter][start : start + part.numel()])
                 start += part.numel()
-        values = Function("f", plain, list(results.values())).call(parts_given, True, False)
+        separate = self.products(self.system.signals) if rounded is None else rounded
+        *values, separate = Function("f", plain, [*results.values(), separate]).call(parts_given, True, False)
 
         def ends(columns: Mapping[str, SX]) -> Signature:
             shapes = {key: () if key == "t" else (column.numel(),) for key, column in columns.items()}
             return Signature(tuple(Slot(key, shape) for key, shape in shapes.items()))
 
-        return TracedFunction(
-            name, ends(symbols), ends(results), tuple(symbols.values()), tuple(densify(v) for v in values)
-        )
+        columns = tuple(densify(value) for value in values)
+        return TracedFunction(name, ends(symbols), ends(results), tuple(symbols.values()), columns, separate)
