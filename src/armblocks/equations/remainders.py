@@ -3,8 +3,8 @@
 ``mod`` has the sign of v, and mod(u, 0) = u; ``rem`` has the sign of u, and rem(u, 0) is NaN. The integer n
 is used as a mode, so that the remainder is smooth between two events.
 
-If |n| is greater than 2**44, the rounding error of u is not small compared with v, and the remainder is
-arbitrary. There, and for a zero or huge divisor, n counts as 0, no event occurs, and the remainder is
+If |n| is greater than 2**44, rounding errors of u are not small compared with v, and events would follow
+these errors. There, and for a zero or huge divisor, n counts as 0, no event occurs, and the remainder is
 computed directly.
 """
 

@@ -8,6 +8,7 @@ run.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from functools import cached_property
 from typing import NamedTuple
@@ -45,27 +46,30 @@ def refuse_moving_start(system: HybridSystem, parameters: Sequence[str]) -> None
     An event is at the start, depends on the parameter, and its two sides differ; or a block starts exactly at
     a limit or at a jump. If implicit equations have no solution here, nothing is checked: the run reports it.
     """
-    try:
+    with contextlib.suppress(_UnsolvedError):
         start = _Start(_Equations(system))
-    except _UnsolvedError:
-        return
-    for name in parameters:
-        entries = system.parameters.range_of(name)
-        guards = [system.guard_names[guard] for guard in start.moving_guards(entries)]
-        for block in [*guards, *start.held_states(entries)]:
-            raise InputError(
-                f"an event of '{block}' at the start moves with the parameter '{name}'",
-                where=system.name,
-                allowed="events at the start that no parameter moves, or that change nothing",
-                fix=f"choose '{name}' so that the event is a little later",
-            )
-        for block in start.kinks(entries):
-            raise InputError(
-                f"block '{block}' starts exactly at a limit or at a jump, which '{name}' moves",
-                where=system.name,
-                allowed="parameters with one derivative at the start of the run",
-                fix=f"change '{name}' a little, or use the difference of two runs",
-            )
+        for name in parameters:
+            _refuse(start, system, name)
+
+
+def _refuse(start: _Start, system: HybridSystem, name: str) -> None:
+    """Raise ``InputError`` if the parameter with this name has no derivative at the start."""
+    entries = system.parameters.range_of(name)
+    guards = [system.guard_names[guard] for guard in start.moving_guards(entries)]
+    for block in [*guards, *start.held_states(entries)]:
+        raise InputError(
+            f"an event of '{block}' at the start moves with the parameter '{name}'",
+            where=system.name,
+            allowed="events at the start that no parameter moves, or that change nothing",
+            fix=f"choose '{name}' so that the event is a little later",
+        )
+    for block in start.kinks(entries):
+        raise InputError(
+            f"block '{block}' starts exactly at a limit or at a jump, which '{name}' moves",
+            where=system.name,
+            allowed="parameters with one derivative at the start of the run",
+            fix=f"change '{name}' a little, or use the difference of two runs",
+        )
 
 
 class _UnsolvedError(ArithmeticError):

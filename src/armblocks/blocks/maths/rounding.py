@@ -64,8 +64,8 @@ class Rounding(BlockWithSteps):
 class Modulo(Block):
     """The remainder: mod(u, v) has the sign of v, and mod(u, 0) = u; rem(u, v) has the sign of u.
 
-    Both are computed by ``fmod``, without rounding u / v. ``rem(u, 0)`` is NaN. In Simulink, mod and rem are
-    options of the Math Function block.
+    Both are computed without rounding u / v. ``rem(u, 0)`` is NaN. Where u / v exceeds 2^44, jumps of the
+    remainder are not events. In Simulink, mod and rem are options of the Math Function block.
     """
 
     following_modes: ClassVar[bool] = True
