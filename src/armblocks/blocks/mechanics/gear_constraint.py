@@ -24,9 +24,9 @@ class GearConstraint(MechanicsBlock):
 
     Revolute joints connect both gears with one body, such as a housing, a planet carrier or the world. The
     z axes of B and F are the axes of these joints. With the angles of the gears relative to that body,
-    external gears have ``ratio angle_F = -angle_B``, internal gears ``ratio angle_F = angle_B``, both plus
-    ``ratio offset``. The distance of the axes is not checked: the gears may be a belt or a train of gears.
-    Masses and inertias of the gears are solids.
+    external gears have ``ratio (angle_F - offset) = -angle_B``, and internal gears ``ratio (angle_F - offset)
+    = angle_B``. The distance of the axes is not checked: the block also describes a belt or a train of gears.
+    Solids give the masses and inertias of the gears.
     """
 
     title: ClassVar[str] = "Gear Constraint"
