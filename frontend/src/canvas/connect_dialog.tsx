@@ -1,9 +1,9 @@
 import { Button, Group, Modal, Select, Stack } from '@mantine/core'
 import { useEffect, useMemo, useState } from 'react'
 import { showDialog, useDialogs } from '../dialogs'
-import { SCROLLED } from '../dropdown_scrolling'
 import { isFrame, mixedKinds, sameKind } from '../model/wires'
 import type { SheetBlock, Wire } from '../protocol'
+import { SEARCHED } from '../searchable_lists'
 import { change, refuse, useStudio } from '../store'
 
 /**
@@ -11,12 +11,7 @@ import { change, refuse, useStudio } from '../store'
  * option in a timer after the list opens; on a busy machine this happens after the first keys, and Enter
  * selects nothing.
  */
-const PORT_SELECT = {
-  ...SCROLLED,
-  searchable: true,
-  selectFirstOptionOnChange: true,
-  selectFirstOptionOnDropdownOpen: true,
-} as const
+const PORT_SELECT = { ...SEARCHED, selectFirstOptionOnDropdownOpen: true } as const
 
 /** The ports at which a wire from a source may end: unconnected inputs, or frame ports. */
 function freeTargets(blocks: Record<string, SheetBlock>, wires: Wire[], source: string | null): string[] {

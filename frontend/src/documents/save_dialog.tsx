@@ -1,7 +1,7 @@
 import { Alert, Autocomplete, Button, Group, Modal, Stack, Text } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { Refusal } from '../connection'
-import { SCROLLED } from '../dropdown_scrolling'
+import { SCROLLED } from '../searchable_lists'
 import { connection, useStudio } from '../store'
 import { projectFiles, showDialog, useDialogs } from '../dialogs'
 

@@ -1,7 +1,7 @@
 import { Select } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import type { DataFile } from '../protocol'
-import { SCROLLED } from '../dropdown_scrolling'
+import { SEARCHED } from '../searchable_lists'
 import { ask } from '../store'
 
 interface Props {
@@ -26,10 +26,8 @@ export function DataFileSelect({ holds, label, description, file, focus, onFile 
   const paths = files?.map(({ path }) => path) ?? []
   return (
     <Select
-      {...SCROLLED}
-      searchable
+      {...SEARCHED}
       openOnFocus={false}
-      selectFirstOptionOnChange
       label={label}
       description={description}
       data={file && !paths.includes(file) ? [file, ...paths] : paths}
