@@ -189,3 +189,43 @@ def test_a_condition_that_stands_at_its_limit_until_an_event() -> None:
     assert result["x", "u.time"][-1] == pytest.approx(-1.0, abs=1e-9)
     assert result["x", "u.final"][-1] == pytest.approx(0.0, abs=1e-9)
     assert not ab.sensitivity(diagram(0.1), "v.initial", "x", stop_time=1.0)["x", "v.initial"].any()
+
+
+@pytest.mark.parametrize("order", [2, 3])
+@pytest.mark.parametrize(
+    "block", [Sign(), CompareToZero(relation=">="), LogicalOperator(operator="NOT"), Abs()]
+)
+def test_a_body_that_starts_from_rest_at_a_limit(block: Block, order: int) -> None:
+    """Its position x(0) = 0 has a multiple zero, which any change of position or speed splits."""
+    builder = ab.DiagramBuilder("rest")
+    signal = builder.add("force", Constant(value=1.0))
+    for k in range(order):
+        signal = builder.add(f"x{k}", Integrator(), signal)
+    builder.add("integral", Integrator(), builder.add("y", block, signal))
+    diagram = builder.build()
+    for k in range(1, order):
+        name = f"x{k}.initial"
+        if isinstance(block, Abs):
+            # The signal does not jump, and the derivatives by position and speed are 1 and t.
+            slope = ab.sensitivity(diagram, name, "y", stop_time=1.0)["y", name]
+            assert slope[-1] == pytest.approx(1.0, rel=1e-9)
+        else:
+            with pytest.raises(InputError, match=f"'y' at the start moves with the parameter '{name}'"):
+                ab.sensitivity(diagram, name, "integral", stop_time=1.0)
+
+
+def test_a_jump_that_the_run_leaves_at_once_has_no_derivative() -> None:
+    """The time in which the signal has its other value depends on the parameter."""
+
+    def diagram(source: Block, block: Block) -> ab.Diagram:
+        builder = ab.DiagramBuilder("leaves")
+        builder.add("x", Integrator(), builder.add("y", block, builder.add("source", source)))
+        return builder.build()
+
+    for name, case in (
+        ("source.time", diagram(Step(time=0.0), Gain())),
+        ("source.bias", diagram(SineWave(), Rounding(function="floor"))),
+        ("y.on_point", diagram(SineWave(), Relay(on_point=0.0, off_point=-2.0))),
+    ):
+        with pytest.raises(InputError, match=r"starts exactly at a limit or at a jump|an event of 'y'"):
+            ab.sensitivity(case, name, "x", stop_time=1.0)

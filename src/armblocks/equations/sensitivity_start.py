@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 
 ZERO_TOLERANCE = 1e-8
 """A guard whose zero is within this time (s) counts as 0."""
+RESTING = 1e-12
+"""The largest value, and the largest time derivative, of a guard that is 0 and does not move at first."""
 DERIVATIVE_TOLERANCE = 1e-9
 """Relative tolerance of equal derivatives of states and signals."""
 
@@ -192,12 +194,21 @@ class _Equations:
     @cached_property
     def guard_rates(self) -> Function:
         """The guards and their time derivatives up to the third order, with constant unknowns."""
+        return Function("rates", self.symbols, [densify(rate) for rate in self._guard_rates])
+
+    @cached_property
+    def guard_rates_along(self) -> Function:
+        """The derivatives of ``guard_rates``, in one column."""
+        return self._derivative(vertcat(*self._guard_rates))
+
+    @cached_property
+    def _guard_rates(self) -> list[SX]:
         t, x = self.symbols[:2]
         rates = [self._column("guards")]
         direction = vertcat(SX(1.0), self._column("derivative"))
         for _ in range(3):
             rates.append(_along(rates[-1], vertcat(t, x), direction))
-        return Function("rates", self.symbols, [densify(rate) for rate in rates])
+        return rates
 
     def _column(self, name: str) -> SX:
         return _in_symbols(getattr(self.system, name), self.symbols)
@@ -258,7 +269,7 @@ class _Start:
         """The guards that are zero, depend on one of these parameters, and whose two sides differ."""
         if not self.system.guard_directions:
             return []
-        guards: set[int] = set()
+        guards = self._resting_guards(entries)
         for point in (self.before, self.after):
             g, rate, moves = self._guards(point, entries)
             zero = np.isfinite(rate) & (np.abs(g) <= ZERO_TOLERANCE * np.abs(rate)) & (rate != 0.0)
@@ -269,6 +280,33 @@ class _Start:
                 if fires or (direction == 0 and self._sides_differ(guard)):
                     guards.add(guard)
         return sorted(guards)
+
+    def _resting_guards(self, entries: slice) -> set[int]:
+        """The guards that leave zero with a time derivative of zero, although one of these parameters moves
+        this zero: a comparison with the position of a body that starts from rest, for example.
+
+        The multiple zero splits, so that there are events for one sign of the change only.
+        """
+        g, rate, _ = self._guards(self.after, entries)
+        resting = (np.abs(g) <= RESTING) & (np.abs(rate) <= RESTING)
+        if not resting.any():
+            return set()
+        point, p, equations = self.after, self.p, self.equations
+        rates = np.array(equations.numbers(equations.guard_rates, np.zeros(1), *point, p))
+        directions = np.array(self.system.guard_directions)
+        movements = [
+            equations.along(equations.guard_rates_along, point, p, direction).reshape(rates.shape)
+            for direction in self._initial_directions(entries)
+        ]
+        lower = np.zeros(g.size, dtype=bool)
+        guards: set[int] = set()
+        for order, leading in enumerate(rates):
+            leaves = resting & lower & (np.abs(leading) > RESTING) & (directions * leading >= 0.0)
+            guards.update(k for k in map(int, np.flatnonzero(leaves)) if self._sides_differ(k))
+            resting &= np.abs(leading) <= RESTING
+            for movement in movements:
+                lower |= np.abs(movement[order]) > ZERO_TOLERANCE * (1.0 + np.abs(leading))
+        return guards
 
     def held_states(self, entries: slice) -> list[str]:
         """The blocks with states whose derivative with respect to these parameters is changed by the reset at
@@ -286,7 +324,9 @@ class _Start:
 
         The derivative by the traced equations is compared with the differences to both sides. The error of a
         difference decreases with the change of the parameter, except at a kink or a jump. A kink that the
-        run leaves at once does not count.
+        run leaves at once does not count. A jump of a signal counts also then, because the time until the run
+        leaves it depends on the change. A jump of the flow alone does not: a rate limiter that starts beside
+        its input reaches it at once.
         """
         system = self.system
         layouts = (system.states, system.discrete, system.signals_layout, system.states)
@@ -303,22 +343,29 @@ class _Start:
                     far, near = self._changed(index, step), self._changed(index, step * CLOSER)
                 except _UnsolvedError:
                     continue
-                kinks = self._has_kinks(index, step, far, near)
-                if kinks.any() and self._lasts(far, near):
-                    # A time at which a source begins, for example, does not last either.
-                    kinks &= self._modes_change(far) | self._has_kinks(index, step, far, near, SHORT)
-                    for k in map(int, np.flatnonzero(kinks)[:1]):
+                kinks, jumps = self._kinks_and_jumps(index, step, far, near)
+                if kinks.any():
+                    lasting = kinks & self._lasts(far, near)
+                    if not self._modes_change(far):
+                        # The time at which a ramp begins, for example, does not last either.
+                        lasting &= self._kinks_and_jumps(index, step, far, near, SHORT)[0]
+                    counted = lasting | jumps
+                    for k in map(int, np.flatnonzero(counted)[:1]):
                         found[elements[k].rpartition("/")[0]] = None
         return list(found)
 
-    def _has_kinks(
+    def _kinks_and_jumps(
         self, index: int, step: float, far: _Start, near: _Start, t: float = 0.0
-    ) -> NDArray[np.bool_]:
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Which values at a time have a kink or a jump between the unchanged parameter and its changes to
-        ``far`` and ``near``."""
+        ``far`` and ``near``, and which signals and variables have a jump."""
         error, limit = self._error(index, step, far, t)
         remaining, _ = self._error(index, step * CLOSER, near, t)
-        return (error > limit) & (remaining > error / 2.0)
+        kinks = (error > limit) & (remaining > error / 2.0)
+        with np.errstate(invalid="ignore"):
+            jumps = kinks & (remaining > error / (2.0 * CLOSER))
+        jumps[jumps.size - self.system.states.size :] = False
+        return kinks, jumps
 
     def _modes_change(self, side: _Start) -> bool:
         modes = list(self.system.modes)
