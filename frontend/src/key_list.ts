@@ -10,15 +10,16 @@ interface KeyGroup {
 export const KEYS: KeyGroup[] = [
   {
     title: 'On the sheet',
-    sources: ['canvas/sheet_keys.ts', 'held_keys.ts'],
+    sources: ['canvas/sheet_keys.ts', 'held_keys.ts', 'canvas/proposed_line.tsx'],
     keys: [
       ['letters', 'Add a block: type its name'],
-      ['Tab', 'Select the next block'],
+      ['Tab', 'Select the next block, or the dashed wire at the block that was just placed'],
+      ['Enter, Space on a dashed wire', 'Connect the block with the free port in front of it'],
       ['F2', 'Rename the block; edit the note'],
       ['Enter', 'Open the block: its parameters, or the sheet inside; edit the note'],
       ['arrows', 'Move the selection; with Shift by one pixel'],
       ['Del, Backspace', 'Delete blocks, wires and notes'],
-      ['Esc', 'Clear the selection; again: leave the subsystem'],
+      ['Esc', 'Remove the dashed wire, clear the selection, leave the subsystem'],
       ['>', 'Draw a wire by the names of its ports'],
       ['"', 'Write a note'],
       ['Space', 'Fit the sheet into the window'],
@@ -31,7 +32,7 @@ export const KEYS: KeyGroup[] = [
   },
   {
     title: 'With the mouse on the sheet',
-    sources: ['canvas/pointer_drag.ts', 'canvas/proposed_line.tsx', 'canvas/subsystem_preview.tsx'],
+    sources: ['canvas/pointer_drag.ts', 'canvas/subsystem_preview.tsx'],
     keys: [
       ['Shift+drag', 'Disconnect a block and connect its neighbours'],
       ['Ctrl+drag, right drag', 'Duplicate blocks at the pointer; from a wire: branch'],
@@ -42,7 +43,7 @@ export const KEYS: KeyGroup[] = [
       ['Alt while dragging', 'Do not align the block with others'],
       ['drag a corner', 'Resize the selected block'],
       ['drag from a port', 'Draw a wire; on the empty sheet add a block at its end'],
-      ['click on a dashed wire, Enter', 'Connect a block with the free port in front of it'],
+      ['click on a dashed wire', 'Connect a block with the free port in front of it'],
       ['double click', 'Open a block, or edit its name; after a run show the chart of a scope'],
       ['double click on a wire', 'Name its signal'],
       ['double click on the empty sheet', 'Add a block'],

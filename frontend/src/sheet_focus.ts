@@ -10,7 +10,7 @@ const isButton = (element: Element | null): boolean =>
  * Whether a key acts on the sheet: the sheet, an element around the sheet or a button has the focus. A button
  * outside the sheet handles only the keys that press it.
  */
-export function isForSheet({ target, key }: KeyboardEvent): boolean {
+export function isForSheet({ target, key }: { target: EventTarget | null; key: string }): boolean {
   const sheet = document.querySelector('.canvas')
   const focused = target instanceof Element ? target : null
   if (
@@ -24,3 +24,15 @@ export function isForSheet({ target, key }: KeyboardEvent): boolean {
   if (sheet.contains(focused) || focused?.contains(sheet)) return true
   return !BUTTON_KEYS.has(key) && (key.length === 1 || isButton(focused))
 }
+
+/** Move the focus to a block. */
+export const focusBlock = (name: string): void =>
+  document
+    .querySelector<HTMLElement>(`.canvas .react-flow__node[data-id="${CSS.escape(name)}"]`)
+    ?.focus({ preventScroll: true })
+
+let lastKey = ''
+addEventListener('keydown', ({ key }) => (lastKey = key), true)
+
+/** Whether Tab was the last key: other keys move the focus only with a dialog that they open or close. */
+export const isByTab = (): boolean => lastKey === 'Tab'

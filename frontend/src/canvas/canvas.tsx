@@ -18,6 +18,7 @@ import { showDialog } from '../dialogs'
 import type { Edit } from '../messages'
 import type { Places } from '../model/wires'
 import type { OuterComment } from '../protocol'
+import { isByTab } from '../sheet_focus'
 import { alteration, ask, openSheet, useStudio } from '../store'
 import { sheetKey } from '../documents/document_views'
 import { selectedBlocks } from './arranging'
@@ -142,7 +143,7 @@ function Sheet({ sheetKey }: { sheetKey: string }) {
   const sheetDrag = useSheetDrag(blocks, notes)
   const { graph, nodes, edges, lines } = useSheetDrawing(sheetDrag, selectedWires)
   const { press, notePress, ...clicks } = useClicks(selectedWires, setSelectedWires)
-  useCentredBlock(sheet, flow, blocks)
+  useCentredBlock(flow, blocks)
   useSheetKeys(selectedWires, setSelectedWires)
   const empty = Object.keys(blocks).length === 0 && Object.keys(notes).length === 0
   const { view, motion } = useView(sheet, flow, sheetKey, blocks, empty)
@@ -229,7 +230,7 @@ function EmptySheet() {
 /** Select the block that receives the focus by Tab. */
 function selectFocused({ target }: React.FocusEvent): void {
   const name =
-    target.classList.contains('react-flow__node') && target.matches(':focus-visible')
+    isByTab() && target.classList.contains('react-flow__node') && target.matches(':focus-visible')
       ? target.getAttribute('data-id')
       : null
   if (name) useStudio.getState().select([name])

@@ -3,6 +3,7 @@ import { useEffect, useState, type RefObject } from 'react'
 import type { Rectangle } from '../model/free_place'
 import type { SheetBlock } from '../protocol'
 import { partsToShow, viewports } from '../documents/document_views'
+import { focusBlock } from '../sheet_focus'
 import { useStudio } from '../store'
 import type { SheetNode } from './sheet_graph'
 import { sheetView } from './sheet_actions'
@@ -18,7 +19,7 @@ type Sheet = RefObject<HTMLDivElement | null>
 type Flow = ReactFlowInstance<SheetNode, WireEdgeType>
 
 /** Centre and focus a block that was found by a search. */
-export function useCentredBlock(sheet: Sheet, flow: Flow, blocks: Record<string, SheetBlock>): void {
+export function useCentredBlock(flow: Flow, blocks: Record<string, SheetBlock>): void {
   const blockToCentre = useStudio((s) => s.blockToCentre)
   useEffect(() => {
     const block = blockToCentre === null ? undefined : blocks[blockToCentre]
@@ -31,11 +32,9 @@ export function useCentredBlock(sheet: Sheet, flow: Flow, blocks: Record<string,
         zoom: Math.max(flow.getZoom(), 0.8),
         duration: 150,
       })
-      sheet.current
-        ?.querySelector<HTMLElement>(`.react-flow__node[data-id="${CSS.escape(block.name)}"]`)
-        ?.focus({ preventScroll: true })
+      focusBlock(block.name)
     }, 2 * LAYOUT_DELAY_MS)
-  }, [sheet, blockToCentre, blocks, flow])
+  }, [blockToCentre, blocks, flow])
 }
 
 /** Distance from the edge of the panel within which a new block is moved farther into view, px. */

@@ -1,11 +1,12 @@
-"""Keys pressed before the result of the previous edit arrives, cancelled drags, renames after a run."""
+"""Keys pressed before the result of the previous edit arrives, cancelled drags, renames, proposed wires."""
 
 from __future__ import annotations
 
 import re
 
+from accessibility import axe
 from browsers import IN_FIREFOX
-from building import block, edge, middle, run, select_block, wait_until
+from building import add, block, edge, middle, new_diagram, run, select_block, wait_until
 from playwright.sync_api import Page, expect
 
 
@@ -208,3 +209,44 @@ def test_without_access_to_the_clipboard_nothing_is_cut_and_a_notice_says_why(sh
         sheet.keyboard.press("Escape")
         expect(block(sheet, "PID")).to_have_count(1)
     sheet.evaluate("() => { delete navigator.clipboard.readText; delete navigator.clipboard.writeText }")
+
+
+def test_a_proposed_wire_is_accepted_and_removed_with_the_keyboard(sheet: Page) -> None:
+    new_diagram(sheet)
+    add(sheet, "sine wave")
+    add(sheet, "gain")
+    proposed = sheet.get_by_role("button", name="Connect Sine Wave/y with Gain/u")
+    announced = sheet.get_by_role("status").filter(has_text="Connect Sine Wave/y with Gain/u: press Tab")
+    expect(proposed).to_have_count(1)
+    expect(announced).to_have_count(1)
+    axe(sheet)
+    expect(block(sheet, "Gain")).to_be_focused()
+    sheet.keyboard.press("Tab")
+    expect(proposed).to_be_focused()
+    sheet.keyboard.press("Shift+Tab")
+    expect(block(sheet, "Gain")).to_be_focused()
+    sheet.keyboard.press("Enter")  # opens the block, as without a proposed wire
+    expect(sheet.get_by_role("dialog", name="Gain")).to_be_visible()
+    sheet.keyboard.press("Escape")
+    expect(sheet.get_by_role("dialog")).to_have_count(0)
+    expect(block(sheet, "Gain")).to_be_focused()
+    sheet.keyboard.press("Tab")
+    expect(proposed).to_be_focused()
+    sheet.keyboard.press("Enter")
+    expect(edge(sheet, "Sine Wave/y -> Gain/u")).to_have_count(1)
+    expect(proposed).to_have_count(0)
+    expect(announced).to_have_count(0)
+    expect(block(sheet, "Gain")).to_be_focused()
+    add(sheet, "scope")
+    expect(block(sheet, "Scope")).to_be_focused()
+    for key in ("Tab", "Space"):
+        sheet.keyboard.press(key)
+    expect(edge(sheet, "Gain/y -> Scope/u")).to_have_count(1)
+    sheet.keyboard.press("Control+z")
+    proposed = sheet.get_by_role("button", name="Connect Gain/y with Scope/u")
+    expect(proposed).to_have_count(1)
+    sheet.keyboard.press("Escape")
+    expect(proposed).to_have_count(0)
+    expect(block(sheet, "Scope")).to_have_class(re.compile("selected"))  # until the next Escape
+    sheet.keyboard.press("Escape")
+    expect(sheet.locator(".react-flow__node.selected")).to_have_count(0)
