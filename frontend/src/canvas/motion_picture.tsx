@@ -5,7 +5,7 @@ import { contains, intersection, pictureRegion, visiblePart, type View } from '.
 import { useStudio } from '../store'
 import type { SheetNode } from './sheet_graph'
 import type { SheetMotion } from './sheet_motion'
-import { SheetPainter, type PlacedName, type SheetContent } from './sheet_picture'
+import { SheetPainter, type PlacedName, type PlacedValue, type SheetContent } from './sheet_picture'
 import { nameScale } from './sheet_view'
 import { shownName } from './signal_names'
 import type { WireEdgeType } from './wire_edge'
@@ -38,6 +38,7 @@ export function MotionPicture({ motion, bounds }: { motion: SheetMotion; bounds:
       nodes: flow.getNodes(),
       edges: flow.getEdges(),
       names: placedNames(),
+      values: placedValues(),
     }))
     const stop = motion.onView(() => motion.isPictured && picture.show(motion.view, motion.count))
     motion.hasPicture = true
@@ -60,6 +61,18 @@ function placedNames(): PlacedName[] {
     if (!net.name_at || !text) return []
     const [x, y, anchor] = net.name_at
     return [{ text, x, y, anchor, propagated: !net.name }]
+  })
+}
+
+/** The displayed values, read from their elements without a layout, which the hidden sheet does not have. */
+function placedValues(): PlacedValue[] {
+  const values = document.querySelectorAll<HTMLElement>('.wire-values > [data-path]:not(:empty)')
+  const scale = Number(values[0]?.parentElement?.style.getPropertyValue('--label-scale'))
+  return Array.from(values, ({ textContent: text, style: { transform, width: fixedWidth } }) => {
+    const [x = 0, y = 0] = transform.match(/-?[\d.]+/g)!.map(Number)
+    if (!fixedWidth) return { text, x, y, align: transform.includes('-100%') ? 'right' : 'left', scale }
+    const width = Number.parseFloat(fixedWidth)
+    return { text, x: x + width, y: y - 5.5, align: 'right', scale, width }
   })
 }
 

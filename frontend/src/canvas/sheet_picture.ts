@@ -17,11 +17,23 @@ export interface PlacedName {
   propagated: boolean
 }
 
+/** A value at a line, or in a block, which has a fixed width, px. `x` is its left or right edge. */
+export interface PlacedValue {
+  text: string
+  x: number
+  y: number
+  align: 'left' | 'right'
+  /** The magnification of the label. */
+  scale: number
+  width?: number
+}
+
 /** The displayed parts of a sheet. */
 export interface SheetContent {
   nodes: SheetNode[]
   edges: WireEdgeType[]
   names: PlacedName[]
+  values: PlacedValue[]
 }
 
 /** Colours and fonts of the sheet, by the names of their CSS variables. */
@@ -55,7 +67,7 @@ export class SheetPainter {
   /** Draw the region of a sheet with `scale` pixels per px. */
   draw(
     context: CanvasRenderingContext2D,
-    { nodes, edges, names }: SheetContent,
+    { nodes, edges, names, values }: SheetContent,
     region: Rectangle,
     scale: number,
     nameScale: number,
@@ -71,6 +83,7 @@ export class SheetPainter {
     for (const node of nodes) if (node.type === 'note') note(context, node, scale, style)
     for (const edge of edges) for (const tag of edge.data?.tags ?? []) wireTag(context, tag, scale, style)
     for (const name of names) signalName(context, name, scale, style)
+    for (const value of values) shownValue(context, value, scale, style)
   }
 
   private wire(context: CanvasRenderingContext2D, { data, selected, className }: WireEdgeType, style: Style) {
@@ -327,4 +340,22 @@ function signalName(context: CanvasRenderingContext2D, name: PlacedName, scale: 
   context.font = `italic 10px ${style('font')}`
   context.fillStyle = style(propagated ? 'muted' : 'ink')
   write(context, { text, x, y: y - 3.5, size: 10, align: ALIGNMENTS[anchor], baseline: 'middle' }, scale)
+}
+
+/** A value with its ground, as the class `wire-value` or `display-value` shows it. */
+function shownValue(
+  context: CanvasRenderingContext2D,
+  value: PlacedValue,
+  scale: number,
+  style: Style,
+): void {
+  const { text, x, y, align, scale: magnification, width: fixedWidth } = value
+  const [size, height, side] = fixedWidth ? [9.5, 11, 4] : [10, 14, 3].map((part) => part * magnification)
+  context.font = `${size}px ${style('mono')}`
+  const width = fixedWidth ?? context.measureText(text).width + 2 * side!
+  context.fillStyle = style(fixedWidth ? 'sunken' : 'page')
+  context.fillRect(align === 'left' ? x : x - width, y, width, height!)
+  context.fillStyle = style(fixedWidth ? 'ink' : 'accent')
+  const start = align === 'left' ? x + side! : x - side!
+  write(context, { text, x: start, y: y + height! / 2, size: size!, align, baseline: 'middle' }, scale)
 }

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from building import block, keep_view, middle, wait_until
+from building import block, keep_view, middle, run, wait_until
 from playwright.sync_api import FloatRect, Page, expect
 
 import armblocks as ab
@@ -54,6 +54,27 @@ PICTURED = """() => new Promise((done) => {
     }
     done([missing, count])
 })"""
+MISSING_VALUES = """() => {
+    // The values in view that the picture does not show, and the number of all values in view, in one task
+    // with a change of the view.
+    const pane = document.querySelector('.react-flow__pane')
+    pane.dispatchEvent(new WheelEvent('wheel', { deltaX: 8, bubbles: true, cancelable: true }))
+    const canvas = document.querySelector('.motion-picture canvas')
+    const [box, panel] = [canvas, pane].map((element) => element.getBoundingClientRect())
+    const { a: zoom, e, f } = new DOMMatrix(document.querySelector('.react-flow__viewport').style.transform)
+    const missing = []
+    let count = 0
+    for (const { style, dataset } of document.querySelectorAll('.wire-value')) {
+        const [x, y] = style.transform.match(/-?[\\d.]+/g).map(Number)
+        const at = [e + zoom * (x + 2), f + zoom * (y + 3)]
+        if (at[0] < 0 || at[1] < 0 || at[0] > panel.width || at[1] > panel.height) continue
+        count++
+        const spot = [at[0] + panel.x - box.x, at[1] + panel.y - box.y]
+        const [left, top] = spot.map((pixels) => (canvas.width / box.width) * pixels)
+        if (canvas.getContext('2d').getImageData(left, top, 1, 1).data[3] < 250) missing.push(dataset.path)
+    }
+    return [missing, count]
+}"""
 ZOOM_AT = """(pane, [clientX, clientY]) => {
     const values = { clientX, clientY, deltaY: -4, ctrlKey: true, bubbles: true, cancelable: true }
     pane.dispatchEvent(new WheelEvent('wheel', values))
@@ -158,6 +179,24 @@ def test_a_picture_shows_all_blocks_at_their_places_during_a_motion(large: Page)
     assert missing == []
     assert count == CHAINS * PER_CHAIN
     rest(large)
+
+
+def test_a_picture_shows_the_values_at_wires_during_a_motion(large: Page) -> None:
+    run(large)
+    button = large.get_by_role("button", name="Values on all wires")
+    button.click()
+    values = large.locator(".wire-value:not(:empty)")
+    expect(values).to_have_count(CHAINS * (PER_CHAIN - 1))
+    while view(large)[2] < 0.8:
+        wheel(large, 0, -10, zoom=True)
+    rest(large)
+    wheel(large, 25, 5)
+    missing, count = large.evaluate(MISSING_VALUES)
+    assert missing == []
+    assert count > PER_CHAIN
+    rest(large)
+    button.click()
+    expect(values).to_have_count(0)
 
 
 def test_a_motion_changes_neither_the_focus_nor_the_selection(large: Page) -> None:
