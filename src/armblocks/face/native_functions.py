@@ -77,7 +77,11 @@ class NativeFunctions(metaclass=ArgumentErrors):
 
     @cached_property
     def manipulability(self) -> ConfigurationFunction:
-        """``manipulability(q)`` → one number, Yoshikawa's sqrt(det(J J')): 0 at a singularity."""
+        """``manipulability(q)`` → one number, Yoshikawa's measure: 0 at a singularity.
+
+        It is the product of the singular values of ``jacob0``: sqrt(det(J J')), or sqrt(det(J' J)) for fewer
+        than six degrees of freedom.
+        """
         return self._code.entry("manipulability")
 
     @cached_property

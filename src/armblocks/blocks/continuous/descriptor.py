@@ -33,11 +33,13 @@ RELATIVE_TOLERANCE = 1e-12
 class DescriptorStateSpace(Block):
     """A linear system with algebraic equations: E x' = A x + B u, y = C x + D u, where E may be singular.
 
-    The equations must be of index 1: the algebraic equations determine the part of x in the null space of E.
-    The block has rank(E) states z. They are the coordinates of x in the row space of E, along its right
-    singular vectors; if E is regular, z is x itself. ``initial`` is x(0). Only its part in the row space of E
-    is used; the algebraic equations determine the rest from u. The matrices are not tunable, so that the
-    feedthrough is known exactly.
+    - The equations must be of index 1: the algebraic equations determine the part of x in the null space of
+      E. Equations of higher index are an error.
+    - The block has rank(E) states z, the coordinates of x in the row space of E along its right singular
+      vectors. If E is regular, z is x itself.
+    - ``initial`` is x(0). Only its part in the row space of E is used; the algebraic equations determine the
+      rest from z and u.
+    - The matrices are not tunable, so that the feedthrough is known exactly.
 
     P. Kunkel, V. Mehrmann, Differential-Algebraic Equations, 2006, section 2.1.
     """

@@ -40,13 +40,14 @@ from armblocks.diagram.signs import FaceSign, graph
 class FirstOrderHold(Block):
     """A first-order hold: y(t) = u(t_k) + (u(t_k) - u(t_(k-1))) (t - t_k) / T until t_(k+1).
 
-    ``extrapolation`` continues the straight line through the last two samples. It is exact for a linear
-    input; at each sample time y may jump to the new sample. ``interpolation`` connects the samples without a
-    jump, one period late: y(t) = u(t_(k-1)) + (u(t_k) - u(t_(k-1))) (t - t_k) / T. Simulink's First Order
-    Hold extrapolates. ``initial`` is the sample before the first sample, and y before ``offset``.
+    - ``extrapolation``, as in Simulink's First Order Hold, continues the straight line through the last two
+      samples, as above. It is exact for a linear input. At each sample time y may jump to the new sample.
+    - ``interpolation`` connects the samples without a jump, one period late: y(t) = u(t_(k-1)) + (u(t_k) -
+      u(t_(k-1))) (t - t_k) / T.
+    - ``initial`` is the sample before the first sample, and y before ``offset``.
 
-    A sampled block that ticks at t_k reads the left limit of y. Sample times at which the block is in a
-    subsystem that is off are missed; y is then constant until the next sample time.
+    A sampled block that ticks at t_k reads the left limit of y. The block takes no samples while its
+    subsystem is disabled; y is then constant until the next sample time.
     """
 
     title: ClassVar[str] = "First Order Hold"

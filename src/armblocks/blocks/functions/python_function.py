@@ -127,11 +127,14 @@ class CalledPythonFunction(Block):
     """The value of a Python function at each tick: y(k) = function(inputs at the tick, t), held in between.
 
     This block is for functions that cannot be traced: a controller of another library, branches, a search in
-    a table. The run stops at each tick and calls the function with numbers and NumPy arrays. The report of
-    the run gives the number of calls and their share of the computing time. Blocks that tick at the same time
-    use the new values. The function may store data between calls, but these data are not states of the
-    diagram: they are neither saved with a state nor reset before another run. Use a Python Function for a
-    function that can be traced: it is much faster, works in continuous time and can be linearised.
+    a table. Use a Python Function for a function that can be traced: it is much faster, works in continuous
+    time and can be linearised.
+
+    - The run stops at each tick and calls the function with numbers and NumPy arrays.
+    - Blocks that tick at the same time use the new values.
+    - The function may store data between calls. These data are not states of the diagram: they are neither
+      saved with a state nor reset before another run.
+    - The report of the run gives the number of calls and their share of the computing time.
 
     The file of a diagram stores ``file.py:name`` and runs no code unless it is trusted.
     """

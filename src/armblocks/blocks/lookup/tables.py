@@ -38,9 +38,14 @@ from armblocks.errors import InputError, counted
 class LookupTable1D(BlockWithAxes):
     """A curve through given points: y = table(u), interpolated by the chosen method.
 
-    ``cubic`` is the spline with not-a-knot ends (MATLAB's ``spline``). ``flat`` uses the entry at the largest
-    position below or equal to u, and ``nearest`` the entry at the nearest position. Beyond the ends, ``clip``
-    gives the value at the end and ``linear`` extrapolates along the tangent.
+    Methods between the points:
+
+    - ``linear``: a straight line.
+    - ``cubic``: the spline with not-a-knot ends (MATLAB's ``spline``).
+    - ``flat``: the entry at the largest position below or equal to u.
+    - ``nearest``: the entry at the nearest position.
+
+    Beyond the ends, ``clip`` gives the value at the end and ``linear`` extrapolates along the tangent.
     """
 
     title: ClassVar[str] = "1-D Lookup Table"

@@ -27,10 +27,12 @@ from armblocks.diagram.signs import FaceSign, Words
 class AlgebraicConstraint(Block):
     """An algebraic constraint: the output z solves f(z) = 0, where the input is f(z).
 
-    An equation that is linear in z is solved symbolically when the diagram is compiled. Other equations are
-    solved by Newton's method with the exact Jacobian, which starts from ``initial`` at t = 0 and later from
-    the previous solution. If the equation has several solutions, the start value selects one. A vector z has
-    as many equations as elements, which are solved together. An input that does not depend on z is an error.
+    - An equation that is linear in z is solved symbolically when the diagram is compiled.
+    - Other equations are solved by Newton's method with the exact Jacobian. The iteration starts from
+      ``initial`` at t = 0 and later from the previous solution. If the equation has several solutions, the
+      start value selects one.
+    - A vector z has as many equations as elements, which are solved together.
+    - An input that does not depend on z is an error.
     """
 
     title: ClassVar[str] = "Algebraic Constraint"

@@ -107,10 +107,15 @@ class ReferenceFrame(MechanicsBlock):
 class RigidTransform(MechanicsBlock):
     """A rigid connection: the constant pose of F in B, a translation and then a rotation.
 
-    ``translation``: the origin of F in the axes of B. ``rotation``: the method that gives the axes of F in
-    the axes of B. ``standard_axis``: by ``angle`` about ``axis`` x, y or z. ``arbitrary_axis``: by ``angle``
-    about ``rotation_axis``. ``sequence``: by ``angles`` about the axes ``sequence``, in this order, each axis
-    after the rotations before it. ``matrix``: the columns of ``matrix`` are the axes of F.
+    ``translation`` is the origin of F in the axes of B. ``rotation`` selects how the rotation of F relative
+    to B is given:
+
+    - ``none``: F has the axes of B.
+    - ``standard_axis``: a rotation by ``angle`` about the axis x, y or z named in ``axis``.
+    - ``arbitrary_axis``: a rotation by ``angle`` about ``rotation_axis``, which need not have the length 1.
+    - ``sequence``: three rotations by ``angles`` about the axes named in ``sequence``, in this order. Each
+      axis is an axis of the frame that results from the rotations before it.
+    - ``matrix``: the columns of ``matrix`` are the axes of F in the axes of B.
     """
 
     title: ClassVar[str] = "Rigid Transform"

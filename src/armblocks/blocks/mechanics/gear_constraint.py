@@ -23,10 +23,15 @@ class GearConstraint(MechanicsBlock):
     """Two gears that mesh without backlash: gear B and gear F turn at speeds of a constant ratio.
 
     Revolute joints connect both gears with one body, such as a housing, a planet carrier or the world. The
-    z axes of B and F are the axes of these joints. With the angles of the gears relative to that body,
-    external gears have ``ratio (angle_F - offset) = -angle_B``, and internal gears ``ratio (angle_F - offset)
-    = angle_B``. The distance of the axes is not checked: the block also describes a belt or a train of gears.
-    Solids give the masses and inertias of the gears.
+    z axes of B and F are the axes of these joints. The angles of the gears about these axes are relative to
+    the body. If both z axes have the same direction:
+
+    - ``external``: ratio (angle_F - offset) = -angle_B.
+    - ``internal``: ratio (angle_F - offset) = angle_B.
+
+    If the z axes have opposite directions, the sign of angle_B is the opposite one. The distance of the axes
+    is not checked: the block also describes a belt or a train of gears. Solids give the masses and inertias
+    of the gears.
     """
 
     title: ClassVar[str] = "Gear Constraint"

@@ -24,11 +24,14 @@ DISTANCE_TOLERANCE = 1e-6
 class RackAndPinionConstraint(MechanicsBlock):
     """A pinion B and a rack F that mesh without backlash: the rack moves by the radius times the angle.
 
-    A revolute joint connects the pinion, and a prismatic joint the rack, with one body, such as a housing or
-    the world. The pinion turns about the z axis of B. The rack moves along the z axis of F. The origin of F
-    is on the pitch line of the rack: the line through it along z has the distance ``radius`` from the axis of
-    the pinion. The side on which it lies gives the direction of the motion, like that of the teeth.
-    ``offset``: the position of the rack, relative to that body, where the angle of the pinion is 0.
+    A revolute joint connects the pinion with a body, such as a housing or the world. A prismatic joint
+    connects the rack with the same body.
+
+    - B: the pinion turns about the z axis of this frame.
+    - F: the rack moves along the z axis of this frame. The origin of F is on the pitch line of the rack: the
+      line through it along z has the distance ``radius`` from the axis of the pinion.
+    - Direction: the rack has the velocity of the pinion's teeth on the pitch line.
+    - ``offset``: the position of the rack where the angle of the pinion is 0. Both are relative to the body.
     """
 
     title: ClassVar[str] = "Rack and Pinion Constraint"

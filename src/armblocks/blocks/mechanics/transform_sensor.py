@@ -31,9 +31,14 @@ _OUTPUTS = {
 class TransformSensor(MechanicsBlock):
     """The motion of frame F relative to frame B: position, rotation, velocities, accelerations.
 
-    ``measurement_frame``: the axes of the vectors, and the motion that is subtracted. ``world``: axes of the
-    World Frame, differences of the motions of both origins. ``nonrotating_base``: the same, in the present
-    axes of B. ``base``: the motion relative to axes that rotate with B, in the axes of B.
+    ``measurement_frame`` selects the observer and the axes of the vectors:
+
+    - ``world``: the observer moves with the origin of B and does not rotate. The axes are those of the World
+      Frame. The velocity is the velocity of F minus the velocity of B.
+    - ``nonrotating_base``: the same observer; the axes are the present axes of B.
+    - ``base``: the observer moves and rotates with B; the axes are those of B.
+
+    The rotation matrix ``R`` is the rotation of F in B for every measurement frame.
     """
 
     title: ClassVar[str] = "Transform Sensor"

@@ -63,18 +63,24 @@ class ArmPlant(Block):
     this torque it slides. The holding torque includes the coupling with the other joints. The block Robot
     (ForwardDynamics) has no sticking, and its joints creep instead.
 
-    End stops are at the robot's joint limits. ``elastic``: beyond a limit the stop exerts the torque
-    stiffness (limit - q) - damping qd, but only in the direction away from the stop. ``hard``: the joint
-    stops at once in a plastic impact, whose impulse also acts on the other joints. It stays exactly at the
-    limit until a torque moves it away. Joints that rest at their stops before the impact stay there.
+    ``stops`` selects the end stops at the robot's joint limits:
+
+    - ``none``: the joints have no end stops.
+    - ``elastic``: beyond a limit the stop exerts the torque stiffness (limit - q) - damping qd, but only in
+      the direction away from the stop.
+    - ``hard``: the joint stops at once in a plastic impact, whose impulse also acts on the other joints. It
+      stays exactly at the limit until a torque moves it away. Joints that rest at their stops before the
+      impact stay there.
 
     The robot may have coupled joints and closed loops; the start must satisfy them (``arm.assemble``). In a
     mechanism with loops, only joints that determine the others can have Coulomb friction or hard stops.
 
-    ``payload``: mass (kg), centre x y z (m) and inertia xx yy zz xy yz xz (kg m^2) about this centre, in the
-    tool frame. If the payload jumps, the joint speeds do not change: a payload is picked up and released at
-    the speed of the tool. ``wrench``: force (N), then moment (N m), of the tip on the environment, in the
-    axes of the last link.
+    Optional inputs:
+
+    - ``payload``: mass (kg), centre x y z (m) and inertia xx yy zz xy yz xz (kg m^2) about this centre, in
+      the tool frame. If the payload jumps, the joint speeds do not change: a payload is picked up and
+      released at the speed of the tool.
+    - ``wrench``: force (N), then moment (N m), of the tip on the environment, in the axes of the last link.
     """
 
     title: ClassVar[str] = "Arm Plant"

@@ -33,9 +33,12 @@ from armblocks.robot import Robot
 class JacobianInverse(Block):
     """An inverse of a Jacobian: J^-1, J', the pseudo-inverse, or J'(J J' + damping^2 I)^-1.
 
-    ``inverse`` needs a square Jacobian and is not finite at a singularity. ``pseudo`` gives the least-norm
-    joint speeds (n >= m) or the least-squares error (n < m) and needs full rank. ``damped`` (damped least
-    squares) is finite everywhere, with an error near singularities.
+    For a Jacobian of m rows and n columns:
+
+    - ``inverse`` needs m = n and is not finite at a singular configuration.
+    - ``pseudo`` gives the joint speeds of least norm (n >= m), or those with the smallest squared error of
+      the velocity (n < m). It needs full rank.
+    - ``damped`` (damped least squares) is finite everywhere, with an error near singular configurations.
     """
 
     title: ClassVar[str] = "ijacob"
@@ -91,12 +94,17 @@ class JacobianInverse(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Manipulability(Block):
-    """Yoshikawa's manipulability measure, which is 0 at a singularity: w = sqrt(det(J J'))."""
+    """Yoshikawa's manipulability measure, which is 0 at a singularity: w = sqrt(det(J J')).
+
+    J has all six rows, in m and rad per unit of the joint coordinates. For fewer than six degrees of freedom
+    det(J J') is always 0, and the measure is sqrt(det(J' J)). With angular rows, this value need not be 0
+    where a planar arm is straight.
+    """
 
     title: ClassVar[str] = "manipulability"
     sign: ClassVar[FaceSign] = Words("√|J Jᵀ|")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="An arm with two links stretches: the measure falls to 0 where the arm is straight.",
+        shows="An arm with two links stretches: the measure falls from 1.41 to 1, where the arm is straight.",
         inputs={"q": driver("JTraj", q0=(0.0, 1.5), qf=(0.5, 0.0), tmax=8.0).named("motion")},
     )
 

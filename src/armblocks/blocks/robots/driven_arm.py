@@ -187,14 +187,17 @@ class DrivenArm(Block):
 class AccelerationDrivenArm(DrivenArm):
     """The robot with joints whose accelerations are given: motion of all joints, torques of the drives.
 
-    The prescribed joints have exactly the accelerations of the input ``motion``. The output ``drive`` has
-    the torques of this motion (N m or N), with rotor inertia and friction; they are not limited. The other
-    joints move under the torques ``tau``; M(q) q'' + C q' + g + friction = tau holds for all joints. Joints
-    of all types can be prescribed, such as the six degrees of freedom of a moving base. The robot may have
-    couplings and closed loops; the start must satisfy them (``arm.assemble``).
+    - The prescribed joints have exactly the accelerations of the input ``motion``.
+    - The other joints move under the torques ``tau``.
+    - The output ``drive`` has the torques (N m or N) at the prescribed joints that cause this motion, with
+      rotor inertia and friction. They are not limited.
 
-    Prescribed joints are the joints of the constraints ``PrescribedMotion`` of the robot, or those named in
-    ``joints``. Use PositionDrivenArm for given positions.
+    The prescribed joints are those named in ``joints``. If ``joints`` is empty, they are the joints of the
+    constraints ``PrescribedMotion`` of the robot, or all joints if it has none. Joints of all types can be
+    prescribed, such as the six degrees of freedom of a moving base.
+
+    The robot may have couplings and closed loops; the start must satisfy them (``arm.assemble``). Use
+    PositionDrivenArm for given positions.
     """
 
     title: ClassVar[str] = "Acceleration-Driven Arm"
@@ -225,16 +228,20 @@ class AccelerationDrivenArm(DrivenArm):
 class PositionDrivenArm(DrivenArm):
     """The robot with joints whose positions are given: motion of all joints, torques of the drives.
 
-    The prescribed joints have exactly the coordinates of the input ``motion``. The output ``drive`` has the
-    torques of this motion (N m or N), with rotor inertia and friction; they are not limited. Speeds and
-    accelerations are the exact first and second derivatives of the input, which must be smooth: at a jump of
-    its value or its rate the impulse of the drive is not modelled, and an input that is held between samples
-    has the rate 0. The other joints move under the torques ``tau``. A quaternion may have any length.
+    - The prescribed joints have exactly the coordinates of the input ``motion``. Their speeds and
+      accelerations are the exact first and second derivatives of this input.
+    - The other joints move under the torques ``tau``, from ``q0`` and ``qd0``.
+    - The output ``drive`` has the torques (N m or N) at the prescribed joints that cause this motion, with
+      rotor inertia and friction. They are not limited.
 
-    ``q0`` and ``qd0`` are the start of the other joints. In closed loops ``q0`` must satisfy the constraints,
-    and the input must start at its prescribed joints. Where the loops cannot reach a position, the
-    coordinates are NaN and the run ends with an error; ``arm.assemble(q, locked=joints)`` names the
-    constraint and the gap. See AccelerationDrivenArm for the prescribed joints.
+    The input must be smooth. If its value or its rate jumps, the impulse of the drive is not modelled. An
+    input that is held between samples has the rate 0. A quaternion in the input may have any length.
+
+    In closed loops ``q0`` must satisfy the constraints, and the input must start at the values of ``q0`` of
+    the prescribed joints. Where the loops cannot reach a position, the coordinates are NaN and the run ends
+    with an error. ``arm.assemble(q, locked=joints)`` names the constraint and the gap.
+
+    AccelerationDrivenArm describes which joints are prescribed.
     """
 
     title: ClassVar[str] = "Position-Driven Arm"

@@ -50,11 +50,12 @@ MOVING_POSE = driver("Fkine").named("target").by(q=MOTION)
 class Ikine(Block):
     """Inverse kinematics in closed form: q = ikine(T), the joint coordinates of one branch.
 
-    The block supports arms with a closed form (``arm.ikine_all``): with a spherical wrist or three parallel
-    axes, SCARA and planar arms, palletisers. ``branch`` is the number of a branch in the order of
-    ``arm.ikine_all(T).q``, from 1. Angles are within half a turn of ``q0``. q is NaN where the branch does
-    not exist, so the run ends there. For other arms, and through singular configurations, use
-    DifferentialIkine.
+    - The block supports arms with a closed form (``arm.ikine_all``): with a spherical wrist or three parallel
+      axes, SCARA and planar arms, palletisers. Use DifferentialIkine for other arms, and for motions through
+      singular configurations.
+    - ``branch`` is the number of a branch in the order of ``arm.ikine_all(T).q``, from 1.
+    - Angles are within half a turn of ``q0``.
+    - q is NaN where the branch does not exist, so the run ends there.
     """
 
     title: ClassVar[str] = "ikine"
@@ -149,11 +150,16 @@ class ResolvedRate(Block):
 class DifferentialIkine(Block):
     """Inverse kinematics by integration: the joints follow a moving pose T, also through singularities.
 
-    The joint speeds are computed as in ResolvedRate for the velocity ``v + gain e``, where ``v`` is the
-    velocity of the pose (0 if it is unknown) and ``e`` the error of the pose: displacement and rotation
-    vector from the tool to T. The joint coordinates are their integral from ``q0`` (closed-loop inverse
-    kinematics, Siciliano et al., *Robotics*, 2009, 3.7). The error decays with the time constant ``1 /
-    gain``. A pose out of reach gives the nearest pose.
+    Closed-loop inverse kinematics (Siciliano et al., Robotics, 2009, 3.7):
+
+    - The pose error e is the displacement and the rotation vector from the tool to T.
+    - The joint speeds are those of ResolvedRate for the tool velocity v + gain e, with its damping and its
+      limit of the speeds. ``v`` is the velocity of the pose T; connect 0 if it is unknown.
+    - The joint coordinates are the integral of the speeds from ``q0``.
+
+    Away from singular configurations, and below the limit of the speeds, the error decays with the time
+    constant 1 / gain if ``v`` is the velocity of T. If the pose is out of reach, the tool approaches the
+    nearest pose that it can reach.
     """
 
     title: ClassVar[str] = "Differential Ikine"

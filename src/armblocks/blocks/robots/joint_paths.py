@@ -99,10 +99,13 @@ class Trapezoidal(Block):
 class MultiSegment(Block):
     """Linear segments between points with parabolic blends: segment k takes durations(k), in s.
 
-    Each blend takes ``blend``, in s. This is the toolbox's ``mstraj`` for given times. The speed of a segment
-    is constant, and changes linearly within blend / 2 of the time of each point. The path passes exactly
-    through the first and last point and close to the inner points. The motion begins at t = 0 and ends after
-    the sum of durations plus one blend: q = p1 + sum of (p(k+1) - p(k)) g_k(t). Each g_k rises from 0 to 1.
+    This is the toolbox's ``mstraj`` for given times: q = p1 + sum of (p(k+1) - p(k)) g_k(t), where each g_k
+    rises from 0 to 1.
+
+    - Each blend takes ``blend``, in s. The speed changes linearly in a blend and is constant between blends.
+    - The blend at a point begins at the sum of the durations before this point; the first begins at t = 0.
+    - The motion ends after the sum of all durations plus one blend.
+    - The path passes exactly through the first and last point and close to the inner points.
     """
 
     title: ClassVar[str] = "mstraj"

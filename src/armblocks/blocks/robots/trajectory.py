@@ -25,11 +25,14 @@ from armblocks.errors import InputError, counted
 class Trajectory(BlockWithRows):
     """A joint motion from a table: rows of t, q, qd, qdd, interpolated by quintics.
 
-    ``trajectory.block()`` gives this block for any joint trajectory, and ``trajectory.save(path)`` writes its
-    table. All trajectories of armblocks up to the fifth degree are reproduced exactly: jtraj, lspb, mstraj,
-    splines, jerk-limited motions. Two rows with the same time are a jump of the accelerations. Each row is an
-    event, so that no step passes over a jump. Before the first row and after the last row the joints are at
-    rest.
+    ``trajectory.block()`` returns this block for any joint trajectory, and ``trajectory.save(path)`` writes
+    its table.
+
+    - All trajectories of armblocks up to the fifth degree are reproduced exactly: jtraj, lspb, mstraj,
+      splines, jerk-limited motions.
+    - Two rows with the same time are a jump of the accelerations. Each row is an event, so that no step
+      passes over a jump.
+    - Before the first row and after the last row the joints are at rest, at the positions of that row.
     """
 
     title: ClassVar[str] = "trajectory"

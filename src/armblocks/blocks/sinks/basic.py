@@ -111,10 +111,10 @@ class ToWorkspace(Block):
 class ToFile(Block):
     """Stores the signal in a separate file: CSV, NPZ, MAT or Parquet, by the file name extension.
 
-    The run itself writes no file. ``write_report`` (and thus ``armblocks run``) writes the file into the
-    report's folder; ``write_files`` writes it into a given folder. The path must be inside that folder. The
-    file has one row for every ``decimation``-th recorded sample time, beginning with the first. If there are
-    more than ``limit`` rows, the file has only the last rows.
+    - The run itself writes no file. ``write_report`` (and thus ``armblocks run``) writes the file into the
+      report's folder; ``write_files`` writes it into a given folder. The path must be inside that folder.
+    - The file has one row for every ``decimation``-th recorded sample time, beginning with the first. If
+      there are more than ``limit`` rows, the file has only the last rows.
     """
 
     title: ClassVar[str] = "To File"
