@@ -35,8 +35,9 @@ function Option({ option, checked }: ComboboxLikeRenderOptionInput<ComboboxItem>
 }
 
 /**
- * Properties of a field with a searchable list in which an option is always highlighted, so that Enter selects
- * it. Mantine highlights the first option after a key; if this key opens the list, the options appear later.
+ * Properties of a field with a searchable list in which an option is always highlighted, so that Enter
+ * selects it. Mantine highlights the first option after a key; if this key opens the list, the options appear
+ * later.
  */
 export const SEARCHED = {
   ...SCROLLED,

@@ -9,7 +9,7 @@ import './proposed_line.css'
 
 /**
  * The proposed wire of the block that was placed last, until Escape or another selection. A click on the wire
- * connects the ports. Tab moves the focus from the block to the wire, where Enter or space connects the ports.
+ * connects the ports. Tab moves the focus from the block to the wire; Enter or space then connects the ports.
  */
 export function ProposedLine() {
   const { name, at } = usePlaced()
@@ -78,8 +78,8 @@ export function ProposedLine() {
 }
 
 /**
- * While a wire is offered: Tab moves the focus from the placed block to the line, and from the line to the next
- * block; Shift+Tab moves it back to the placed block. Escape removes the line and keeps the selection.
+ * While a wire is offered: Tab moves the focus from the placed block to the line, and from the line to the
+ * next block; Shift+Tab moves it back to the placed block. Escape removes the line and keeps the selection.
  */
 function useLineKeys(line: React.RefObject<SVGSVGElement | null>, name: string, isOffered: boolean): void {
   // A layout effect: the next key may be held until the block is shown.
