@@ -128,7 +128,7 @@ ENABLED = {
 
 
 def starts_at_any_time(case: Case) -> Iterator[str]:
-    """A diagram in a subsystem that starts later, with sources that are later as well, has equal signals."""
+    """A diagram in a subsystem that is enabled later, with its sources delayed alike, has equal signals."""
     recipe = replace(case.recipe, nodes=tuple(map(periodic, case.recipe.nodes)))
     try:
         periodic_case = case if recipe == case.recipe else Case(recipe)

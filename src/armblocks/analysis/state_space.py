@@ -24,10 +24,14 @@ Array = NDArray[np.float64]
 class StateSpaceModel(metaclass=ArgumentErrors):
     """The system ``x' = A x + B u, y = C x + D u``, or ``x[k+1] = A x[k] + B u[k]`` for ``dt > 0`` (s).
 
-    ``A (nx, nx)``, ``B (nx, nu)``, ``C (ny, nx)``, ``D (ny, nu)``. All quantities are deviations from the
-    operating ``point``. ``states``, ``inputs`` and ``outputs`` name the scalars, with their SI units; without
-    names they are ``x1``, ``u1``, ``y1`` … Raises ``InputError`` for matrices whose shapes do not fit or
-    whose entries are not finite.
+    - ``A (nx, nx)``, ``B (nx, nu)``, ``C (ny, nx)``, ``D (ny, nu)``: the matrices. All quantities are
+      deviations from the operating ``point``.
+    - ``dt``: the sample time, s; 0 (the default) for a continuous system.
+    - ``states``, ``inputs``, ``outputs``: the names of the scalars; by default ``x1``, ``u1``, ``y1`` …
+    - ``state_units``, ``input_units``, ``output_units``: their units; by default empty.
+
+    Raises ``InputError`` for matrices whose shapes do not fit or whose entries are not finite, for numbers of
+    names or units that do not fit, and for a negative or infinite ``dt``.
     """
 
     A: Array
@@ -110,7 +114,10 @@ class StateSpaceModel(metaclass=ArgumentErrors):
         )
 
     def transformed(self, T: ArrayLike) -> Self:
-        """The same system in other state coordinates, ``x = T x_new``."""
+        """The same system in other state coordinates, ``x = T x_new``, without names of the states.
+
+        ``T (nx, nx)`` must be regular; NumPy raises ``LinAlgError`` for a singular matrix.
+        """
         matrix = np.asarray(T, dtype=np.float64)
         return dataclasses.replace(
             self,

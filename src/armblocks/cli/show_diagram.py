@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def print_hierarchy(diagram: Diagram, console: Console) -> None:
-    """Print the tree of subsystems, with type, parameters, library and size of each."""
+    """Print the tree of subsystems: type, library, number of blocks and wires, mask parameters of each."""
     tree = Tree(_heading(diagram, diagram.name), guide_style=ACCENT)
     if diagram.description:
         tree.add(Text(diagram.description, "italic"))

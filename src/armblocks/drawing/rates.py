@@ -1,4 +1,4 @@
-"""The clocks of a diagram in its drawing: a colour and a mark for each, and a legend with the periods."""
+"""Sample times in the drawing of a diagram: each clock has a colour and a mark; a legend has the periods."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ _ROW = 22.0
 
 @dataclass(frozen=True, eq=False)
 class Rates:
-    """The clock of each sampled block of the flat diagram, fastest first: D1, D2, …"""
+    """The clocks of a diagram, fastest first: D1, D2, …
+
+    ``clock_of`` has the index of the clock of each sampled block, by its path in the flat diagram.
+    """
 
     clocks: tuple[SampleClock, ...] = ()
     clock_of: Mapping[str, int] | None = None
@@ -34,7 +37,7 @@ class Rates:
         return None if number is None else (f"D{number + 1}", trace_tone(number))
 
     def add_legend(self, picture: Picture) -> None:
-        """A line below the drawing for every clock."""
+        """Add a line of text below the drawing for every clock."""
         for number, clock in enumerate(self.clocks):
             text = f"D{number + 1}: {_period(clock.period)}"
             if clock.offset:

@@ -54,7 +54,13 @@ class Segment:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class JointLog:
-    """A log as it was measured, with NaN for missing values; ``qd`` and ``qdd`` may be missing entirely."""
+    """A log as it was measured, in SI units, with NaN for missing values.
+
+    - ``time`` (N,): finite, ascending times, s.
+    - ``q`` (N, nq), ``tau`` (N, n): coordinates and torques or forces of the joints.
+    - ``qd``, ``qdd`` (N, n): speeds and accelerations; ``None`` if they were not measured.
+    - ``where``: the place of the log in messages.
+    """
 
     time: Array
     q: Array
@@ -81,7 +87,11 @@ class JointLog:
 
 
 def read_logs(data: LogSource, robot: Robot, where: str) -> list[JointLog]:
-    """The logs of one or several experiments. Raises InputError for unsuitable data."""
+    """The logs of one or several experiments.
+
+    Raises UnknownNameError for a log without q or tau, and InputError for wrong shapes, unknown units, and
+    times that are missing, not finite or not ascending.
+    """
     several = isinstance(data, Sequence) and not isinstance(data, str | bytes)
     sources: list[Any] = list(cast("Sequence[Any]", data)) if several else [data]
     if not sources:
@@ -266,8 +276,12 @@ class PreparedLogs:
 def prepared(logs: Sequence[JointLog], robot: Robot, cutoff: float | None, *, whole: bool) -> PreparedLogs:
     """The logs with speeds and accelerations, without rows that have gaps.
 
-    ``cutoff`` (Hz): of the filter of the motion; ``None``: complete logs are not filtered, and others with
-    the advised cut-off. ``whole``: torques without gaps too, because they are filtered later.
+    - ``cutoff``: the cut-off frequency of the filter of the motion, Hz. With ``None``, logs with speeds and
+      accelerations are not filtered, and other logs are filtered with the advised cut-off frequency.
+    - ``whole``: whether a missing torque is also the end of a segment, because the torques are filtered
+      later. Otherwise rows without torque are removed from the segments.
+
+    Raises InputError for logs that need a filter and have unequal time steps or quaternions.
     """
     segments: list[Segment] = []
     steps: list[float] = []
@@ -325,7 +339,7 @@ def _finite(*arrays: Array | None) -> NDArray[np.bool_]:
 
 
 def _runs(used: NDArray[np.bool_], time: Array, step: float) -> Iterator[slice]:
-    """The longest ranges of usable samples without a gap in time."""
+    """The ranges of consecutive usable samples, of at least ``_FEWEST``; a gap in time ends a range."""
     after_gap = np.append(True, np.diff(time) > 1.5 * step)
     begins = np.flatnonzero(used & (after_gap | ~np.append(False, used[:-1])))
     stops = np.append(np.flatnonzero(~used | after_gap), len(time))
@@ -346,7 +360,7 @@ def _check_differentiable(log: JointLog, robot: Robot) -> None:
 
 
 def _with_derivatives(log: JointLog, part: slice, cutoff: float) -> Segment:
-    """Filtered positions with their derivatives; measured speeds and accelerations are filtered alike.
+    """Filtered positions with their derivatives; measured speeds and accelerations have the same filter.
 
     The samples at both ends, about one period of the cut-off frequency, are omitted.
     """

@@ -28,14 +28,14 @@ class SymbolicExpression(metaclass=ArgumentErrors):
 
     - ``casadi``: the expression as traced, an ``SX`` in natural shape (a vector is a column), for CasADi's
       own functions.
-    - ``shape``: (4, 4), (6, n), (n,), or () of a scalar.
+    - ``shape``: (4, 4), (6, n), (n,), or () for a scalar.
 
     ``T[0, 3]`` is an entry. All other forms are simplified: products of sines and cosines of parallel axes
     become sines and cosines of the sum of the angles, and common factors are taken out. Numbers then have 12
     digits.
 
-    ``str`` and the notebook have the short form of textbooks, ``l1 c1 + l2 c12`` with ``c12 = cos(q1 + q2)``
-    by the numbers of the joints.
+    ``str`` and notebooks show the short form of textbooks, ``l1 c1 + l2 c12`` with ``c12 = cos(q1 + q2)``;
+    the digits are the numbers of the joints.
     """
 
     def __init__(
@@ -86,7 +86,10 @@ class SymbolicExpression(metaclass=ArgumentErrors):
         return SX(flat[[int(k) for k in self._entries.ravel()]])
 
     def __getitem__(self, index: Any) -> SymbolicExpression:
-        """An entry, a row or a part, as of an array."""
+        """An entry, a row or a part, with the indices of a NumPy array.
+
+        Raises InputError for an index outside the shape, a part without entries, and a part of a part.
+        """
         if self._index is not None:
             raise InputError(
                 f"the expression is already the part {self._index!r}",
@@ -130,8 +133,8 @@ class SymbolicExpression(metaclass=ArgumentErrors):
     def text(self, *, short: bool = False) -> str:
         """The expression in text, one line for each row, in Python's syntax.
 
-        ``short``: as textbooks print it, ``l1 c1 + l2 c12``, unless joints have two digits or a symbol has
-        the name c1, s1 ….
+        ``short``: in the form of textbooks, ``l1 c1 + l2 c12``. The long form is returned if a joint has a
+        number of two digits, or a symbol has a name such as c1 or s1.
 
         Raises InputError for expressions with more than 400 terms.
         """

@@ -36,7 +36,10 @@ def read_npz(data: bytes) -> ColumnFile:
 
 
 def read_mat(data: bytes) -> ColumnFile:
-    """The columns of the variables and structures of a MAT file; the first axis is time."""
+    """The columns of the variables and structures of a MAT file; the first axis is time.
+
+    Raises ``FormatError`` for version 7.3 and for too many numbers.
+    """
     with from_extra("data", "MAT files"):
         import scipy.io
     if data[:128].lstrip().startswith(b"MATLAB 7.3") or data[:8] == b"\x89HDF\r\n\x1a\n":

@@ -93,10 +93,12 @@ _AT_THE_JOINT = (Transform(), Transform())
 class JointPart:
     """A joint from frame ``B`` to frame ``F``: a sequence of elementary motions.
 
-    ``closure``: the type of constraint that the joint is where it closes a loop, with the pose of the frames
-    of this constraint in ``B`` and in ``F``; ``None``: there is no such type. ``needs_coordinate``: whether
-    the joint must have coordinates, because something acts on them or reads them. ``actuation``: ``none``,
-    ``torque`` or ``motion`` for each speed; the three of a ball motion are equal.
+    - ``closure``: the type of the constraint that replaces the joint where it closes a loop. ``None``: the
+      joint cannot close a loop.
+    - ``closure_frames``: the poses of the frames of this constraint, in ``B`` and in ``F``.
+    - ``needs_coordinate``: whether the joint must have coordinates, because a parameter of its block, such
+      as a target or a spring, refers to them, or a coupling does.
+    - ``actuation``: ``none``, ``torque`` or ``motion`` for each speed; the three of a ball motion are equal.
     """
 
     motions: tuple[Motion, ...]

@@ -28,10 +28,11 @@ def sample_frame(run: str, first: int, time: NDArray[np.float64], signals: NDArr
 def thinned(
     time: NDArray[np.float64], signals: NDArray[np.float64], stride: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Replace each ``stride`` samples by two: minimum and maximum of each signal, in their order of time.
+    """Replace every ``stride`` samples by two: minimum and maximum of each signal, in their order of time.
 
-    ``time`` is (N,) s, ``signals`` (ny, N). A plot of the result looks the same if one pixel covers more than
-    a stride. An incomplete stride at the end is reduced in the same way.
+    ``time`` is (N,) s, ``signals`` (ny, N). The times of the two are those of the first and the middle sample
+    of the stride, for all signals. A plot of the result looks the same if one pixel covers more than a
+    stride. An incomplete stride at the end is reduced in the same way.
     """
     whole = time.size - time.size % stride
     if whole == 0:

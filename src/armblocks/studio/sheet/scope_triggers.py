@@ -1,4 +1,4 @@
-"""The trigger of the scopes in the editor: its edit, its message, and its signal after renames of blocks."""
+"""The trigger of the scopes in the editor: edits, messages to clients, and renamed blocks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from armblocks.studio.sheet.renames import path_after
 
 
 def with_trigger(edit: SetScopeTrigger, diagram: Diagram, _context: object) -> Diagram:
-    """Return the diagram with another trigger of its scopes."""
+    """Return the diagram with the trigger of an edit; without one, its scopes have no trigger."""
     trigger = ScopeTrigger(**edit.trigger.model_dump()) if edit.trigger else None
     return dataclasses.replace(diagram, scope_trigger=trigger)
 
@@ -23,7 +23,10 @@ def trigger_settings(diagram: Diagram) -> ScopeTriggerSettings | None:
 
 
 def with_consistent_trigger(diagram: Diagram, renamed: Mapping[str, str]) -> Diagram:
-    """Return the diagram with the signal of its trigger under the new path of a renamed block."""
+    """Return the diagram after a rename: the trigger names its signal by the new path of the block.
+
+    ``renamed``: new paths of blocks by old path.
+    """
     trigger = diagram.scope_trigger
     if trigger is None or (signal := path_after(trigger.signal, renamed)) == trigger.signal:
         return diagram
