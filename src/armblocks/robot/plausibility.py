@@ -46,9 +46,13 @@ class PlausibilityFinding:
 def plausibility_findings(robot: Robot) -> tuple[PlausibilityFinding, ...]:
     """Values that probably have a wrong unit or sign; they are warnings, not errors.
 
-    Findings are: limits of revolute joints beyond a full turn (degrees?), a reach beyond 20 m and inertias
-    that are far too large for the robot's size (millimetres?), gravity that points upwards, limits of coupled
-    joints that :attr:`Robot.limits` cannot include, named configurations outside the limits.
+    Findings are:
+
+    - a limit of a rotation beyond a full turn in either direction, except of screw joints (degrees?),
+    - a reach beyond 20 m, or a link whose radius of gyration exceeds three times the reach (millimetres?),
+    - gravity with a component along +z,
+    - limits of coupled joints that :attr:`Robot.limits` cannot include,
+    - named configurations outside the limits.
     """
     return tuple(_findings(robot))
 

@@ -50,8 +50,8 @@ class ResettableIntegrator(Block):
     - The initial value may come from a port: always (``external``), or only at resets (``external at
       resets``), so that this value may depend on y.
     - The ``state_port`` outputs the state before a reset, so that a loop through this port is not algebraic.
-      At the start, ``external`` gives y and the state port the value of the port; a loop through it is then
-      algebraic.
+      At the start with ``external``, y and the state port have the value of the port of the initial value; a
+      loop through the state port is then algebraic.
     - With ``limit_output`` y stays between ``lower`` and ``upper``.
     """
 

@@ -59,9 +59,11 @@ class ZeroPole(SectionsByRoots):
 class AnalogFilter(FilterByBand):
     """An analog filter; the Butterworth low pass has |y / u| = 1 / sqrt(1 + (w / edge)^(2 order)).
 
-    ``chebyshev1`` has a steeper roll-off and ripple in the pass band. ``chebyshev2`` has ripple in the stop
-    band, and its edge is the beginning of the stop band. Band filters have twice as many poles as the order.
-    The filter is initially at rest.
+    - ``butterworth`` has no ripple.
+    - ``chebyshev1`` has a steeper roll-off and ripple in the pass band.
+    - ``chebyshev2`` has ripple in the stop band, and its edge is the beginning of the stop band.
+
+    Band filters have twice as many poles as the order. The filter is initially at rest.
     """
 
     title: ClassVar[str] = "Analog Filter Design"

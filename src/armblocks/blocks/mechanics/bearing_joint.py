@@ -14,7 +14,7 @@ from armblocks.robot.joints import AxisMotion, Motion
 
 @dataclass(frozen=True, kw_only=True)
 class BearingJoint(JointBlock):
-    """F translates along the z axis of B, then rotates about its x, then y, then z axis."""
+    """F translates along the z axis of B, then rotates about its own x, y and z axes, in this order."""
 
     title: ClassVar[str] = "Bearing Joint"
     sign: ClassVar[FaceSign] = Words("Bearing")

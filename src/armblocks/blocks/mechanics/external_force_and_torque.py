@@ -19,9 +19,12 @@ from armblocks.spatial.vectors import ZERO, Vector, add, scale
 
 @dataclass(frozen=True, kw_only=True)
 class ExternalForceAndTorque(MechanicsBlock):
-    """A force and a torque on the body at frame F, at its origin, given by signals.
+    """A force and a torque from input signals on the body at frame F; the force acts at the origin of F.
 
-    ``resolution``: the axes of the signals: the axes of the World Frame or of F.
+    ``resolution`` selects the axes of the signals:
+
+    - ``world``: the axes of the World Frame.
+    - ``attached``: the axes of F.
     """
 
     title: ClassVar[str] = "External Force and Torque"

@@ -36,6 +36,7 @@ class JacobianInverse(Block):
     For a Jacobian of m rows and n columns:
 
     - ``inverse`` needs m = n and is not finite at a singular configuration.
+    - ``transpose`` is J', which converts a force at the tool to joint torques.
     - ``pseudo`` gives the joint speeds of least norm (n >= m), or those with the smallest squared error of
       the velocity (n < m). It needs full rank.
     - ``damped`` (damped least squares) is finite everywhere, with an error near singular configurations.

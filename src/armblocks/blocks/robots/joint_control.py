@@ -117,6 +117,7 @@ class JointPD(Block):
 class GravityCompensation(Block):
     """PD with gravity compensation: tau = g(q) + Kp (qr - q) - Kd qd, whose only equilibrium is qr.
 
+    This holds for a model equal to the robot and without Coulomb friction, which can stop a joint before qr.
     In robots with closed loops only the joints with a motor are controlled, and only they have torques.
     """
 
@@ -223,7 +224,8 @@ class FeedForward(Block):
     """Feedforward and PD: tau = rne(qr, qdr, qddr) + Kp (qr - q) + Kd (qdr - qd).
 
     In robots with closed loops only the joints with a motor are controlled, and only they have torques. The
-    desired motion of the other joints follows from the constraints, with their inputs as the initial guess.
+    desired motion of the other joints follows from the constraints; the inputs of these joints are the
+    initial guess.
     """
 
     title: ClassVar[str] = "Feed-Forward Controller"

@@ -99,8 +99,8 @@ class Trapezoidal(Block):
 class MultiSegment(Block):
     """Linear segments between points with parabolic blends: segment k takes durations(k), in s.
 
-    This is the toolbox's ``mstraj`` for given times: q = p1 + sum of (p(k+1) - p(k)) g_k(t), where each g_k
-    rises from 0 to 1.
+    q = p1 + sum of (p(k+1) - p(k)) g_k(t), where each g_k rises from 0 to 1. The toolbox's ``mstraj`` and
+    ``ab.mstraj`` have quintic blends instead of parabolic ones.
 
     - Each blend takes ``blend``, in s. The speed changes linearly in a blend and is constant between blends.
     - The blend at a point begins at the sum of the durations before this point; the first begins at t = 0.

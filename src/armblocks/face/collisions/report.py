@@ -30,8 +30,10 @@ class CollisionPair(metaclass=ArgumentErrors):
 class CollisionReport(metaclass=ArgumentErrors):
     """Distances along a motion. ``print`` shows the pairs in the order of contact, then of distance.
 
+    - ``name``: the name of the robot.
     - ``samples``: number of checked configurations.
-    - ``unit``: of times, s or none.
+    - ``unit``: the unit of times: ``"s"``, or ``""`` if times are numbers of configurations.
+    - ``pairs``: the compared pairs, in this order.
     - ``excluded``: the pairs that are not compared, with reasons, apart from pairs that a joint connects.
     - ``drawn``: links without shapes in their file, whose bodies are the default shapes of the drawing.
     """
