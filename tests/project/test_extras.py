@@ -58,7 +58,7 @@ for name in ("a.mat", "a.parquet"):
     Path(name).write_bytes(b"")
 linear = ab.linearize(model)
 
-said = {}
+messages = {}
 for name, call in {
     "data frame": result.to_dataframe,
     "save parquet": lambda: result.save("x.parquet"),
@@ -78,12 +78,12 @@ for name, call in {
     "mp4": lambda: ab.load_robot("puma560").animate([[0.0] * 6] * 2, 0.1, save="x.mp4"),
 }.items():
     try:
-        said[name] = repr(call())
+        messages[name] = repr(call())
     except ab.errors.MissingLibraryError as error:
-        said[name] = str(error)
+        messages[name] = str(error)
     except BaseException as error:
-        said[name] = repr(error)
-Path("said.json").write_text(json.dumps(said))
+        messages[name] = repr(error)
+Path("messages.json").write_text(json.dumps(messages))
 sys.exit(app(["studio", "--no-browser"], standalone_mode=False))
 """
 
@@ -108,7 +108,7 @@ def test_the_core_runs_without_the_extras_and_names_missing_libraries(tmp_path: 
     assert written == {"report.html", "diagram.svg", "data.csv", "figures"}
     assert {path.suffix for path in (tmp_path / "report" / "figures").iterdir()} == {".svg"}
     assert not (tmp_path / "other").exists()
-    message = json.loads((tmp_path / "said.json").read_text(encoding="utf-8"))
+    message = json.loads((tmp_path / "messages.json").read_text(encoding="utf-8"))
     expected = {
         "data frame": ("pandas", "data", "data frames"),
         "save parquet": ("pyarrow", "data", "Parquet files"),

@@ -1,4 +1,4 @@
-/** The names of a legend that has too little room: the shorter names are whole, the longer ones are cut. */
+/** The names of a legend with too little space: the shorter names are whole, the longer ones are cut. */
 
 const ELLIPSIS = '…'
 /** Least number of letters of a cut name, without the ellipsis; names with two more are whole. */

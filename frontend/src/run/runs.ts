@@ -37,7 +37,7 @@ const MAX_BYTES = 384 * 2 ** 20
 interface Runs {
   runs: StoredRun[]
   /**
-   * Tried values of tunable parameters by `block.parameter`; they are not in the model until they are kept.
+   * Tried values of tunable parameters by `block.parameter`; they are not saved in the model.
    */
   trialValues: Record<string, unknown>
   /** Simulated seconds per second of clock time; null: as fast as possible. */

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _ROUNDS = 50
-_SETTLED = 1e-8
+_CONVERGED = 1e-8
+"""The noise estimates have converged when they change by at most this fraction in one round."""
 RANK_TOLERANCE = 1e-10
 """Singular values of the matrix with columns of length 1 below this fraction of the largest value are 0."""
 
@@ -95,10 +96,10 @@ def weighted_fit(sensors: Sequence[Rows], start: Array, deviations: Array | None
     fit = _fit(sensors, start, sigma)
     for _ in range(_ROUNDS):
         new = np.array([_deviation(rows, fit, old, size) for rows, old, size in zip(sensors, sigma, sizes)])
-        settled = bool(np.all(np.abs(new - sigma) <= _SETTLED * sigma))
+        converged = bool(np.all(np.abs(new - sigma) <= _CONVERGED * sigma))
         sigma = new
         fit = _fit(sensors, start, sigma)
-        if settled:
+        if converged:
             break
     return fit
 

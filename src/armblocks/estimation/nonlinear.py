@@ -19,7 +19,8 @@ model has no result."""
 RANK_TOLERANCE = 1e-7
 """Singular values of the derivatives with columns of length 1 below this fraction of the largest are 0."""
 _ROUNDS = 6
-_SETTLED = 1e-3
+_CONVERGED = 1e-3
+"""The noise estimates have converged when they change by at most this fraction in one round."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -122,10 +123,10 @@ def nonlinear_fit(
         if deviations is not None:
             break
         new = _deviations(search.best[2], search.sigma, scales)
-        settled = bool(np.all(np.abs(new - search.sigma) <= _SETTLED * search.sigma))
+        converged = bool(np.all(np.abs(new - search.sigma) <= _CONVERGED * search.sigma))
         one_sensor = len(scales) == 1  # the weight of a single sensor has no effect on the minimum
         search.reweighted(new)
-        if settled or stopped or one_sensor:
+        if converged or stopped or one_sensor:
             break
     return _summary(search, message, stopped=stopped, known_noise=deviations is not None)
 

@@ -316,9 +316,9 @@ def _robust_fit(rows: _Rows, start: Array) -> tuple[list[Rows], LinearFit]:
         sensors = rows.sensors(huber_weights(residuals, deviations))
         new = weighted_fit(sensors, start, deviations)
         errors = np.sqrt(np.maximum(np.diag(new.covariance), 1e-300))
-        settled = bool((np.abs(new.values - fit.values) <= 1e-3 * errors).all())
+        converged = bool((np.abs(new.values - fit.values) <= 1e-3 * errors).all())
         fit = new
-        if settled:
+        if converged:
             break
     residuals = rows.residuals(fit.values)
     inliers, squares = sandwich_factors(residuals, fit.deviations)

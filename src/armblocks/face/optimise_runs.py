@@ -121,7 +121,7 @@ class Runs:
                 "the variables and the parameters of the scenarios together change the equations",
                 where=self._where,
                 allowed="scenarios whose equations do not depend on the variables",
-                fix="optimise each of these scenarios by itself",
+                fix="optimise each of these scenarios separately",
             )
 
         def groups_of(begin: int, end: int) -> list[RunGroup]:

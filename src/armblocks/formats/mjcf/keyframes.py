@@ -1,7 +1,7 @@
 """Named configurations as key frames of MJCF: ``<keyframe> <key name qpos>``.
 
 ``qpos`` has the coordinates of all joints of the tree in the order of the file, those of equality constraints
-included. Angles are in rad, whatever ``<compiler angle>`` says. A free joint has the pose of its body in the
+included. Angles are in rad for every ``<compiler angle>``. A free joint has the pose of its body in the
 world. Source: MuJoCo documentation, *XML reference*, *keyframe*.
 """
 

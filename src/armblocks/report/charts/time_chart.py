@@ -204,7 +204,8 @@ def _end_labels(panel: Panel, y_scale: Scale, right: float) -> list[Mark]:
     for trace in panel.traces:
         finite = trace.values[np.isfinite(trace.values)]
         preferred.append(y_scale(float(finite[-1])) if len(finite) else y_scale.start)
-    # Lines that end at one point are named in their own order, whatever the rounding errors of their values.
+    # Positions are compared in whole px: labels of lines that end at one point have the order of the lines,
+    # in spite of rounding errors.
     order = sorted(range(len(preferred)), key=lambda k: (round(preferred[k]), k))
     low, high = y_scale.end - _LABEL_OVERHANG, y_scale.start + _LABEL_OVERHANG
     positions = separated_positions([preferred[k] for k in order], _LABEL_STEP, low, high)
