@@ -23,6 +23,7 @@ from armblocks.blocks import (
     RateLimiterContinuous,
     RateLimiterDynamic,
     Relay,
+    ResettableIntegrator,
     Rounding,
     Saturation,
     SecondOrderIntegratorLimited,
@@ -31,6 +32,7 @@ from armblocks.blocks import (
     Step,
     StickSlipFriction,
     Sum,
+    ZeroOrderHold,
 )
 from armblocks.diagram import Block
 from armblocks.errors import InputError, SimulationError
@@ -182,7 +184,7 @@ def test_a_condition_that_stands_at_its_limit_until_an_event() -> None:
         builder.add("x", Integrator(), both)
         return builder.build()
 
-    with pytest.raises(SimulationError, match=r"several events coincide at 0\.4 s, one of 'both'"):
+    with pytest.raises(SimulationError, match=r"several events coincide at 0\.3 s, one of 'both'"):
         ab.sensitivity(diagram(0.0), "v.initial", "x", stop_time=1.0)
     # Without a change of the initial value v leaves 0 when the step occurs.
     result = ab.sensitivity(diagram(0.0), ["u.time", "u.final"], "x", stop_time=1.0)
@@ -229,3 +231,37 @@ def test_a_jump_that_the_run_leaves_at_once_has_no_derivative() -> None:
     ):
         with pytest.raises(InputError, match=r"starts exactly at a limit or at a jump|an event of 'y'"):
             ab.sensitivity(case, name, "x", stop_time=1.0)
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+@pytest.mark.parametrize("speed", [0.0, 1.0])
+@pytest.mark.parametrize(
+    "block", [Sign(), CompareToZero(relation=">="), Relay(on_point=0.0, off_point=-3.0), Abs()]
+)
+def test_a_state_that_is_reset_to_a_limit(block: Block, speed: float, sampled: bool) -> None:
+    """A change of its new value, or of its new speed 0, moves the event behind or before the reset."""
+    builder = ab.DiagramBuilder("reset")
+    edge = builder.add("edge", Step(time=1.0 if not sampled else 0.9))
+    edge = builder.add("tick", ZeroOrderHold(sample_time=0.25), edge) if sampled else edge
+    start = builder.add("start", Step(time=0.4, initial=-30.0, final=0.0))
+    start_speed = builder.add("start speed", Step(time=0.4, initial=0.1, final=speed))
+    settings = {"initial_condition_source": "external", "external_reset": "rising"}
+    force = builder.add("force", Constant(value=1.0))
+    v = builder.add("v", ResettableIntegrator(**settings), force, edge, start_speed)
+    x = builder.add("x", ResettableIntegrator(**settings), v, edge, start)
+    builder.add("integral", Integrator(), builder.add("y", block, x))
+    diagram = builder.build()
+
+    def derivative(name: str) -> float:
+        return float(ab.sensitivity(diagram, name, "integral", stop_time=2.0)["integral", name][-1])
+
+    if isinstance(block, Abs):
+        assert derivative("start.final") == pytest.approx(1.0, rel=1e-9)
+        assert derivative("start speed.final") == pytest.approx(0.5, rel=1e-9)
+        return
+    for name in ("start.final", "start speed.final"):
+        if name == "start.final" or speed == 0.0:
+            with pytest.raises(SimulationError, match="several events coincide at 1 s, one of 'y'"):
+                derivative(name)
+        else:
+            assert derivative(name) == pytest.approx(0.0, abs=1e-9)

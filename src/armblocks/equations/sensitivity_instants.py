@@ -13,7 +13,8 @@ For a single jump this is the saltation matrix of Hiskens and Pai, IEEE Trans. C
 the derivative of this time. For the arrival of a delayed jump see
 :mod:`armblocks.equations.sensitivity_delays`. A guard that fires because of one of these jumps belongs to the
 same instant. If instants with different derivatives coincide, the instant of this guard is unknown. ``mixed``
-then stores the time and one of the guards.
+then stores the time and one of the guards. A guard that is 0 after an instant is stored likewise, see
+:mod:`armblocks.equations.sensitivity_ties`.
 
 Each jump at an instant is a call of ``reset``. The first call replaces S by S*. An added guard fires after
 all other guards; its call replaces S* by S. There are two such guards, which alternate, because a guard that
@@ -46,6 +47,7 @@ from casadi import (
 from armblocks.equations.hybrid_system import EventRanks
 from armblocks.equations.sensitivity_delays import DelayedSensitivities
 from armblocks.equations.sensitivity_layout import Columns
+from armblocks.equations.sensitivity_ties import Ties
 
 LOCATION_TOLERANCE = 1e-8
 """A guard whose zero is within this relative time counts as located; otherwise it has jumped."""
@@ -53,9 +55,6 @@ SAME_INSTANT = 2.0**-48
 """Relative tolerance of equal times."""
 SAME_DERIVATIVE = 1e-6
 """Relative tolerance of equal time derivatives of events."""
-STANDING = 1e-12
-"""Relative time after an instant within which a guard that stood at 0 leaves it, and the largest value of a
-guard that stands at 0."""
 JUST_BEFORE = 1.0 - 2.0**-49
 """Factor from a time to a time just before it, and before all breakpoints of the same instant."""
 NEVER = -1.0
@@ -72,18 +71,15 @@ class Instants:
         self.guards = len(system.guard_directions)
         self.time = c.add("instant", 1, NEVER)
         """The time of the present or latest instant, s."""
-        self.time_before = c.add("instant before", 1, NEVER)
         self.known, self.open = c.add("known", 1), c.add("open", 1)
         """Whether ``s_p`` of the instant is known, and whether S is S*, the derivative along the instant."""
         self.arms = c.add("arms", 2, 1.0)
         """The values of the two added guards that end an instant; a change of sign makes a guard fire."""
         self.mixed, self.ticked = c.add("mixed", 2, [NEVER, 0.0]), c.add("ticked", 1)
+        self.tied = c.add("tied", 2, [NEVER, 0.0])
+        """The time of the latest instant and a guard that is 0 after it, as in ``mixed``."""
         self.located = c.add("located", self.guards)
-        self.stands, self.stood = c.add("stands", self.guards), c.add("stood", self.guards)
-        """Whether each guard was 0 and did not move just before the present instant, and the one before."""
         self.instant_p = [c.add(f"instant by {name}", 1) for name in c.names]
-        self.before_p = [c.add(f"instant before by {name}", 1) for name in c.names]
-        """The derivatives of the time of the instant before the present one."""
         self.flow = c.value(system.derivative)
         delays.set_flow(self.flow)
         captured = c.value(system.update, SX.zeros(len(system.clocks)))
@@ -93,6 +89,7 @@ class Instants:
         self.g = c.value(system.guards)
         self.g_rate = self.over_time(self.g)
         self.times, self.moving_breakpoints = self._breakpoints()
+        self.ties = Ties(columns, delays.rate_along, self.g, self.g_rate) if self.guards else None
 
     def _breakpoints(self) -> tuple[SX, list[int]]:
         """The breakpoints, and the indices of breakpoints that depend on the parameters."""
@@ -167,18 +164,14 @@ class Instants:
         located = logic_and(is_near, logic_and(self.g_rate != 0.0, c.t > 0.0))
         left_values = {
             "instant": c.t,
-            "instant before": self.time,
             "known": SX(0.0),
             "open": SX(0.0),
             "ticked": SX(0.0),
             "located": located,
-            "stands": logic_and(fabs(self.g) <= STANDING, self.g_rate == 0.0),
-            "stood": self.stands,
             "rate of left limits": vertcat(
                 *(self.over_time(self.captured)[k] for k in self.left_limits), SX(0, 1)
             ),
             **{f"instant by {name}": SX(0.0) for name in c.names},
-            **{f"instant before by {name}": latest for name, latest in zip(c.names, self.instant_p)},
             **self.delays.begin(),
         }
         added = {
@@ -193,6 +186,9 @@ class Instants:
             number = if_else(self.located[k], float(k + 1), number)
         mixes = logic_and(logic_and(logic_not(begins), moved), self.mixed[0] < 0.0)
         added["mixed"] = if_else(mixes, vertcat(c.t, number), self.mixed)
+        ends_tied = logic_and(logic_and(begins, self.tied[0] >= 0.0), self.mixed[0] < 0.0)
+        added["mixed"] = if_else(ends_tied, self.tied, added["mixed"])
+        added["tied"] = if_else(begins, SX([NEVER, 0.0]), self.tied)
         return vertcat(updated, *Z, *added.values())
 
     def _captured_by(self, updated: SX, k: int) -> SX:
@@ -260,6 +256,10 @@ class Instants:
             # A signal that jumped before the first reset jumped at a tick, whose time is fixed.
             **d.after(arrived, jumped, [if_else(caused, instant, 0.0) for instant in instants]),
         }
+        if self.ties is not None:
+            number = self.ties.first(x, z, instants, opened)
+            ties = logic_and(number > 0.0, c.t > 0.0)
+            changes["tied"] = if_else(ties, vertcat(c.t, number), SX([NEVER, 0.0]))
         added = [changes.get(name, present) for name, present in c.added.items()]
         return vertcat(*x), vertcat(*z, *added)
 
@@ -296,23 +296,12 @@ class Instants:
             mean = dot(if_else(marks, derivatives, 0.0), marks) / fmax(dot(marks, marks), 1.0)
             differs = fabs(derivatives - mean) > SAME_DERIVATIVE * (1.0 + fabs(mean))
             differs = logic_or(logic_and(logic_or(marks, later), differs), logic_and(follows, mean != 0.0))
-            leaves = vertcat(self._leaves_zero(k), SX.zeros(marks.numel() - self.guards))
-            differs = logic_or(differs, logic_and(marks, leaves))
             differing = logic_or(differing, differs)
             instants.append(if_else(self.known, known, mean))
         last = SX(0.0)
         for number in range(differing.numel()):
             last = if_else(differing[number], float(number + 1), last)
         return instants, if_else(self.known, 0.0, last)
-
-    def _leaves_zero(self, k: int) -> SX:
-        """Whether each guard was 0 before it began to move at the latest instant, and depends on parameter
-        ``k`` there: with any other value of the parameter it is not 0."""
-        c = self.columns
-        just_now = logic_and(self.stood, c.t - self.time_before <= STANDING * c.t)
-        by_guards = self.by_parameter(self.g, k)
-        moved = fabs(by_guards + self.g_rate * self.before_p[k])
-        return logic_and(just_now, moved > SAME_DERIVATIVE * (1.0 + fabs(by_guards)))
 
     def _fire_later(self, own: SX, others: SX) -> SX:
         """Whether each guard has a located zero now and a higher rank than the guards that fire."""

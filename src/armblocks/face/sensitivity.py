@@ -15,7 +15,7 @@ from armblocks.argument_errors import ArgumentErrors
 from armblocks.diagram import Diagram
 from armblocks.diagram.mask_tuning import mask_parameters, with_mask_parameters
 from armblocks.equations import HybridSystem, Signature, Slot
-from armblocks.equations.sensitivity import MIXED, sensitivity_system
+from armblocks.equations.sensitivity import MIXED, TIED, sensitivity_system
 from armblocks.equations.sensitivity_layout import entry_name, sensitivity_name
 from armblocks.errors import InputError, SimulationError, UnknownNameError, counted
 from armblocks.face.linearizing import resolved_diagram
@@ -143,11 +143,12 @@ def _parameter(system: HybridSystem, diagram: Diagram, name: str) -> Slot:
 
 def check_coinciding_events(compiled: CompiledSystem, run: SimulationResult) -> None:
     """Raise ``SimulationError`` for coinciding events that a parameter change would separate."""
-    entry = compiled.discrete.ranges.get(MIXED)
-    if entry is None or run.final_state is None:
+    if MIXED not in compiled.discrete.ranges or run.final_state is None:
         return
-    time, guard = run.final_state.discrete[entry]
-    if time >= 0.0:
+    for name in (MIXED, TIED):
+        time, guard = run.final_state.discrete[compiled.discrete.ranges[name]]
+        if time < 0.0:
+            continue
         raise SimulationError(
             f"several events coincide at {time:.9g} s, one of '{compiled.guard_names[int(guard) - 1]}' among "
             "them, and a parameter change would separate them: the derivative does not exist",
