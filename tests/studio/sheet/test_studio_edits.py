@@ -203,7 +203,7 @@ def test_wires_are_moved_reconnected_and_added_in_one_step() -> None:
     assert [str(wire) for wire in document.diagram.connections] == ["sine/y -> next/u"]
     document.undo()
     document.edit(AddBlocks(blocks=[], wires=[Wire(source="gain/y", target="next/u")]))
-    assert document.undo_title == "connect 1 wire"
+    assert document.undo_title == "connect gain/y to next/u"
     document.edit(RemoveBlocks(blocks=["gain"], reconnections=[Wire(source="sine/y", target="next/u")]))
     assert [str(wire) for wire in document.diagram.connections] == ["sine/y -> next/u"]
     document.undo()

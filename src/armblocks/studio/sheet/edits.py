@@ -121,7 +121,11 @@ def applied(
 
 def _addition_title(edit: AddBlocks) -> str:
     names = [block.name for block in edit.blocks]
-    return f"add {_name_list(names)}" if names else f"connect {_count_text(edit.wires, 'wire')}"
+    if names:
+        return f"add {_name_list(names)}"
+    if len(edit.wires) == 1:
+        return f"connect {edit.wires[0].source} to {edit.wires[0].target}"
+    return f"connect {_count_text(edit.wires, 'wire')}"
 
 
 @EDITS.on(AddBlocks, _addition_title)
@@ -139,7 +143,12 @@ def _add(edit: AddBlocks, diagram: Diagram, context: EditContext) -> Diagram:
     return _with_wires(edit.wires, _without_removed(RemoveBlocks(wires=edit.instead), added), replace=False)
 
 
-@EDITS.on(PasteBlocks, lambda edit: "paste")
+def _paste_title(edit: PasteBlocks) -> str:
+    names = [name for name in edit.names.values() if not name.startswith("/")]
+    return f"add {_name_list(names)}" if names else "paste"
+
+
+@EDITS.on(PasteBlocks, _paste_title)
 def _paste(edit: PasteBlocks, diagram: Diagram, context: EditContext) -> Diagram:
     copied = context.read_diagram(edit.text, "the copied blocks")
     _check_room(diagram, len(copied.blocks))
