@@ -47,7 +47,7 @@ export const KEYS: KeyGroup[] = [
       ['double click', 'Open a block, or edit its name; after a run show the chart of a scope'],
       ['double click on a wire', 'Name its signal'],
       ['double click on the empty sheet', 'Add a block'],
-      ['middle button', 'Move the sheet'],
+      ['middle button, Space+drag', 'Move the sheet'],
       ['Ctrl+wheel', 'Zoom'],
       ['rest on a subsystem', 'Show a picture of the sheet inside; also with the keyboard focus'],
       ['Esc', 'Cancel the drag; close the picture'],

@@ -21,6 +21,25 @@ export function removeSelected(selectedWires: ReadonlySet<string>): void {
   select([])
 }
 
+/** Fit the sheet when space is released, unless the pointer was pressed: space and a drag move the sheet. */
+function fitAtRelease({ isTrusted, repeat }: KeyboardEvent): void {
+  if (repeat) return
+  // A held key is replayed without a release.
+  if (!isTrusted) return sheetView.fit?.()
+  const listeners = new AbortController()
+  const { signal } = listeners
+  addEventListener('pointerdown', () => listeners.abort(), { signal, capture: true })
+  addEventListener(
+    'keyup',
+    ({ key }) => {
+      if (key !== ' ') return
+      listeners.abort()
+      sheetView.fit?.()
+    },
+    { signal },
+  )
+}
+
 /** The keys of the sheet: active while the sheet or nothing has the focus. */
 export function useSheetKeys(
   selectedWires: ReadonlySet<string>,
@@ -58,7 +77,7 @@ export function useSheetKeys(
     } else if (event.key === '>') showDialog('connect')
     else if (event.key === '?') showDialog('keys')
     else if (event.key === '"') addNote()
-    else if (event.key === ' ') sheetView.fit?.()
+    else if (event.key === ' ') fitAtRelease(event)
     else if (event.key === '+' || event.key === '=') sheetView.zoom?.(ZOOM_STEP)
     else if (event.key === '-') sheetView.zoom?.(1 / ZOOM_STEP)
     else if (event.key === '1') sheetView.zoom?.(null)
@@ -72,7 +91,8 @@ export function useSheetKeys(
   }
 
   const onKeyDown = (event: KeyboardEvent) => {
-    if (event.defaultPrevented || !isForSheet(event)) return
+    // React Flow prevents the default action of space.
+    if ((event.defaultPrevented && event.key !== ' ') || !isForSheet(event)) return
     const command = commandOf(event, true)
     if (command) {
       if (command.enabled?.() ?? true) command.run()

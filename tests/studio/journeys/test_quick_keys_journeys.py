@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 
+import pytest
 from accessibility import axe
 from browsers import IN_FIREFOX
-from building import add, block, edge, middle, new_diagram, run, select_block, wait_until
+from building import add, block, edge, keep_view, middle, new_diagram, run, select_block, wait_until
 from playwright.sync_api import Page, expect
 
 
@@ -33,6 +34,7 @@ def test_each_of_several_quick_copies_is_made_and_none_hides_another(sheet: Page
         sheet.keyboard.press("Control+d")
     names = ["PID"] + [f"PID {k}" for k in range(2, 7)]
     expect(block(sheet, names[-1])).to_have_class(re.compile("selected"))
+    last_edit(sheet, "add PID 6")
     assert len({position(sheet, name) for name in names}) == len(names)
 
 
@@ -250,3 +252,31 @@ def test_a_proposed_wire_is_accepted_and_removed_with_the_keyboard(sheet: Page) 
     expect(block(sheet, "Scope")).to_have_class(re.compile("selected"))  # until the next Escape
     sheet.keyboard.press("Escape")
     expect(sheet.locator(".react-flow__node.selected")).to_have_count(0)
+
+
+def test_space_fits_the_sheet_and_a_drag_with_space_moves_it(sheet: Page) -> None:
+    viewport = sheet.locator(".react-flow__viewport")
+
+    def view() -> tuple[float, float, float]:
+        matrix = viewport.evaluate("element => new DOMMatrix(element.style.transform)")
+        return matrix["a"], matrix["e"], matrix["f"]
+
+    select_block(sheet, "PID")
+    sheet.keyboard.press("1")
+    wait_until(sheet, lambda: view()[0] == 1)
+    _, left, top = view()
+    pane = sheet.locator(".react-flow__pane").bounding_box()
+    assert pane is not None
+    x, y = pane["x"] + 80, pane["y"] + 190  # no block or wire is there
+    sheet.keyboard.down(" ")
+    expect(sheet.locator(".react-flow__pane.draggable")).to_have_count(1)
+    sheet.mouse.move(x, y)
+    sheet.mouse.down()
+    sheet.mouse.move(x + 40, y + 20, steps=4)
+    sheet.mouse.up()
+    sheet.keyboard.up(" ")
+    wait_until(sheet, lambda: view() == pytest.approx((1, left + 40, top + 20), abs=1))
+    keep_view(sheet)
+    assert view()[0] == 1
+    sheet.keyboard.press(" ")
+    wait_until(sheet, lambda: view()[0] < 0.8)  # the whole model is wider than the panel
