@@ -15,14 +15,17 @@ from armblocks.blocks import (
     Backlash,
     Constant,
     Derivative,
+    DifferentialIkine,
     EnabledSubsystem,
     Expression,
     FirstOrderHold,
+    Fkine,
     FromFile,
     Gain,
     HitCrossing,
     Inport,
     Integrator,
+    JTraj,
     Modulo,
     Outport,
     Ramp,
@@ -443,3 +446,41 @@ def test_the_sensitivity_to_an_indexed_table_is_refused_and_others_are_correct()
     result = ab.sensitivity(diagram, ["gain.gain"], ["sum"])
     # d/dk of k times the integral of the table is that integral: 0, 0.75, 2, 3, 3 every half second
     assert result["sum", "gain.gain"] == pytest.approx([0.0, 0.75, 2.0, 3.0, 3.0], rel=1e-5, abs=1e-6)
+
+
+def test_the_rotation_error_of_an_arm_passes_zero_in_a_run_with_derivatives() -> None:
+    """A condition for a rotation of zero would divide zero by zero at its event."""
+    robot = ab.load_robot("twolink").robot
+    builder = ab.DiagramBuilder("passes")
+    motion = builder.add(
+        "motion",
+        JTraj(
+            q0=[0.34094470689079426, 0.5996500799331719],
+            qf=[0.9687810390959505, 1.3432089519442145],
+            tmax=7.278617312138701,
+        ),
+    )
+    ikine = DifferentialIkine(
+        robot=robot,
+        q0=[0.5678733792354316, 0.9749222175472892],
+        gain=10.809977675593643,
+        damping=0.09330546833103433,
+        region=0.022557222485450844,
+        max_speed=2.870894557652534,
+    )
+    target = builder.add("target", Fkine(robot=robot), motion["q"])
+    velocity = builder.add("velocity", Constant(value=[0.0] * 6))
+    speeds = builder.add("ikine", ikine, target, velocity)
+    for port in ("q", "qd"):
+        late = builder.add(f"late {port}", TransportDelay(delay=0.37), speeds[port])
+        builder.add(f"integral of {port}", Integrator(), late)
+    diagram, names = builder.build(), ("ikine.gain", "motion.tmax")
+    settings = {"rtol": 1e-10, "atol": 1e-11, "stop_time": 1.0, "sample_time": 3.0 / 37.3, "solver": "rk45"}
+    found = ab.sensitivity(diagram, names, "integral of q", **settings)
+    for name in names:
+        value = diagram.blocks[name.partition(".")[0]].parameter_value(name.partition(".")[2])
+        low, high = (
+            ab.simulate(diagram, parameters={name: value + step}, **settings)["integral of q"]
+            for step in (-1e-4, 1e-4)
+        )
+        assert found["integral of q", name] == pytest.approx((high - low) / 2e-4, rel=1e-4, abs=1e-6)

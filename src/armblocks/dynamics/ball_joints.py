@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from casadi import SX, atan2, cos, fabs, if_else, sin, sqrt
+from casadi import SX, atan2, cos, fabs, fmax, if_else, sin, sqrt
 
 from armblocks.robot.joints import AxisMotion, Motion
 from armblocks.robot.robot import Robot
@@ -27,7 +27,7 @@ SHRINK, GROW = 2.0**-520, 2.0**600
 """Factors of quaternions whose squared length is outside ``SQUARES``; powers of two do not round."""
 SQUARES = 1e-280, 1e280
 TINY = 1e-200
-"""Square of an angle below which its sine is replaced by the angle; the difference is below rounding."""
+"""Smallest square of an angle; the sine of its root equals the root."""
 
 
 def ball_rotation(body: Body, q: Sequence[Scalar]) -> Rotation | RotationZ:
@@ -230,16 +230,22 @@ def _product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Quaternion:
 
 def _exponential(half: Vector) -> Quaternion:
     """The unit quaternion of a rotation by twice the vector ``half``."""
-    square = SX(dot(half, half))
-    angle = sqrt(if_else(square > TINY, square, 1.0))
-    x, y, z = scale(if_else(square > TINY, sin(angle) / angle, 1.0), half)
-    return if_else(square > TINY, cos(angle), 1.0), x, y, z
+    angle = _length(half)
+    x, y, z = scale(sin(angle) / angle, half)
+    return cos(angle), x, y, z
 
 
 def _logarithm(quaternion: Quaternion) -> Vector:
     """The vector ``half`` of at most π/2 whose exponential is plus or minus the quaternion's direction."""
     w, x, y, z = quaternion
-    size, square = fabs(w), SX(x * x + y * y + z * z)
-    length = sqrt(if_else(square > TINY, square, 1.0))
-    factor = if_else(square > TINY, atan2(length, size) / length, 1.0 / size)
+    length = _length((x, y, z))
+    factor = atan2(length, fabs(w)) / length
     return scale(if_else(SX(w) < 0.0, -factor, factor), (x, y, z))
+
+
+def _length(vector: Vector) -> SX:
+    """The length of a vector, at least the root of ``TINY``.
+
+    A bound, unlike a condition, causes no event where the vector passes zero.
+    """
+    return sqrt(fmax(SX(dot(vector, vector)), TINY))

@@ -13,9 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from casadi import SX, atan2, cos, dot, hypot, if_else, sin, sqrt, vertcat
+from casadi import SX, atan2, cos, dot, fmax, hypot, if_else, sin, sqrt, vertcat
 
 from armblocks.spatial.rotation import RPY_CONVENTIONS, SINGULAR
+
+SMALLEST = 1e-300
+"""A divisor in place of zero, where the quotient is not used."""
 
 
 def rotation_about_axis(axis: str, angle: SX) -> SX:
@@ -106,7 +109,7 @@ def to_angle_axis(R: SX) -> tuple[SX, SX]:
     quaternion = to_quaternion(R)
     vector = quaternion[1:]
     length = sqrt(dot(vector, vector))
-    axis = if_else(length > 0.0, vector / length, SX.zeros(3))
+    axis = if_else(length > 0.0, vector / fmax(length, SMALLEST), SX.zeros(3))
     return 2.0 * atan2(length, quaternion[0]), axis
 
 
