@@ -56,8 +56,9 @@ def test_a_document_returns_with_its_view_selection_and_run(two: Page) -> None:
     expect(block(two, "PID")).to_have_class(re.compile("selected"))
     expect(block(two, "u")).to_have_count(0)
     tabs(two).filter(has_text="van_der_pol_pid").last.click()
+    expect(two.locator(".title")).to_have_text("van_der_pol_pid")
     expect(block(two, "PID")).to_have_class(re.compile("selected"))
-    assert two.evaluate(VIEW) == before
+    wait_until(two, lambda: two.evaluate(VIEW) == before)
     expect(two.locator(".run-state")).to_contain_text("100.00 s")
     expect(two.locator(".chart").first).to_be_visible()
     axe(two, ".document-tabs")
