@@ -105,7 +105,7 @@ class Manipulability(Block):
     title: ClassVar[str] = "manipulability"
     sign: ClassVar[FaceSign] = Words("√|J Jᵀ|")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="An arm with two links stretches: the measure falls from 1.41 to 1, where the arm is straight.",
+        shows="The measure of an arm with two links falls from 1.41 to 1 while the arm stretches.",
         inputs={"q": driver("JTraj", q0=(0.0, 1.5), qf=(0.5, 0.0), tmax=8.0).named("motion")},
     )
 

@@ -11,7 +11,7 @@ Parameters arrive as JSON values and are checked by the declarations of the bloc
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence, Sized
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from armblocks.blocks import BLOCKS
@@ -33,7 +33,7 @@ from armblocks.diagram.diagram import block_in_scope
 from armblocks.diagram.mask import Scope
 from armblocks.diagram.names import folded
 from armblocks.drawing.wires import moved_bends
-from armblocks.errors import DiagramError, UnknownNameError, counted
+from armblocks.errors import DiagramError, UnknownNameError
 from armblocks.formats.data_files import DataFiles
 from armblocks.studio.documents.edit_table import EditTable
 from armblocks.studio.protocol.messages.sheet_edits import (
@@ -73,7 +73,7 @@ from armblocks.studio.protocol.messages.sheet_edits import (
     SheetNote,
     Wire,
 )
-from armblocks.studio.sheet import bookmarks, parameter_sets, scope_triggers
+from armblocks.studio.sheet import bookmarks, edit_titles, parameter_sets, scope_triggers
 from armblocks.studio.sheet.clipping import ReadDiagram, leaves_horizontally, pasted, reader
 from armblocks.studio.sheet.frame_lines import split_wires, with_lines, without_lines
 from armblocks.studio.sheet.grounding import grounded
@@ -119,16 +119,7 @@ def applied(
 # -- blocks --------------------------------------------------------------------------------------------------
 
 
-def _addition_title(edit: AddBlocks) -> str:
-    names = [block.name for block in edit.blocks]
-    if names:
-        return f"add {_name_list(names)}"
-    if len(edit.wires) == 1:
-        return f"connect {edit.wires[0].source} to {edit.wires[0].target}"
-    return f"connect {_count_text(edit.wires, 'wire')}"
-
-
-@EDITS.on(AddBlocks, _addition_title)
+@EDITS.on(AddBlocks, edit_titles.addition_title)
 def _add(edit: AddBlocks, diagram: Diagram, context: EditContext) -> Diagram:
     where = f"diagram '{diagram.name}'"
     blocks, layout = dict(diagram.blocks), dict(diagram.layout)
@@ -143,12 +134,7 @@ def _add(edit: AddBlocks, diagram: Diagram, context: EditContext) -> Diagram:
     return _with_wires(edit.wires, _without_removed(RemoveBlocks(wires=edit.instead), added), replace=False)
 
 
-def _paste_title(edit: PasteBlocks) -> str:
-    names = [name for name in edit.names.values() if not name.startswith("/")]
-    return f"add {_name_list(names)}" if names else "paste"
-
-
-@EDITS.on(PasteBlocks, _paste_title)
+@EDITS.on(PasteBlocks, edit_titles.paste_title)
 def _paste(edit: PasteBlocks, diagram: Diagram, context: EditContext) -> Diagram:
     copied = context.read_diagram(edit.text, "the copied blocks")
     _check_room(diagram, len(copied.blocks))
@@ -186,13 +172,7 @@ def _new_block(new: NewBlock, scope: Scope, context: EditContext) -> Block:
     return block
 
 
-def _removal_title(edit: RemoveBlocks) -> str:
-    if edit.blocks:
-        return f"delete {_name_list(edit.blocks)}"
-    return f"delete {_count_text(edit.wires, 'wire') if edit.wires else _count_text(edit.notes, 'note')}"
-
-
-@EDITS.on(RemoveBlocks, _removal_title)
+@EDITS.on(RemoveBlocks, edit_titles.removal_title)
 def _remove(edit: RemoveBlocks, diagram: Diagram, _: EditContext) -> Diagram:
     return _with_wires(edit.reconnections, _without_removed(edit, diagram), replace=False)
 
@@ -292,14 +272,7 @@ def _check_port(ref: PortRef, diagram: Diagram, *, output: bool) -> None:
         raise UnknownNameError(f"{side} port", ref.port, ports, where=f"block '{ref.block}' ({block.title})")
 
 
-def _move_title(edit: MoveBlocks) -> str:
-    if edit.instead and edit.places:
-        inserts = len(edit.wires) > len(edit.instead)
-        return f"{'insert' if inserts else 'disconnect'} {_name_list(list(edit.places))}"
-    return f"move {_name_list(list(edit.places)) if edit.places else _count_text(edit.notes, 'note')}"
-
-
-@EDITS.on(MoveBlocks, _move_title)
+@EDITS.on(MoveBlocks, edit_titles.move_title)
 def _move(edit: MoveBlocks, diagram: Diagram, _: EditContext) -> Diagram:
     layout = dict(diagram.layout)
     shifts: dict[str, tuple[float, float]] = {}
@@ -317,13 +290,7 @@ def _move(edit: MoveBlocks, diagram: Diagram, _: EditContext) -> Diagram:
     return _with_wires(edit.wires, _without_removed(RemoveBlocks(wires=edit.instead), moved), replace=False)
 
 
-def _appearance_title(edit: SetAppearance) -> str:
-    if edit.colour is not None:
-        return f"colour {_name_list(edit.blocks)}"
-    return f"{'hide' if edit.name_side == 'hidden' else 'move'} the name of {_name_list(edit.blocks)}"
-
-
-@EDITS.on(SetAppearance, _appearance_title)
+@EDITS.on(SetAppearance, edit_titles.appearance_title)
 def _set_appearance(edit: SetAppearance, diagram: Diagram, _: EditContext) -> Diagram:
     changes = edit.model_dump(include={"name_side", "colour"}, exclude_none=True)
     changed = {
@@ -333,7 +300,7 @@ def _set_appearance(edit: SetAppearance, diagram: Diagram, _: EditContext) -> Di
     return dataclasses.replace(diagram, layout={**diagram.layout, **changed})
 
 
-@EDITS.on(BendWires, lambda edit: f"bend {_count_text(edit.wires, 'wire')}")
+@EDITS.on(BendWires, lambda edit: f"bend {edit_titles.count_text(edit.wires, 'wire')}")
 def _bend(edit: BendWires, diagram: Diagram, _: EditContext) -> Diagram:
     return _with_bends(edit.wires, diagram)
 
@@ -345,7 +312,7 @@ def _with_bends(wires: Sequence[Wire], diagram: Diagram) -> Diagram:
     return dataclasses.replace(diagram, bends=bends)
 
 
-@EDITS.on(SetNotes, lambda edit: f"write {_count_text(edit.notes, 'note')}")
+@EDITS.on(SetNotes, lambda edit: f"write {edit_titles.count_text(edit.notes, 'note')}")
 def _write_notes(edit: SetNotes, diagram: Diagram, _: EditContext) -> Diagram:
     return _with_notes(edit.notes, diagram)
 
@@ -408,7 +375,7 @@ def _ground(edit: GroundPorts, diagram: Diagram, _: EditContext) -> Diagram:
 _COMMENTED = {"out": "comment out", "through": "comment through", "": "uncomment"}
 
 
-@EDITS.on(CommentBlocks, lambda edit: f"{_COMMENTED[edit.comment]} {_name_list(edit.blocks)}")
+@EDITS.on(CommentBlocks, lambda edit: f"{_COMMENTED[edit.comment]} {edit_titles.name_list(edit.blocks)}")
 def _comment(edit: CommentBlocks, diagram: Diagram, _: EditContext) -> Diagram:
     block_names = {_checked_block(name, diagram) for name in edit.blocks}
     commented = {name: comment for name, comment in diagram.commented.items() if name not in block_names}
@@ -440,7 +407,7 @@ def _arrange(edit: ArrangeBlocks, diagram: Diagram, _: EditContext) -> Diagram:
     return arranged(diagram)
 
 
-@EDITS.on(GroupBlocks, lambda edit: f"group {_count_text(edit.blocks, 'block')}")
+@EDITS.on(GroupBlocks, lambda edit: f"group {edit_titles.count_text(edit.blocks, 'block')}")
 def _group(edit: GroupBlocks, diagram: Diagram, _: EditContext) -> Diagram:
     return grouped(edit.blocks, edit.name, diagram)
 
@@ -464,7 +431,7 @@ def _set_mask(edit: SetMask, diagram: Diagram, context: EditContext) -> Diagram:
     return with_mask(edit, diagram, context.resolve_robot)
 
 
-@EDITS.on(KeepTuned, lambda edit: f"keep {_count_text(edit.values, 'tuned value')}")
+@EDITS.on(KeepTuned, lambda edit: f"keep {edit_titles.count_text(edit.values, 'tuned value')}")
 def _keep_tuned(edit: KeepTuned, diagram: Diagram, _: EditContext) -> Diagram:
     return with_parameters(diagram, {path: tuned_value(value, path) for path, value in edit.values.items()})
 
@@ -499,11 +466,3 @@ def _checked_block(name: str, diagram: Diagram) -> str:
     if name not in diagram.blocks:
         raise UnknownNameError("block", name, diagram.blocks, where=f"diagram '{diagram.name}'")
     return name
-
-
-def _name_list(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else _count_text(names, "block")
-
-
-def _count_text(items: Sized, noun: str) -> str:
-    return counted(len(items), noun)
