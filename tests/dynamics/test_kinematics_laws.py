@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from casadi import Function, horzcat, jacobian, mtimes, vertcat
+from casadi import SX, Function, horzcat, jacobian, jtimes, mtimes, vertcat
 from numpy.testing import assert_allclose
 
 from armblocks.dynamics import TRACES
-from armblocks.dynamics.ball_joints import position_rates
+from armblocks.dynamics.ball_joints import position_rates, rotation_vector
 from armblocks.dynamics.jacobian import MAX_COLUMNS_BY_MINORS
 from armblocks.dynamics.joint_motion import entries
 from armblocks.robot import (
@@ -242,3 +242,23 @@ def test_a_vertical_prismatic_joint_carries_the_weight():
     assert evaluate(lift, "inertia", [0.4]) == pytest.approx(np.array([[3.2]]))
     assert evaluate(lift, "accel", [0.0], [0.0], [0.0]) == pytest.approx([-9.81 * 3 / 3.2])
     assert evaluate(lift, "jacob0", [0.0]) == pytest.approx(np.array([[0, 0, 1, 0, 0, 0]]).T)
+
+
+def test_rotation_vectors_of_quaternions_of_any_length() -> None:
+    """The vectors have full accuracy for all angles, and finite derivatives of high order at the angle 0."""
+    quaternion = SX.sym("quaternion", 4)
+    vector = vertcat(*rotation_vector(entries(quaternion)))
+    rotation = Function("f", [quaternion], [vector])
+    random = np.random.default_rng(3)
+    for _ in range(500):
+        axis = random.normal(size=3)
+        axis /= np.linalg.norm(axis)
+        half = min(10.0 ** random.uniform(-60.0, 0.2), 0.499 * np.pi)
+        length = random.choice([-1.0, 1.0]) * 10.0 ** random.uniform(-200.0, 150.0)
+        found = rotation(length * np.r_[np.cos(half), np.sin(half) * axis]).full().ravel()
+        assert_allclose(found, 2.0 * half * axis, rtol=1e-14, atol=4e-16 * half)
+    derivative = vector
+    for _ in range(5):
+        derivative = jtimes(derivative, quaternion, SX([1.0, 0.3, 0.2, 0.1]))
+        at_zero = Function("d", [quaternion], [derivative])([1.0, 0.0, 0.0, 0.0])
+        assert np.isfinite(at_zero.full()).all()

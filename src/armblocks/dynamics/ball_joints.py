@@ -26,8 +26,9 @@ Quaternion = tuple[Scalar, Scalar, Scalar, Scalar]
 SHRINK, GROW = 2.0**-520, 2.0**600
 """Factors of quaternions whose squared length is outside ``SQUARES``; powers of two do not round."""
 SQUARES = 1e-280, 1e280
-TINY = 1e-200
-"""Smallest square of an angle; the sine of its root equals the root."""
+TINY = 1e-32
+"""Smallest square of an angle: its sine and tangent equal the angle, and higher derivatives, which divide by
+powers of it, are finite."""
 
 
 def ball_rotation(body: Body, q: Sequence[Scalar]) -> Rotation | RotationZ:
@@ -230,7 +231,7 @@ def _product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Quaternion:
 
 def _exponential(half: Vector) -> Quaternion:
     """The unit quaternion of a rotation by twice the vector ``half``."""
-    angle = _length(half)
+    angle = _length(half, SX(1.0))
     x, y, z = scale(sin(angle) / angle, half)
     return cos(angle), x, y, z
 
@@ -238,14 +239,14 @@ def _exponential(half: Vector) -> Quaternion:
 def _logarithm(quaternion: Quaternion) -> Vector:
     """The vector ``half`` of at most π/2 whose exponential is plus or minus the quaternion's direction."""
     w, x, y, z = quaternion
-    length = _length((x, y, z))
+    length = _length((x, y, z), SX(w))
     factor = atan2(length, fabs(w)) / length
     return scale(if_else(SX(w) < 0.0, -factor, factor), (x, y, z))
 
 
-def _length(vector: Vector) -> SX:
-    """The length of a vector, at least the root of ``TINY``.
+def _length(vector: Vector, unit: SX) -> SX:
+    """The length of a vector, at least the root of ``TINY`` times ``unit``.
 
     A bound, unlike a condition, causes no event where the vector passes zero.
     """
-    return sqrt(fmax(SX(dot(vector, vector)), TINY))
+    return sqrt(fmax(SX(dot(vector, vector)), TINY * unit * unit))
