@@ -44,6 +44,7 @@ REASONS = (
     "are in one diagram",
     "calls Python, which has no derivatives",
     "several events coincide at",
+    "is exactly at a limit or at a jump after",
 )
 
 Array = NDArray[np.float64]

@@ -218,11 +218,13 @@ def sensitivities_agree_with_differences(case: Case) -> Iterator[str]:
                 warnings.simplefilter("ignore")
                 found = ab.sensitivity(case.diagram, name, names, **settings)
         except SimulationError as error:
-            undefined = re.search(f"signal '(.+) by {re.escape(name)}' is nan", str(error))
-            if "coincide" in str(error):
+            if "the derivative does not exist" in str(error):
                 raise InconclusiveError(f"refused: {error}") from None
-            if undefined and has_kink(differences(case, name, value, settings), undefined[1]):
-                raise InconclusiveError(f"'{undefined[1]}' has no derivative by '{name}'") from None
+            undefined = re.search(f"signal '(.+) by {re.escape(name)}' is nan at ([\\d.e+-]+) s", str(error))
+            if undefined:
+                signal, row = undefined[1], int(np.argmin(np.abs(case.times - float(undefined[2]))))
+                if has_kink(differences(case, name, value, settings), signal, row):
+                    raise InconclusiveError(f"'{signal}' has no derivative by '{name}'") from None
             yield f"the run with derivatives by '{name}' fails: {error}"
             continue
         except ArmblocksError as error:
@@ -280,9 +282,9 @@ def differences(
     return quotients
 
 
-def has_kink(quotients: Mapping[str, tuple[np.ndarray, ...]], signal: str) -> bool:
-    """Return whether the left and right difference quotients of a signal differ in a row."""
+def has_kink(quotients: Mapping[str, tuple[np.ndarray, ...]], signal: str, row: int) -> bool:
+    """Return whether the left and right difference quotients of a signal differ at a row or beside it."""
     if signal not in quotients:
         return False
     left, right = quotients[signal][:2]
-    return bool((rows_of(left, right) > 1e-2).any())
+    return bool((rows_of(left, right)[max(row - 1, 0) : row + 2] > 1e-2).any())

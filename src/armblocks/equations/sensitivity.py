@@ -31,8 +31,8 @@ from armblocks.errors import InputError
 MIXED = PREFIX + "mixed"
 """A discrete variable (2,): the first time (s; -1: never) at which events coincided whose times have
 different derivatives with respect to a parameter, and the number of one of their guards, from 1."""
-TIED = PREFIX + "tied"
-"""The same for a guard that is 0 after the last instant."""
+TIES = (PREFIX + "tie", PREFIX + "latest tie")
+"""The same for a guard that is 0 after an instant: at the first, and at the latest of these instants."""
 
 
 def parameters_read_by_index(system: HybridSystem) -> frozenset[str]:

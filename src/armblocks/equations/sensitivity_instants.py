@@ -13,7 +13,7 @@ For a single jump this is the saltation matrix of Hiskens and Pai, IEEE Trans. C
 the derivative of this time. For the arrival of a delayed jump see
 :mod:`armblocks.equations.sensitivity_delays`. A guard that fires because of one of these jumps belongs to the
 same instant. If instants with different derivatives coincide, the instant of this guard is unknown. ``mixed``
-then stores the time and one of the guards. A guard that is 0 after an instant is stored likewise, see
+then stores the time and one of the guards. ``tie`` stores them for a guard that is 0 after an instant, see
 :mod:`armblocks.equations.sensitivity_ties`.
 
 Each jump at an instant is a call of ``reset``. The first call replaces S by S*. An added guard fires after
@@ -46,7 +46,7 @@ from casadi import (
 
 from armblocks.equations.hybrid_system import EventRanks
 from armblocks.equations.sensitivity_delays import DelayedSensitivities
-from armblocks.equations.sensitivity_layout import Columns
+from armblocks.equations.sensitivity_layout import Columns, any_marked
 from armblocks.equations.sensitivity_ties import Ties
 
 LOCATION_TOLERANCE = 1e-8
@@ -76,8 +76,8 @@ class Instants:
         self.arms = c.add("arms", 2, 1.0)
         """The values of the two added guards that end an instant; a change of sign makes a guard fire."""
         self.mixed, self.ticked = c.add("mixed", 2, [NEVER, 0.0]), c.add("ticked", 1)
-        self.tied = c.add("tied", 2, [NEVER, 0.0])
-        """The time of the latest instant and a guard that is 0 after it, as in ``mixed``."""
+        self.tie, self.latest_tie = c.add("tie", 2, [NEVER, 0.0]), c.add("latest tie", 2, [NEVER, 0.0])
+        """The first and the latest instant with a guard that is 0 after it: the time and this guard."""
         self.located = c.add("located", self.guards)
         self.instant_p = [c.add(f"instant by {name}", 1) for name in c.names]
         self.flow = c.value(system.derivative)
@@ -180,15 +180,14 @@ class Instants:
         }
         added["ticked"] = if_else(begins, 0.0, 1.0)
         # Events that come before the ticks of the same instant; the time of the ticks is fixed.
-        moved = logic_and(self.open, _any_marked(vertcat(*self.instant_p)))
+        moved = logic_and(self.open, any_marked(vertcat(*self.instant_p)))
         number = SX(1.0)
         for k in range(self.guards):
             number = if_else(self.located[k], float(k + 1), number)
         mixes = logic_and(logic_and(logic_not(begins), moved), self.mixed[0] < 0.0)
         added["mixed"] = if_else(mixes, vertcat(c.t, number), self.mixed)
-        ends_tied = logic_and(logic_and(begins, self.tied[0] >= 0.0), self.mixed[0] < 0.0)
-        added["mixed"] = if_else(ends_tied, self.tied, added["mixed"])
-        added["tied"] = if_else(begins, SX([NEVER, 0.0]), self.tied)
+        added["tie"] = if_else(logic_and(begins, self.tie[0] < 0.0), self.latest_tie, self.tie)
+        added["latest tie"] = if_else(begins, SX([NEVER, 0.0]), self.latest_tie)
         return vertcat(updated, *Z, *added.values())
 
     def _captured_by(self, updated: SX, k: int) -> SX:
@@ -205,15 +204,15 @@ class Instants:
         c, d, names = self.columns, self.delays, self.columns.names
         counts = [self.guards, 2, len(self.moving_breakpoints), d.n, d.n, 1]
         own, arms, sources, arrived, jumped, follows = vertsplit(e, [0, *accumulate(counts)])
-        fired, no_event = _any_marked(own), logic_not(_any_marked(e[:-1]))
-        others = logic_or(_any_marked(vertcat(own, sources, arrived, jumped)), no_event)
+        fired, no_event = any_marked(own), logic_not(any_marked(e[:-1]))
+        others = logic_or(any_marked(vertcat(own, sources, arrived, jumped)), no_event)
         first = logic_not(self.known)
         instants, mixed = self._instants(own, no_event, sources, arrived)
         leaves = logic_and(self.open, logic_not(others))
-        enters = logic_and(logic_not(self.open), _any_marked(vertcat(*instants)))
+        enters = logic_and(logic_not(self.open), any_marked(vertcat(*instants)))
 
         # The derivatives before or after the instant.
-        left_side = logic_and(first, _any_marked(sources))
+        left_side = logic_and(first, any_marked(sources))
         t = if_else(left_side, c.t * JUST_BEFORE, c.t)
         flow = c.value_at(c.system.derivative, t, c.x, d.before_arrival(arrived), c.w)
         along = [_times(flow, if_else(leaves, -1.0, enters) * instant) for instant in instants]
@@ -246,7 +245,7 @@ class Instants:
         # A guard that waits for events of other ranks has already changed its sign.
         sets = logic_and(repeats, logic_or(enters, arms[1] != 0.0))
         flips = vertcat(logic_and(sets, logic_not(second)), second)
-        caused = logic_or(logic_not(first), _any_marked(vertcat(sources, arrived)))
+        caused = logic_or(logic_not(first), any_marked(vertcat(sources, arrived)))
         changes = {
             "known": SX(1.0),
             "open": opened,
@@ -259,7 +258,7 @@ class Instants:
         if self.ties is not None:
             number = self.ties.first(x, z, instants, opened)
             ties = logic_and(number > 0.0, c.t > 0.0)
-            changes["tied"] = if_else(ties, vertcat(c.t, number), SX([NEVER, 0.0]))
+            changes["latest tie"] = if_else(ties, vertcat(c.t, number), SX([NEVER, 0.0]))
         added = [changes.get(name, present) for name, present in c.added.items()]
         return vertcat(*x), vertcat(*z, *added)
 
@@ -282,7 +281,7 @@ class Instants:
         ]
         jumped = logic_and(own != 0.0, logic_not(self.located))
         follows = vertcat(jumped, SX.zeros(2), sources != 0.0, SX.zeros(arrived.numel()))
-        follows = logic_and(follows, _any_marked(vertcat(*at_fixed)))
+        follows = logic_and(follows, any_marked(vertcat(*at_fixed)))
         later = vertcat(
             self._fire_later(own, vertcat(sources, arrived)), SX.zeros(marks.numel() - self.guards)
         )
@@ -308,7 +307,7 @@ class Instants:
         system = self.columns.system
         if system.ranks is None:
             return SX.zeros(self.guards)
-        rank = if_else(_any_marked(others), -1.0, float(max(system.ranks.guards)))
+        rank = if_else(any_marked(others), -1.0, float(max(system.ranks.guards)))
         for number, own_rank in enumerate(system.ranks.guards):
             rank = if_else(own[number] != 0.0, fmin(rank, float(own_rank)), rank)
         later = SX(system.ranks.guards) > rank
@@ -330,7 +329,3 @@ def _times(flow: SX, shift: SX) -> SX:
     """The change of states along a shift of time: 0 without a shift, also where inconsistent modes give a
     flow that is not a number."""
     return if_else(shift == 0.0, 0.0, flow * shift)
-
-
-def _any_marked(marks: SX) -> SX:
-    return dot(marks, marks) > 0.0 if marks.numel() else SX(0.0)

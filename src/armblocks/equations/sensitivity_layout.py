@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from casadi import SX, Function, densify, vertcat
+from casadi import SX, Function, densify, dot, vertcat
 
 from armblocks.equations.forward_differentiation import directional_derivative
 from armblocks.equations.hybrid_system import HybridSystem
@@ -24,6 +24,11 @@ def entry_name(slot: Slot, element: str) -> str:
     """The name of a parameter entry in results: ``k.gain`` for a parameter of one entry, else
     ``g.gain[1]``."""
     return slot.name if slot.size == 1 else element
+
+
+def any_marked(marks: SX) -> SX:
+    """Whether an element of a column is not 0."""
+    return dot(marks, marks) > 0.0 if marks.numel() else SX(0.0)
 
 
 def _entries(layout: Signature, parameters: Sequence[str]) -> dict[str, int]:

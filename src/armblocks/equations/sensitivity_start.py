@@ -269,9 +269,11 @@ class _Start:
         """The guards that are zero, depend on one of these parameters, and whose two sides differ."""
         if not self.system.guard_directions:
             return []
-        guards = self._resting_guards(entries)
+        guards: set[int] = set()
         for point in (self.before, self.after):
             g, rate, moves = self._guards(point, entries)
+            if point is self.after:
+                guards |= self._resting_guards(g, rate, entries)
             zero = np.isfinite(rate) & (np.abs(g) <= ZERO_TOLERANCE * np.abs(rate)) & (rate != 0.0)
             for guard in np.flatnonzero(zero & (moves > ZERO_TOLERANCE * np.abs(rate))).tolist():
                 direction = self.system.guard_directions[guard]
@@ -281,13 +283,12 @@ class _Start:
                     guards.add(guard)
         return sorted(guards)
 
-    def _resting_guards(self, entries: slice) -> set[int]:
+    def _resting_guards(self, g: Array, rate: Array, entries: slice) -> set[int]:
         """The guards that leave zero with a time derivative of zero, although one of these parameters moves
         this zero: a comparison with the position of a body that starts from rest, for example.
 
         The multiple zero splits, so that there are events for one sign of the change only.
         """
-        g, rate, _ = self._guards(self.after, entries)
         resting = (np.abs(g) <= RESTING) & (np.abs(rate) <= RESTING)
         if not resting.any():
             return set()

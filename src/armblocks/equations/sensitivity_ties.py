@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from casadi import SX, Function, densify, dot, fabs, if_else, logic_and, logic_or, vertcat, vertsplit
+from casadi import SX, Function, densify, fabs, if_else, logic_and, logic_or, vertcat, vertsplit
 
-from armblocks.equations.sensitivity_layout import Columns
+from armblocks.equations.sensitivity_layout import Columns, any_marked
 
 AT_ZERO = 1e-12
 """The largest value of a guard that counts as 0."""
@@ -69,13 +69,13 @@ class Ties:
             at_zero = logic_and(fabs(g) <= AT_ZERO, moves)
             tied = logic_or(tied, at_zero)
             # Parameters that move no zero are not changed. With different weights no changes cancel.
-            weight = (1.0 + 0.37 * k) * _any(at_zero)
+            weight = (1.0 + 0.37 * k) * any_marked(at_zero)
             along = [instant, x[k + 1] + flow * beside, z[k + 1] + self.rate_along * instant, c.seeds[k]]
             change = [total + weight * part for total, part in zip(change, along)]
         directions = SX(c.system.guard_directions)
         tied = logic_and(tied, logic_or(rests, logic_or(directions == 0.0, directions * rate > 0.0)))
         # A changed rate moves a double zero shortly afterwards.
-        later = LATER * _any(logic_and(tied, rests))
+        later = LATER * any_marked(logic_and(tied, rests))
         present = self._signals([c.t, x[0] + later * flow, *at[2:]])
         differs = SX(0.0)
         for step in (-STEP, STEP):
@@ -85,7 +85,7 @@ class Ties:
             (after,) = self.reset.call([t, moved_x, moved_z, c.w, p, self.no_event], True, False)
             other_x, other_z = vertsplit(after, [0, c.x.numel(), after.numel()])
             difference = fabs(self._signals([t, other_x, other_z, c.w, p]) - present)
-            differs = logic_or(differs, _any(difference > JUMPS * (1.0 + fabs(present))))
+            differs = logic_or(differs, any_marked(difference > JUMPS * (1.0 + fabs(present))))
         number = SX(0.0)
         for k in range(g.numel()):
             number = if_else(tied[k], float(k + 1), number)
@@ -95,7 +95,3 @@ class Ties:
         """The states and signals at ``t, x, z, w, p``."""
         (signals,) = self.signals.call(list(at), True, False)
         return vertcat(at[1], signals)
-
-
-def _any(marks: SX) -> SX:
-    return dot(marks, marks) > 0.0 if marks.numel() else SX(0.0)

@@ -15,7 +15,7 @@ from armblocks.argument_errors import ArgumentErrors
 from armblocks.diagram import Diagram
 from armblocks.diagram.mask_tuning import mask_parameters, with_mask_parameters
 from armblocks.equations import HybridSystem, Signature, Slot
-from armblocks.equations.sensitivity import MIXED, TIED, sensitivity_system
+from armblocks.equations.sensitivity import MIXED, TIES, sensitivity_system
 from armblocks.equations.sensitivity_layout import entry_name, sensitivity_name
 from armblocks.errors import InputError, SimulationError, UnknownNameError, counted
 from armblocks.face.linearizing import resolved_diagram
@@ -122,7 +122,7 @@ def sensitivity(
     options = with_settings(resolved.settings, settings)
     compiled = compile_system(augmented)
     run = run_system(compiled, options)
-    check_coinciding_events(compiled, run)
+    check_instants(compiled, run)
     slots = Signature(tuple(dict.fromkeys(chosen)))
     return SensitivityResult(run=run, outputs=output_names, parameters=names, slots=slots)
 
@@ -141,19 +141,32 @@ def _parameter(system: HybridSystem, diagram: Diagram, name: str) -> Slot:
         raise InputError(error.what, allowed=error.allowed, fix=error.fix, where=system.name) from None
 
 
-def check_coinciding_events(compiled: CompiledSystem, run: SimulationResult) -> None:
-    """Raise ``SimulationError`` for coinciding events that a parameter change would separate."""
+def check_instants(compiled: CompiledSystem, run: SimulationResult) -> None:
+    """Raise ``SimulationError`` for an instant at which a parameter has no derivative.
+
+    A change of the parameter separates coinciding events, or moves a signal that is exactly at a limit.
+    """
     if MIXED not in compiled.discrete.ranges or run.final_state is None:
         return
-    for name in (MIXED, TIED):
+    for name in (MIXED, *TIES):
         time, guard = run.final_state.discrete[compiled.discrete.ranges[name]]
         if time < 0.0:
             continue
+        block = compiled.guard_names[int(guard) - 1]
+        if name == MIXED:
+            raise SimulationError(
+                f"several events coincide at {time:.9g} s, one of '{block}' among them, and a parameter "
+                "change would separate them: the derivative does not exist",
+                where=compiled.name,
+                allowed="events that coincide, or do not, for all small parameter changes",
+                fix="shift one of the events, or use the difference of two runs",
+                partial=run,
+            )
         raise SimulationError(
-            f"several events coincide at {time:.9g} s, one of '{compiled.guard_names[int(guard) - 1]}' among "
-            "them, and a parameter change would separate them: the derivative does not exist",
+            f"block '{block}' is exactly at a limit or at a jump after an event or a tick at {time:.9g} s, "
+            "and a parameter change would move it away: the derivative does not exist",
             where=compiled.name,
-            allowed="events that coincide, or do not, for all small parameter changes",
-            fix="shift one of the events, or use the difference of two runs",
+            allowed="signals that jump at all small parameter changes, or at none",
+            fix="change the new value or the limit a little, or use the difference of two runs",
             partial=run,
         )
