@@ -15,15 +15,15 @@ export const SCROLLED = {
   styles: { dropdown: { maxHeight: 220, overflowY: 'auto' } },
 } as const
 
-/** An option of a list. If no option is highlighted when it appears, the first one is. */
+/** An option of a list. If none is highlighted when it appears, the chosen one is, or else the first one. */
 function Option({ option, checked }: ComboboxLikeRenderOptionInput<ComboboxItem>) {
   const { store } = useComboboxContext()
   useEffect(() => {
     // The list gets its identifier after the effects of its options.
     queueMicrotask(() => {
-      if (store.getSelectedOptionIndex() === -1) store.selectFirstOption()
+      if (store.getSelectedOptionIndex() === -1) store.selectActiveOption()
     })
-    // Options are checked when they appear; Mantine highlights the first one after each later key.
+    // Only when the option appears: Mantine highlights the first one after each later key.
     // eslint-disable-next-line react-hooks/exhaustive-deps
   }, [])
   return (

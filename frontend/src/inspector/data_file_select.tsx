@@ -28,6 +28,7 @@ export function DataFileSelect({ holds, label, description, file, focus, onFile 
     <Select
       {...SEARCHED}
       openOnFocus={false}
+      selectFirstOptionOnDropdownOpen={!file}
       label={label}
       description={description}
       data={file && !paths.includes(file) ? [file, ...paths] : paths}
