@@ -23,7 +23,6 @@ from armblocks.blocks import (
     RateLimiterContinuous,
     RateLimiterDynamic,
     Relay,
-    ResettableIntegrator,
     Rounding,
     Saturation,
     SecondOrderIntegratorLimited,
@@ -32,10 +31,9 @@ from armblocks.blocks import (
     Step,
     StickSlipFriction,
     Sum,
-    ZeroOrderHold,
 )
 from armblocks.diagram import Block
-from armblocks.errors import InputError, SimulationError
+from armblocks.errors import InputError
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12, "stop_time": 3.0, "sample_time": 0.1}
 
@@ -174,25 +172,6 @@ def test_the_start_of_a_diagram_with_an_implicit_equation() -> None:
     assert np.array_equal(result["limited", "bias.bias"], np.ones(result.time.size))
 
 
-def test_a_condition_that_stands_at_its_limit_until_an_event() -> None:
-    """v is 0 until 0.4 s. For any other initial value, v ~= 0 holds from 0.3 s on."""
-
-    def diagram(initial: float) -> ab.Diagram:
-        builder = ab.DiagramBuilder("stands")
-        v = builder.add("v", Integrator(initial=initial), builder.add("u", Step(time=0.4)))
-        both = builder.add("both", LogicalOperator(), v, builder.add("on", Step(time=0.3)))
-        builder.add("x", Integrator(), both)
-        return builder.build()
-
-    with pytest.raises(SimulationError, match=r"block 'both' is exactly at a limit .* at 0\.3 s"):
-        ab.sensitivity(diagram(0.0), "v.initial", "x", stop_time=1.0)
-    # Without a change of the initial value v leaves 0 when the step occurs.
-    result = ab.sensitivity(diagram(0.0), ["u.time", "u.final"], "x", stop_time=1.0)
-    assert result["x", "u.time"][-1] == pytest.approx(-1.0, abs=1e-9)
-    assert result["x", "u.final"][-1] == pytest.approx(0.0, abs=1e-9)
-    assert not ab.sensitivity(diagram(0.1), "v.initial", "x", stop_time=1.0)["x", "v.initial"].any()
-
-
 @pytest.mark.parametrize("order", [2, 3])
 @pytest.mark.parametrize(
     "block", [Sign(), CompareToZero(relation=">="), LogicalOperator(operator="NOT"), Abs()]
@@ -231,37 +210,3 @@ def test_a_jump_that_the_run_leaves_at_once_has_no_derivative() -> None:
     ):
         with pytest.raises(InputError, match=r"starts exactly at a limit or at a jump|an event of 'y'"):
             ab.sensitivity(case, name, "x", stop_time=1.0)
-
-
-@pytest.mark.parametrize("sampled", [False, True])
-@pytest.mark.parametrize("speed", [0.0, 1.0])
-@pytest.mark.parametrize(
-    "block", [Sign(), CompareToZero(relation=">="), Relay(on_point=0.0, off_point=-3.0), Abs()]
-)
-def test_a_state_that_is_reset_to_a_limit(block: Block, speed: float, sampled: bool) -> None:
-    """A change of its new value, or of its new speed 0, moves the event behind or before the reset."""
-    builder = ab.DiagramBuilder("reset")
-    edge = builder.add("edge", Step(time=1.0 if not sampled else 0.9))
-    edge = builder.add("tick", ZeroOrderHold(sample_time=0.25), edge) if sampled else edge
-    start = builder.add("start", Step(time=0.4, initial=-30.0, final=0.0))
-    start_speed = builder.add("start speed", Step(time=0.4, initial=0.1, final=speed))
-    settings = {"initial_condition_source": "external", "external_reset": "rising"}
-    force = builder.add("force", Constant(value=1.0))
-    v = builder.add("v", ResettableIntegrator(**settings), force, edge, start_speed)
-    x = builder.add("x", ResettableIntegrator(**settings), v, edge, start)
-    builder.add("integral", Integrator(), builder.add("y", block, x))
-    diagram = builder.build()
-
-    def derivative(name: str) -> float:
-        return float(ab.sensitivity(diagram, name, "integral", stop_time=2.0)["integral", name][-1])
-
-    if isinstance(block, Abs):
-        assert derivative("start.final") == pytest.approx(1.0, rel=1e-9)
-        assert derivative("start speed.final") == pytest.approx(0.5, rel=1e-9)
-        return
-    for name in ("start.final", "start speed.final"):
-        if name == "start.final" or speed == 0.0:
-            with pytest.raises(SimulationError, match=r"block 'y' is exactly at a limit .* at 1 s"):
-                derivative(name)
-        else:
-            assert derivative(name) == pytest.approx(0.0, abs=1e-9)

@@ -16,11 +16,13 @@ from casadi import SX, Function, densify, depends_on, jacobian, jtimes, vertcat
 
 from armblocks.equations.evaluation import refuse_called
 from armblocks.equations.forward_differentiation import directional_derivative
+from armblocks.equations.held_limits import held_limits
 from armblocks.equations.hybrid_system import HybridSystem, LinearLoops
 from armblocks.equations.located_jumps import with_located_jumps
+from armblocks.equations.sampled_limits import samples_kinks
 from armblocks.equations.sensitivity_delays import DelayedSensitivities
 from armblocks.equations.sensitivity_instants import Instants
-from armblocks.equations.sensitivity_layout import PREFIX, Columns, sensitivity_name
+from armblocks.equations.sensitivity_layout import PREFIX, Columns, limit_name, sensitivity_name
 from armblocks.equations.sensitivity_start import refuse_moving_start
 from armblocks.equations.signatures import Signature, Slot, signature
 from armblocks.equations.symbols import flatten
@@ -33,6 +35,12 @@ MIXED = PREFIX + "mixed"
 different derivatives with respect to a parameter, and the number of one of their guards, from 1."""
 TIES = (PREFIX + "tie", PREFIX + "latest tie")
 """The same for a guard that is 0 after an instant: at the first, and at the latest of these instants."""
+SAMPLED = PREFIX + "sampled"
+"""The same for a signal that is at a limit when a tick samples it, with the number of the discrete variable
+that has sampled it, from 1."""
+LIMIT = PREFIX + limit_name("")
+"""The name of a discrete variable, without the name of a block: the first time (s; -1: never) after which a
+held signal of this block is at a limit."""
 
 
 def parameters_read_by_index(system: HybridSystem) -> frozenset[str]:
@@ -147,11 +155,14 @@ class _AugmentedSystem:
         chosen = vertcat(*(p[system.parameters.range_of(name)] for name in parameters))
         sources = depends_on(vertcat(*system.breakpoints.results, SX(0, 1)), chosen)
         _refuse_implicit_jumps(system, sources=sources)
-        self.moving = bool(system.guard_directions or system.delays is not None or sources)
+        limits = held_limits(system)
+        self.moving = bool(
+            system.guard_directions or system.delays is not None or sources or limits or samples_kinks(system)
+        )
         self.outputs = [system.signals_layout[name] for name in outputs]
         self.columns = Columns(system, parameters, moving=self.moving)
         self.delays = DelayedSensitivities(self.columns)
-        self.instants = Instants(self.columns, self.delays) if self.moving else None
+        self.instants = Instants(self.columns, self.delays, limits) if self.moving else None
 
     def _names(self, count: int) -> list[str]:
         """Names of the added guards for messages: the names of their blocks, or of the system."""

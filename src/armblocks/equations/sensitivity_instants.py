@@ -14,7 +14,10 @@ the derivative of this time. For the arrival of a delayed jump see
 :mod:`armblocks.equations.sensitivity_delays`. A guard that fires because of one of these jumps belongs to the
 same instant. If instants with different derivatives coincide, the instant of this guard is unknown. ``mixed``
 then stores the time and one of the guards. ``tie`` stores them for a guard that is 0 after an instant, see
-:mod:`armblocks.equations.sensitivity_ties`.
+:mod:`armblocks.equations.sensitivity_ties`. ``limit of block`` stores the time of an instant after which a
+held signal of a block is at a limit, see :mod:`armblocks.equations.held_limits`. ``sampled`` stores the time
+and the number of a discrete variable that has sampled a signal at a limit, see
+:mod:`armblocks.equations.sampled_limits`.
 
 Each jump at an instant is a call of ``reset``. The first call replaces S by S*. An added guard fires after
 all other guards; its call replaces S* by S. There are two such guards, which alternate, because a guard that
@@ -24,6 +27,7 @@ has just fired cannot fire again at once.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from itertools import accumulate
 
 from casadi import (
@@ -40,14 +44,16 @@ from casadi import (
     logic_and,
     logic_not,
     logic_or,
+    sign,
     vertcat,
     vertsplit,
 )
 
 from armblocks.equations.hybrid_system import EventRanks
+from armblocks.equations.sampled_limits import Sampling
 from armblocks.equations.sensitivity_delays import DelayedSensitivities
-from armblocks.equations.sensitivity_layout import Columns, any_marked
-from armblocks.equations.sensitivity_ties import Ties
+from armblocks.equations.sensitivity_layout import Columns, any_marked, limit_name
+from armblocks.equations.sensitivity_ties import AT_ZERO, MOVES, Ties
 
 LOCATION_TOLERANCE = 1e-8
 """A guard whose zero is within this relative time counts as located; otherwise it has jumped."""
@@ -62,11 +68,17 @@ NEVER = -1.0
 
 
 class Instants:
-    """Changes of sensitivities at instants: ``update``, ``reset`` and guards of the whole system."""
+    """Changes of sensitivities at instants: ``update``, ``reset`` and guards of the whole system.
 
-    def __init__(self, columns: Columns, delays: DelayedSensitivities) -> None:
+    ``limits``: the distances of held signals from their limits by block, functions of ``t, x, z, w, p``.
+    """
+
+    def __init__(
+        self, columns: Columns, delays: DelayedSensitivities, limits: Mapping[str, Function]
+    ) -> None:
         self.columns = columns
         self.delays = delays
+        self.limits = limits
         c, system = columns, columns.system
         self.guards = len(system.guard_directions)
         self.time = c.add("instant", 1, NEVER)
@@ -78,6 +90,10 @@ class Instants:
         self.mixed, self.ticked = c.add("mixed", 2, [NEVER, 0.0]), c.add("ticked", 1)
         self.tie, self.latest_tie = c.add("tie", 2, [NEVER, 0.0]), c.add("latest tie", 2, [NEVER, 0.0])
         """The first and the latest instant with a guard that is 0 after it: the time and this guard."""
+        self.sampling = Sampling(system) if system.clocks else None
+        self.sampled = c.add("sampled", 2, [NEVER, 0.0])
+        """The first instant at which a signal at a limit is sampled: the time and the discrete variable."""
+        self.limit_times = {block: c.add(limit_name(block), 1, NEVER) for block in limits}
         self.located = c.add("located", self.guards)
         self.instant_p = [c.add(f"instant by {name}", 1) for name in c.names]
         self.flow = c.value(system.derivative)
@@ -160,14 +176,12 @@ class Instants:
         begins = dot(m, m) == 0.0 if m.numel() else SX(1.0)
         updated = c.value(c.system.update, m)
         Z = [self._captured_by(updated, k) for k in range(len(c.names))]
-        is_near = fabs(self.g) <= LOCATION_TOLERANCE * fabs(self.g_rate) * fmax(1.0, c.t)
-        located = logic_and(is_near, logic_and(self.g_rate != 0.0, c.t > 0.0))
         left_values = {
             "instant": c.t,
             "known": SX(0.0),
             "open": SX(0.0),
             "ticked": SX(0.0),
-            "located": located,
+            "located": self._located(),
             "rate of left limits": vertcat(
                 *(self.over_time(self.captured)[k] for k in self.left_limits), SX(0, 1)
             ),
@@ -186,16 +200,67 @@ class Instants:
             number = if_else(self.located[k], float(k + 1), number)
         mixes = logic_and(logic_and(logic_not(begins), moved), self.mixed[0] < 0.0)
         added["mixed"] = if_else(mixes, vertcat(c.t, number), self.mixed)
-        added["tie"] = if_else(logic_and(begins, self.tie[0] < 0.0), self.latest_tie, self.tie)
+        tie = if_else(self.latest_tie[0] < 0.0, self._resting_tie(), self.latest_tie)
+        added["tie"] = if_else(logic_and(begins, self.tie[0] < 0.0), tie, self.tie)
         added["latest tie"] = if_else(begins, SX([NEVER, 0.0]), self.latest_tie)
+        if self.sampling is not None:
+            along = [self._present_along(k) for k in range(len(c.names))]
+            row = self.sampling.first(updated, Z, m, along, self._events_now())
+            found = logic_and(logic_and(logic_not(begins), row > 0.0), self.sampled[0] < 0.0)
+            added["sampled"] = if_else(found, vertcat(c.t, row), self.sampled)
+        for block, time in self.limit_times.items():
+            stays = logic_and(logic_and(begins, time < 0.0), self._stays_at_limit(block))
+            added[limit_name(block)] = if_else(stays, fmax(self.time, 0.0), time)
         return vertcat(updated, *Z, *added.values())
 
+    def _stays_at_limit(self, block: str) -> SX:
+        """Whether a held signal of a block has been at a limit since the last instant."""
+        c = self.columns
+        (distances,) = self.limits[block].call([c.t * JUST_BEFORE, c.x, c.z, c.w, c.p], True, False)
+        moved = [fabs(self.by_parameter(distances, k)) > MOVES for k in range(len(c.names))]
+        at_limit = fabs(distances) <= AT_ZERO
+        return logic_and(self._lasts, any_marked(vertcat(*(logic_and(at_limit, moves) for moves in moved))))
+
+    def _resting_tie(self) -> SX:
+        """The time of the last instant and the number of a guard that has been 0 since then, or never."""
+        c = self.columns
+        if self.ties is None:
+            return SX([NEVER, 0.0])
+        x, z = [c.x, *c.S], [c.z, *self.delays.Z]
+        number = self.ties.first(x, z, [SX(0.0)] * len(c.names), SX(0.0), t=c.t * JUST_BEFORE, stays=True)
+        tied = logic_and(self._lasts, number > 0.0)
+        return if_else(tied, vertcat(fmax(self.time, 0.0), number), SX([NEVER, 0.0]))
+
+    @property
+    def _lasts(self) -> SX:
+        """Whether there is time between the last instant and the present one."""
+        return self.columns.t * JUST_BEFORE > self.time
+
+    def _located(self) -> SX:
+        """Whether each guard passes zero now."""
+        is_near = fabs(self.g) <= LOCATION_TOLERANCE * fabs(self.g_rate) * fmax(1.0, self.columns.t)
+        return logic_and(is_near, logic_and(self.g_rate != 0.0, self.columns.t > 0.0))
+
+    def _events_now(self) -> SX:
+        """The events of guards that pass zero now and whose times depend on a parameter."""
+        moves = SX.zeros(self.guards)
+        for k in range(len(self.columns.names)):
+            moves = logic_or(moves, fabs(self.by_parameter(self.g, k)) > MOVES * fabs(self.g_rate))
+        direction = sign(self.g_rate)
+        fires = SX(self.columns.system.guard_directions) * direction >= 0.0
+        return if_else(logic_and(logic_and(self._located(), moves), fires), direction, 0.0)
+
     def _captured_by(self, updated: SX, k: int) -> SX:
-        """The derivative of an update with respect to parameter ``k``; between the events of an instant,
-        along the instant."""
+        """The derivative of an update with respect to parameter ``k``."""
+        t, x, z, w, p = self._present_along(k)
+        return self.columns.derivative_along(updated, t=t, x=x, z=z, w=w, p=p)
+
+    def _present_along(self, k: int) -> tuple[SX, SX, SX, SX, SX]:
+        """The derivatives of ``t, x, z, w, p`` with respect to parameter ``k``; between the events of an
+        instant, along the instant."""
         c, instant = self.columns, self.open * self.instant_p[k]
         z = self.delays.Z[k] + self.delays.rate_along * instant
-        return c.derivative_along(updated, t=instant, x=c.S[k], z=z, w=c.W[k], p=c.seeds[k])
+        return instant, c.S[k], z, c.W[k], c.seeds[k]
 
     # At an instant.
 

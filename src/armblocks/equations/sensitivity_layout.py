@@ -26,6 +26,12 @@ def entry_name(slot: Slot, element: str) -> str:
     return slot.name if slot.size == 1 else element
 
 
+def limit_name(block: str) -> str:
+    """The name of a discrete variable with the time of the first instant (s; -1: never) after which a held
+    signal of a block is at a limit."""
+    return f"limit of {block}"
+
+
 def any_marked(marks: SX) -> SX:
     """Whether an element of a column is not 0."""
     return dot(marks, marks) > 0.0 if marks.numel() else SX(0.0)

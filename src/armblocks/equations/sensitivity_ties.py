@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from casadi import SX, Function, densify, fabs, if_else, logic_and, logic_or, vertcat, vertsplit
+from casadi import SX, Function, densify, fabs, fmax, if_else, logic_and, logic_or, vertcat, vertsplit
 
 from armblocks.equations.sensitivity_layout import Columns, any_marked
 
@@ -20,6 +20,8 @@ derivative."""
 STEP, JUMPS = 1e-9, 1e-4
 """The change of a parameter, and the smallest change of a signal or of a state that is a jump, relative to 1
 plus its value."""
+KINK, ROUNDING = 1e-2, 1e-5
+"""The smallest difference of two derivatives at a kink, and the part of it for each unit of the value."""
 LATER = 1e-4
 """The time after which a change of a rate has moved a guard, s."""
 
@@ -43,15 +45,25 @@ class Ties:
             for traced in (c.system.guards, c.system.derivative, c.system.signals, c.system.reset)
         )
 
-    def first(self, x: Sequence[SX], z: Sequence[SX], instants: Sequence[SX], opened: SX) -> SX:
+    def first(
+        self,
+        x: Sequence[SX],
+        z: Sequence[SX],
+        instants: Sequence[SX],
+        opened: SX,
+        *,
+        t: SX | None = None,
+        stays: bool = False,
+    ) -> SX:
         """The number, from 1, of a guard that is 0, that a parameter moves, and whose sides differ; or 0.
 
         ``x``, ``z``: the states (nx,) and discrete variables (nz,) after the call, each followed by its
         derivatives with respect to the parameters. ``instants``: the derivatives of the time of the instant.
-        ``opened``: whether the derivatives after the call are those along the instant.
+        ``opened``: whether the derivatives after the call are those along the instant. ``t``: another time
+        than the present. ``stays``: only guards whose time derivative is 0 as well.
         """
         c = self.columns
-        at = [c.t, x[0], z[0], c.w, c.p]
+        at = [c.t if t is None else t, x[0], z[0], c.w, c.p]
         (g,) = self.guards.call(at, True, False)
         (rate,) = self.rate.call([*at, c.V], True, False)
         (flow,) = self.flow.call(at, True, False)
@@ -67,6 +79,8 @@ class Ties:
             splits = logic_and(logic_and(rests, beside == 0.0), fabs(moved[1]) > MOVES)
             moves = logic_or(moves, splits)
             at_zero = logic_and(fabs(g) <= AT_ZERO, moves)
+            if stays:
+                at_zero = logic_and(at_zero, rests)
             tied = logic_or(tied, at_zero)
             # Parameters that move no zero are not changed. With different weights no changes cancel.
             weight = (1.0 + 0.37 * k) * any_marked(at_zero)
@@ -77,19 +91,23 @@ class Ties:
         # A changed rate moves a double zero shortly afterwards.
         later = LATER * any_marked(logic_and(tied, rests))
         present = self._signals([c.t, x[0] + later * flow, *at[2:]])
-        differs = SX(0.0)
+        differences: list[SX] = []
         for step in (-STEP, STEP):
             t, moved_x, moved_z, p = (value + step * along for value, along in zip([*at[:3], c.p], change))
             (moved_flow,) = self.flow.call([t, moved_x, moved_z, c.w, p], True, False)
             moved_x = moved_x + later * moved_flow
             (after,) = self.reset.call([t, moved_x, moved_z, c.w, p, self.no_event], True, False)
             other_x, other_z = vertsplit(after, [0, c.x.numel(), after.numel()])
-            difference = fabs(self._signals([t, other_x, other_z, c.w, p]) - present)
-            differs = logic_or(differs, any_marked(difference > JUMPS * (1.0 + fabs(present))))
+            differences.append(self._signals([t, other_x, other_z, c.w, p]) - present)
+        before, after = differences
+        differs = fmax(fabs(before), fabs(after)) > JUMPS * (1.0 + fabs(present))
+        if stays:
+            kink = STEP * (KINK + ROUNDING * fabs(present))
+            differs = logic_or(differs, fabs(before + after) > kink)
         number = SX(0.0)
         for k in range(g.numel()):
             number = if_else(tied[k], float(k + 1), number)
-        return if_else(differs, number, 0.0)
+        return if_else(any_marked(differs), number, 0.0)
 
     def _signals(self, at: Sequence[SX]) -> SX:
         """The states and signals at ``t, x, z, w, p``."""

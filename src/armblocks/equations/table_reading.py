@@ -78,6 +78,14 @@ def tables_read(function: Function) -> set[tuple[int, int, int]]:
     return tables
 
 
+def evaluated(function: Function, arguments: Sequence[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+    """The values of a function that may read tables, each a flat array."""
+    values = (
+        evaluate_with_reads(function, arguments) if reads_tables(function) else function.call(list(arguments))
+    )
+    return [np.array(value, dtype=np.float64).ravel() for value in values]
+
+
 def evaluate_with_reads(function: Function, arguments: Sequence[NDArray[np.float64]]) -> list[Any]:
     """The values of a function that reads tables: operations by CasADi, reads here. Slow."""
     outputs = [np.zeros(function.numel_out(k)) for k in range(function.n_out())]

@@ -18,7 +18,7 @@ from armblocks.equations.sensitivity_layout import entry_name, sensitivity_name
 from armblocks.equations.sensitivity_times import INSTANT, rate_name, time_derivative, with_instant_times
 from armblocks.errors import InputError, SimulationError
 from armblocks.face.model import CompiledDiagram
-from armblocks.face.sensitivity import check_instants
+from armblocks.face.sensitivity import InstantChecks
 from armblocks.integration.system import compile_system
 from armblocks.simulation import SimulationResult
 from armblocks.simulation import simulate as run_system
@@ -143,6 +143,7 @@ class MeasuredRun:
             sensitivity_system(model.system, list(entries), list(paths)), list(paths)
         )
         self._compiled = compile_system(augmented)
+        self._checks = InstantChecks(augmented)
         after = self._compiled.signals_layout
         self._rows: dict[int, NDArray[np.intp]] = {}
         self._rates: dict[int, int] = {}
@@ -180,7 +181,7 @@ class MeasuredRun:
         coinciding events that a parameter change would separate."""
         result = run_system(self._compiled, self._options, p)
         check_interrupt(result)
-        check_instants(self._compiled, result)
+        self._checks.check(result, p)
         if result.run.message.startswith("stopped by block"):
             raise SimulationError(
                 f"the run ended at {result.time[-1]:.9g} s: {result.run.message}",

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from os import PathLike
 from typing import Unpack
 
 import numpy as np
+from casadi import SX, Function, vertcat
 from numpy.typing import NDArray
 
 from armblocks import interrupts
@@ -15,13 +18,14 @@ from armblocks.argument_errors import ArgumentErrors
 from armblocks.diagram import Diagram
 from armblocks.diagram.mask_tuning import mask_parameters, with_mask_parameters
 from armblocks.equations import HybridSystem, Signature, Slot
-from armblocks.equations.sensitivity import MIXED, TIES, sensitivity_system
+from armblocks.equations.sensitivity import LIMIT, MIXED, SAMPLED, TIES, sensitivity_system
 from armblocks.equations.sensitivity_layout import entry_name, sensitivity_name
+from armblocks.equations.table_reading import evaluated
 from armblocks.errors import InputError, SimulationError, UnknownNameError, counted
 from armblocks.face.linearizing import resolved_diagram
 from armblocks.face.model import CompiledDiagram, compile_diagram
 from armblocks.face.settings import RunSettings, check_settings, takes_settings, with_settings
-from armblocks.integration.system import CompiledSystem, compile_system
+from armblocks.integration.system import compile_system
 from armblocks.simulation import SimulationResult
 from armblocks.simulation import simulate as run_system
 
@@ -91,7 +95,8 @@ def sensitivity(
     other values of parameters. The settings of the run are as in :func:`simulate`.
 
     Raises ``UnknownNameError`` for unknown names, and ``SimulationError`` like a run. ``SimulationError`` is
-    also raised if a parameter change would separate coinciding events, because the derivative does not exist.
+    also raised if a parameter change would separate coinciding events, or move a signal that is exactly at a
+    limit between two instants or at a tick: the derivative does not exist.
     Raises ``InputError`` for
 
     - an index that is out of range,
@@ -120,9 +125,8 @@ def sensitivity(
             raise UnknownNameError("signal", path, parameter_names, where=system.name)
     augmented = sensitivity_system(system, names, paths)
     options = with_settings(resolved.settings, settings)
-    compiled = compile_system(augmented)
-    run = run_system(compiled, options)
-    check_instants(compiled, run)
+    run = run_system(compile_system(augmented), options)
+    InstantChecks(augmented).check(run)
     slots = Signature(tuple(dict.fromkeys(chosen)))
     return SensitivityResult(run=run, outputs=output_names, parameters=names, slots=slots)
 
@@ -141,32 +145,79 @@ def _parameter(system: HybridSystem, diagram: Diagram, name: str) -> Slot:
         raise InputError(error.what, allowed=error.allowed, fix=error.fix, where=system.name) from None
 
 
-def check_instants(compiled: CompiledSystem, run: SimulationResult) -> None:
-    """Raise ``SimulationError`` for an instant at which a parameter has no derivative.
+class InstantChecks:
+    """Checks of runs of a system with sensitivities for instants at which a parameter has no derivative.
 
     A change of the parameter separates coinciding events, or moves a signal that is exactly at a limit.
     """
-    if MIXED not in compiled.discrete.ranges or run.final_state is None:
-        return
-    for name in (MIXED, *TIES):
-        time, guard = run.final_state.discrete[compiled.discrete.ranges[name]]
-        if time < 0.0:
-            continue
-        block = compiled.guard_names[int(guard) - 1]
-        if name == MIXED:
+
+    def __init__(self, system: HybridSystem) -> None:
+        self._system = system
+        self._ranges = {
+            name: places
+            for name, places in system.discrete.ranges.items()
+            if name in (MIXED, *TIES, SAMPLED) or name.startswith(LIMIT)
+        }
+
+    def check(self, run: SimulationResult, p: Array | None = None) -> None:
+        """Raise ``SimulationError`` for the first such instant of a run with parameters ``(np,)``."""
+        state = run.final_state
+        if not self._ranges or state is None:
+            return
+        values = state.discrete
+        self._refuse(run, {name: values[places] for name, places in self._ranges.items()})
+        p = np.asarray(self._system.parameter_values if p is None else p, dtype=np.float64)
+        arguments = [np.array([state.time]), state.states, values, state.algebraic, p]
+        (column,) = evaluated(self._at_end, arguments)
+        ends = itertools.accumulate(places.stop - places.start for places in self._ranges.values())
+        self._refuse(run, dict(zip(self._ranges, np.split(column, list(ends)[:-1]))))
+
+    @cached_property
+    def _at_end(self) -> Function:
+        """The variables of these instants as they would be at an instant at the end of a run, in one column,
+        from ``t, x, z, w, p``."""
+        update = self._system.update
+        function = Function("f", list(update.arguments), list(update.results))
+        arguments = list(update.arguments[:5])
+        (z,) = function.call([*arguments, SX.zeros(len(self._system.clocks))], True, False)
+        return Function("f", arguments, [vertcat(*(z[places] for places in self._ranges.values()))])
+
+    def _refuse(self, run: SimulationResult, instants: Mapping[str, Array]) -> None:
+        for name, values in instants.items():
+            time = f"{values[0]:.9g} s"
+            if values[0] < 0.0:
+                continue
+            if name == MIXED:
+                raise SimulationError(
+                    f"several events coincide at {time}, one of '{self._guarded(values[1])}' among them, and "
+                    "a parameter change would separate them: the derivative does not exist",
+                    where=self._system.name,
+                    allowed="events that coincide, or do not, for all small parameter changes",
+                    fix="shift one of the events, or use the difference of two runs",
+                    partial=run,
+                )
+            if name == SAMPLED:
+                raise SimulationError(
+                    f"block '{self._samples(values[1])}' samples a signal exactly at a limit or at a jump at "
+                    f"{time}, and a parameter change would move it away: the derivative does not exist",
+                    where=self._system.name,
+                    allowed="sampled signals that have derivatives at the ticks",
+                    fix="shift the ticks or the signal a little, or use the difference of two runs",
+                    partial=run,
+                )
+            block = name.removeprefix(LIMIT) if name.startswith(LIMIT) else self._guarded(values[1])
             raise SimulationError(
-                f"several events coincide at {time:.9g} s, one of '{block}' among them, and a parameter "
-                "change would separate them: the derivative does not exist",
-                where=compiled.name,
-                allowed="events that coincide, or do not, for all small parameter changes",
-                fix="shift one of the events, or use the difference of two runs",
+                f"block '{block}' is exactly at a limit or at a jump after an event or a tick at {time}, "
+                "and a parameter change would move it away: the derivative does not exist",
+                where=self._system.name,
+                allowed="signals that jump at all small parameter changes, or at none",
+                fix="change the new value or the limit a little, or use the difference of two runs",
                 partial=run,
             )
-        raise SimulationError(
-            f"block '{block}' is exactly at a limit or at a jump after an event or a tick at {time:.9g} s, "
-            "and a parameter change would move it away: the derivative does not exist",
-            where=compiled.name,
-            allowed="signals that jump at all small parameter changes, or at none",
-            fix="change the new value or the limit a little, or use the difference of two runs",
-            partial=run,
-        )
+
+    def _samples(self, number: float) -> str:
+        elements = [element for slot in self._system.discrete for element in slot.elements]
+        return elements[int(number) - 1].rpartition("/")[0]
+
+    def _guarded(self, number: float) -> str:
+        return self._system.guard_names[int(number) - 1]
