@@ -42,7 +42,7 @@ def simulate(
 
     With ``solver="auto"`` a system without states is evaluated directly at all sample times. Other systems
     are integrated with RK4 if ``step`` is given, else with Dormand-Prince 5(4). When stability, not accuracy,
-    has limited some thousand of its steps, Rodas5P replaces it. Without a ``sample_time`` the stop time is
+    has limited 4000 of its steps, Rodas5P replaces it. Without a ``sample_time`` the stop time is
     divided into 1000 intervals (10 s into intervals of 10 ms). With a fixed step every step is recorded, or
     every n-th step so that there are at most 10 000 rows.
 

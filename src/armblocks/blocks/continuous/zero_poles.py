@@ -57,13 +57,16 @@ class ZeroPole(SectionsByRoots):
 
 @dataclass(frozen=True, kw_only=True)
 class AnalogFilter(FilterByBand):
-    """An analog filter; the Butterworth low pass has |y / u| = 1 / sqrt(1 + (w / edge)^(2 order)).
+    """A low-pass, high-pass, band-pass or band-stop filter for continuous signals, initially at rest.
 
-    - ``butterworth`` has no ripple.
+    ``design`` selects the frequency response:
+
+    - ``butterworth`` has no ripple. The low pass has |y / u| = 1 / sqrt(1 + (w / edge)^(2 order)) at the
+      angular frequency w (rad/s).
     - ``chebyshev1`` has a steeper roll-off and ripple in the pass band.
     - ``chebyshev2`` has ripple in the stop band, and its edge is the beginning of the stop band.
 
-    Band filters have twice as many poles as the order. The filter is initially at rest.
+    Band filters have twice as many poles as the order.
     """
 
     title: ClassVar[str] = "Analog Filter Design"

@@ -69,9 +69,11 @@ class DiscreteZeroPole(SectionsByRoots):
 
 @dataclass(frozen=True, kw_only=True)
 class DigitalFilter(FilterByBand):
-    """A digital filter: the analog filter under the bilinear transformation z = (1 + s) / (1 - s).
+    """A sampled low-pass, high-pass, band-pass or band-stop filter, initially at rest.
 
-    Edge frequencies are fractions of half the sampling frequency, as in MATLAB and SciPy (``butter(order,
+    The designs are those of the block Analog Filter Design. The bilinear transformation
+    s = (z - 1) / (z + 1) converts the filter, and its edges are exactly at the given frequencies. Edge
+    frequencies are fractions of half the sampling frequency, as in MATLAB and SciPy (``butter(order,
     edge)``).
     """
 

@@ -276,10 +276,10 @@ class IntervalTestDynamic(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class CombinatorialLogic(Block):
-    """A truth table: the conditions are the binary digits of a row number, and y is that row.
+    """A truth table: y is the row with the number 1 + u1 2^(m-1) + … + um, for m conditions 0 or 1.
 
-    For conditions (u1, …, um) the row is 1 + u1 2^(m-1) + … + um, of 2^m rows. A table of one column gives
-    a scalar. The default is the AND of two conditions.
+    The table has 2^m rows, one for each combination of conditions. An input that is not 0 counts as 1. A
+    table of one column gives a scalar. The default is the AND of two conditions.
     """
 
     title: ClassVar[str] = "Combinatorial Logic"

@@ -37,11 +37,11 @@ from armblocks.errors import InputError
 
 @dataclass(frozen=True, kw_only=True)
 class Prelookup(BlockWithAxes):
-    """The interval of a position and the fraction in it: u = b(k) + f (b(k+1) - b(k)), k from 0.
+    """The interval k of a table axis that contains u, and the fraction f of this interval at u.
 
-    Several Interpolation Using Prelookup blocks can use the result of one Prelookup. At the last position the
+    u = b(k) + f (b(k+1) - b(k)), where b are the positions and k counts from 0. At the last position the
     index of the last interval is returned, with f = 1. Beyond the ends ``clip`` limits f to 0 or 1, and
-    ``linear`` extrapolates.
+    ``linear`` extrapolates. Several Interpolation Using Prelookup blocks can use the result of one Prelookup.
     """
 
     title: ClassVar[str] = "Prelookup"
@@ -107,10 +107,10 @@ class Prelookup(BlockWithAxes):
 
 @dataclass(frozen=True, kw_only=True)
 class InterpolationUsingPrelookup(Block):
-    """Linear interpolation at known intervals: y = (1 - f) table[k] + f table[k + 1], along each axis.
+    """Linear interpolation in a table at index k and fraction f: y = (1 - f) table[k] + f table[k + 1].
 
-    Indices and fractions come from Prelookup blocks, one pair for each axis of the table. An index is
-    rounded down to an integer and limited to the table.
+    A table of several axes is interpolated along each axis. Indices and fractions come from Prelookup blocks,
+    one pair for each axis. An index is rounded down to an integer and limited to the table.
     """
 
     title: ClassVar[str] = "Interpolation Using Prelookup"

@@ -191,10 +191,14 @@ class DotProduct(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Norm(Block):
-    """The norm of a vector or matrix; 2: sqrt(sum u^2), 1: sum abs(u), inf: max abs(u), fro: sqrt(sum u^2).
+    """The norm of a vector or matrix, by default the length of a vector: y = sqrt(u1^2 + u2^2 + …).
 
-    For a matrix, 1 is the greatest column sum and inf the greatest row sum. The 2-norm of a matrix (its
-    greatest singular value) is not supported. The derivative of the norms 2 and fro at zero is NaN.
+    - ``2``: the length of a vector. The 2-norm of a matrix (its greatest singular value) is not supported.
+    - ``1``: the sum of abs(u) of a vector; for a matrix, the greatest of these sums over the columns.
+    - ``inf``: the greatest abs(u) of a vector; for a matrix, the greatest sum of abs(u) over the rows.
+    - ``fro``: the square root of the sum of the squares of all elements.
+
+    The derivative of the norms 2 and fro at zero is NaN.
     """
 
     title: ClassVar[str] = "Norm"

@@ -62,10 +62,11 @@ class Rounding(BlockWithSteps):
 
 @dataclass(frozen=True, kw_only=True)
 class Modulo(Block):
-    """The remainder: mod(u, v) has the sign of v, and mod(u, 0) = u; rem(u, v) has the sign of u.
+    """The remainder of u / v: y = u - v floor(u / v) for ``mod``, y = u - v fix(u / v) for ``rem``.
 
-    Both are computed without rounding u / v. ``rem(u, 0)`` is NaN. Where u / v exceeds 2^44, jumps of the
-    remainder are not events. In Simulink, mod and rem are options of the Math Function block.
+    fix rounds towards zero. mod(u, v) has the sign of v, and mod(u, 0) = u. rem(u, v) has the sign of u, and
+    rem(u, 0) is NaN. The remainder is computed without rounding u / v. Where u / v exceeds 2^44, its jumps
+    are not events. In Simulink, mod and rem are options of the Math Function block.
     """
 
     following_modes: ClassVar[bool] = True

@@ -14,7 +14,11 @@ from armblocks.robot.joints import AxisMotion, Motion
 
 @dataclass(frozen=True, kw_only=True)
 class BearingJoint(JointBlock):
-    """F translates along the z axis of B, then rotates about its own x, y and z axes, in this order."""
+    """A shaft in a bearing: frame F translates along the z axis of frame B and rotates in all directions.
+
+    The coordinates are the translation pz (m), then the rotations rx, ry and rz (rad) about the own x, y and
+    z axes of F, in this order. At ry = ±90 degrees the first and the last rotation axis coincide.
+    """
 
     title: ClassVar[str] = "Bearing Joint"
     sign: ClassVar[FaceSign] = Words("Bearing")

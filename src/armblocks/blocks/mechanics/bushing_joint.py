@@ -14,7 +14,12 @@ from armblocks.robot.joints import AxisMotion, Motion
 
 @dataclass(frozen=True, kw_only=True)
 class BushingJoint(JointBlock):
-    """F translates along the x, y and z axes of B, then rotates about its x, then y, then z axis."""
+    """An elastic mount: frame F translates along all axes of frame B and rotates in all directions.
+
+    The coordinates are the translations px, py and pz (m) along the axes of B, then the rotations rx, ry and
+    rz (rad) about the own x, y and z axes of F, in this order. At ry = ±90 degrees the first and the last
+    rotation axis coincide; the 6-DOF Joint has no such position.
+    """
 
     title: ClassVar[str] = "Bushing Joint"
     sign: ClassVar[FaceSign] = Words("Bushing")

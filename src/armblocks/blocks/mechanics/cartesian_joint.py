@@ -14,7 +14,7 @@ from armblocks.robot.joints import AxisMotion, Motion
 
 @dataclass(frozen=True, kw_only=True)
 class CartesianJoint(JointBlock):
-    """F translates along the x, y and z axes of B."""
+    """Three slides: frame F translates along the x, y and z axes of frame B, without rotation."""
 
     title: ClassVar[str] = "Cartesian Joint"
     sign: ClassVar[FaceSign] = Words("Cartesian")

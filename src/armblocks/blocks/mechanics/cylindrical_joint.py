@@ -15,7 +15,7 @@ from armblocks.robot.joints import AxisMotion, Motion
 
 @dataclass(frozen=True, kw_only=True)
 class CylindricalJoint(JointBlock):
-    """F rotates about and translates along the common z axis of B and F."""
+    """A shaft in a sleeve: frame F rotates about the common z axis of B and F and slides along it."""
 
     title: ClassVar[str] = "Cylindrical Joint"
     sign: ClassVar[FaceSign] = Words("Cylindrical")

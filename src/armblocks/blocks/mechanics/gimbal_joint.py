@@ -15,7 +15,11 @@ from armblocks.robot.joints import AxisMotion, Motion
 
 @dataclass(frozen=True, kw_only=True)
 class GimbalJoint(JointBlock):
-    """F rotates about its x, then y, then z axis; at 90 degrees about y two axes coincide."""
+    """Three gimbals: frame F rotates about its own x, then y, then z axis, relative to frame B.
+
+    The coordinates are these angles rx, ry and rz (rad). At ry = ±90 degrees the first and the last axis
+    coincide; the Spherical Joint has no such position.
+    """
 
     title: ClassVar[str] = "Gimbal Joint"
     sign: ClassVar[FaceSign] = Words("Gimbal")

@@ -14,7 +14,7 @@ from armblocks.robot.joints import AxisMotion, Motion
 
 @dataclass(frozen=True, kw_only=True)
 class PinSlotJoint(JointBlock):
-    """A pin in a slot: F translates along the x axis of B, then rotates about its own z axis."""
+    """A pin in a slot: frame F translates along the x axis of frame B, then rotates about its own z axis."""
 
     title: ClassVar[str] = "Pin Slot Joint"
     sign: ClassVar[FaceSign] = Words("Pin Slot")

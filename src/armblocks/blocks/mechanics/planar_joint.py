@@ -15,7 +15,7 @@ from armblocks.robot.joints import AxisMotion, Motion
 
 @dataclass(frozen=True, kw_only=True)
 class PlanarJoint(JointBlock):
-    """F translates along the x and y axes of B, then rotates about its z axis."""
+    """A motion in a plane: frame F translates along the x and y axes of frame B and rotates about z."""
 
     title: ClassVar[str] = "Planar Joint"
     sign: ClassVar[FaceSign] = Words("Planar")

@@ -14,7 +14,7 @@ from armblocks.robot.joints import AxisMotion, Motion
 
 @dataclass(frozen=True, kw_only=True)
 class RectangularJoint(JointBlock):
-    """F translates along the x and y axes of B."""
+    """Two slides: frame F translates along the x and y axes of frame B, without rotation."""
 
     title: ClassVar[str] = "Rectangular Joint"
     sign: ClassVar[FaceSign] = Words("Rectangular")

@@ -14,7 +14,11 @@ from armblocks.robot.joints import AxisMotion, BallMotion, Motion
 
 @dataclass(frozen=True, kw_only=True)
 class SixDofJoint(JointBlock):
-    """F moves freely: three translations in the axes of B, then any rotation, with a quaternion w x y z."""
+    """A free motion: frame F translates and rotates relative to frame B without any constraint.
+
+    The coordinates are the translations px, py and pz (m) along the axes of B, then the quaternion w x y z of
+    F in B.
+    """
 
     title: ClassVar[str] = "6-DOF Joint"
     sign: ClassVar[FaceSign] = Words("6-DOF")

@@ -14,7 +14,10 @@ from armblocks.robot.joints import AxisMotion, BallMotion, Motion
 
 @dataclass(frozen=True, kw_only=True)
 class TelescopingJoint(JointBlock):
-    """F rotates about the origin of B, then translates along its own z axis."""
+    """A ball joint with a telescopic rod: frame F rotates about the origin of frame B and slides along z.
+
+    The coordinates are the quaternion w x y z of F in B, then the translation pz (m) along the z axis of F.
+    """
 
     title: ClassVar[str] = "Telescoping Joint"
     sign: ClassVar[FaceSign] = Words("Telescoping")

@@ -29,10 +29,14 @@ from armblocks.diagram import (
 
 @dataclass(frozen=True, kw_only=True)
 class MotorDrive(Block):
-    """The torque command u, limited by the current (peak) and the voltage (stall (1 -+ w / w0)) of a drive.
+    """The torque of a motor drive: the command u (N m), limited by the current and the voltage of the drive.
 
-    The voltage limit is the torque-speed line of a DC motor: for torques in the direction of motion it falls
-    from ``stall`` at rest to 0 at ``no_load_speed`` w0. Beyond w0 the drive can only brake.
+    - Current: the torque stays between -``peak`` and ``peak``.
+    - Voltage: the torque stays between -stall (1 + w / w0) and stall (1 - w / w0), where w is the speed and
+      w0 the ``no_load_speed``. These are the torque-speed lines of a DC motor.
+
+    In the direction of motion the voltage limit falls from ``stall`` at rest to 0 at w0. Beyond w0 the drive
+    can only brake, at most with the peak torque.
     """
 
     title: ClassVar[str] = "Motor Drive"

@@ -36,11 +36,12 @@ from armblocks.trajectories import Quintic
 
 @dataclass(frozen=True, kw_only=True)
 class Trapezoidal(Block):
-    """A trapezoidal profile from q0 to qf in tmax: qd rises, is cruise (qf - q0) / tmax, and falls.
+    """A joint motion from q0 to qf in the time tmax (s) with a trapezoidal profile of the speed.
 
-    This is the toolbox's ``lspb``. ``cruise`` is the speed of the middle part in units of the mean speed:
-    1.5 (the toolbox's default) gives three equal parts and 2 a triangle. The ramps take tmax (1 - 1 / cruise)
-    each. Before 0 and after tmax the joints are at rest.
+    The speed rises linearly, is constant, and falls linearly. The constant speed is
+    cruise (qf - q0) / tmax, so that ``cruise`` is the ratio of the greatest speed to the mean speed: 1.5 (the
+    toolbox's default) gives three equal parts, 2 gives a triangle. Rise and fall take tmax (1 - 1 / cruise)
+    each. Before 0 and after tmax the joints are at rest. This is the toolbox's ``lspb``.
     """
 
     title: ClassVar[str] = "lspb"
@@ -97,11 +98,12 @@ class Trapezoidal(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class MultiSegment(Block):
-    """Linear segments between points with parabolic blends: segment k takes durations(k), in s.
+    """A joint motion past given points: linear segments, which parabolic blends connect.
 
     q = p1 + sum of (p(k+1) - p(k)) g_k(t), where each g_k rises from 0 to 1. The toolbox's ``mstraj`` and
     ``ab.mstraj`` have quintic blends instead of parabolic ones.
 
+    - Segment k takes durations(k), in s.
     - Each blend takes ``blend``, in s. The speed changes linearly in a blend and is constant between blends.
     - The blend at a point begins at the sum of the durations before this point; the first begins at t = 0.
     - The motion ends after the sum of all durations plus one blend.

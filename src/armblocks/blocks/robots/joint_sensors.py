@@ -106,11 +106,12 @@ class JointSensor(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Encoder(Block):
-    """An incremental encoder with a gear: count = floor(G counts u / 2 pi), y = 2 pi count / (G counts).
+    """A joint angle (rad) measured by an incremental encoder behind a gear: y = 2 pi count / (G counts).
 
-    ``speed`` is the difference quotient (count(k) - count(k-1)) / T as a joint angle per second, and 0 at the
-    first tick. The resolution of ``speed`` is 2 pi / (G counts T). ``counts`` is the number of counts per
-    turn after quadrature, four per line.
+    - ``count`` is floor(G counts u / 2 pi), with the gear ratio G.
+    - ``counts`` is the number of counts per turn after quadrature, four per line.
+    - ``speed`` is the difference quotient (count(k) - count(k-1)) / T as a joint angle per second, and 0 at
+      the first tick. Its resolution is 2 pi / (G counts T).
     """
 
     title: ClassVar[str] = "Encoder"

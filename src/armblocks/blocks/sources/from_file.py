@@ -21,7 +21,7 @@ from armblocks.diagram.signs import FaceSign, graph
 
 @dataclass(frozen=True, kw_only=True)
 class FromFile(BlockWithRows):
-    """A signal from a table: y = values of the rows around t, interpolated linearly or held.
+    """A signal from the rows (time, values) of a file: y = the values at time t, interpolated or held.
 
     ``data`` is the table:
 

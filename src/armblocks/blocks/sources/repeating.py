@@ -47,11 +47,16 @@ _WAVES = {
 
 @dataclass(frozen=True, kw_only=True)
 class SignalGenerator(Block):
-    """A periodic wave; s = f t - floor(f t): sine A sin(2 pi s), sawtooth A (1 - 2 s), or square.
+    """A periodic wave of amplitude A and frequency f: a sine, a square wave or a sawtooth.
 
-    The square is -A in the first half of the period and A in the second, and the sawtooth falls from A to
-    -A, as with Simulink's block. The random waveform of Simulink's block is the block Uniform Random Number
-    here.
+    s = f t - floor(f t) is the elapsed fraction of the period, with f in Hz:
+
+    - ``sine``: y = A sin(2 pi s).
+    - ``square``: y = -A in the first half of each period, A in the second half.
+    - ``sawtooth``: y = A (1 - 2 s), which falls from A to -A in each period.
+
+    The signs of the waves are those of Simulink's block. For the random waveform of Simulink's block use the
+    block Uniform Random Number.
     """
 
     following_modes: ClassVar[bool] = True
@@ -114,7 +119,7 @@ class SignalGenerator(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class RepeatingSequence(Block):
-    """A periodic piecewise linear signal: y = values at times, linear in between, period times[-1].
+    """A periodic signal of straight lines: y = values(k) at times(k), with the period times(n).
 
     If the last value differs from the first value, the signal jumps at the end of each period.
     """
@@ -181,9 +186,10 @@ class RepeatingSequence(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class RepeatingSequenceInterpolated(Block):
-    """A periodic sampled signal: y(k) = values at times, interpolated at kT modulo times[-1].
+    """A periodic signal at ticks: y = values(k) at times(k), interpolated, with the period times(n).
 
-    ``linear`` interpolates linearly, ``nearest`` takes the nearest value, ``flat`` the previous value.
+    The value at a tick is interpolated at the time of the tick modulo times(n). ``linear`` interpolates
+    linearly, ``nearest`` takes the nearest value, ``flat`` the previous value.
     """
 
     title: ClassVar[str] = "Repeating Sequence Interpolated"

@@ -140,11 +140,14 @@ class Chirp(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class FromTable(Block):
-    """A signal given at sample times: y = values at times, interpolated by the chosen method.
+    """A signal through given points: y = values(k) at t = times(k), interpolated in between.
 
-    ``linear`` interpolates linearly, ``flat`` holds the previous value, ``cubic`` is the not-a-knot spline.
-    Outside the table the first and last value are held (``hold``), or the signal is ``zero``, or it is
-    extrapolated linearly (``linear``). Solver steps end at the given times.
+    - ``method``: ``linear`` interpolates linearly, ``flat`` holds the previous value, ``cubic`` is the
+      not-a-knot spline.
+    - ``outside`` applies before the first and after the last time: ``hold`` keeps the first or last value,
+      ``zero`` gives 0, ``linear`` extrapolates linearly.
+
+    Solver steps end at the given times.
     """
 
     title: ClassVar[str] = "From Workspace"

@@ -33,10 +33,15 @@ def _angles(*names: str) -> tuple[Port, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class Rpy2T(Block):
-    """The rotation by roll, pitch and yaw: zyx (release 10) is T = Rz(yaw) Ry(pitch) Rx(roll).
+    """The pose with the rotation by roll, pitch and yaw (rad): T = Rz(yaw) Ry(pitch) Rx(roll) for ``zyx``.
 
-    ``xyz`` is Rx(yaw) Ry(pitch) Rz(roll), ``yxz`` Ry(yaw) Rx(pitch) Rz(roll); ``release 9`` (and 8) is
-    Rx(roll) Ry(pitch) Rz(yaw), ``release 7`` Rz(roll) Ry(pitch) Rx(yaw).
+    ``convention`` selects the order of the rotations:
+
+    - ``zyx``, as in release 10 of the toolbox: Rz(yaw) Ry(pitch) Rx(roll).
+    - ``xyz``: Rx(yaw) Ry(pitch) Rz(roll).
+    - ``yxz``: Ry(yaw) Rx(pitch) Rz(roll).
+    - ``release 9``, also for release 8: Rx(roll) Ry(pitch) Rz(yaw).
+    - ``release 7``: Rz(roll) Ry(pitch) Rx(yaw).
     """
 
     title: ClassVar[str] = "rpy2T"

@@ -208,11 +208,14 @@ class Skew(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Tr2Delta(Block):
-    """The differential motion (d; r) from T1 to T2: body is (p; vex(R - I)) of T1^-1 T2, as in release 10.
+    """The small motion (d; r) from pose T1 to pose T2: displacement d (m) and rotation vector r (rad).
 
-    ``world`` is the formula of the toolbox up to release 9: d = p2 - p1 and r = 1/2 (n1 x n2 + o1 x o2 + a1 x
-    a2), where n, o, a are the axes of T1 and T2 in their reference frame. Both are accurate for small
-    rotations only. vex gives the vector of the skew-symmetric part of a matrix.
+    - ``body``, in the axes of T1, as in release 10 of the toolbox: d = p and r = vex(R - I), where R and p
+      are rotation and position of T1^-1 T2. vex gives the vector of the skew-symmetric part of a matrix.
+    - ``world``, in the reference frame of T1 and T2, as in the toolbox up to release 9: d = p2 - p1 and
+      r = 1/2 (n1 x n2 + o1 x o2 + a1 x a2), where n, o, a are the axes of T1 and T2.
+
+    Both formulas for r are accurate for small rotations only.
     """
 
     title: ClassVar[str] = "tr2delta"
