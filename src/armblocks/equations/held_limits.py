@@ -46,31 +46,29 @@ def held_limits(system: HybridSystem) -> dict[str, Function]:
     """For each block the distances between held signals and their limits: functions (n,) of ``t, x, z, w,
     p``.
 
-    The block is the one of the first signal, state or variable that depends on the operation with the limit.
+    The block is the one of the first signal, state or unknown that depends on the operation with the limit.
     """
     if not system.breakpoints.outputs.size and system.discrete.size == len(system.modes):
         return {}
     symbols = list(system.signals.arguments)
-    ticks = SX.sym("m", len(system.clocks))
-    function = _all_values(system, [*symbols, ticks])
+    function = _all_values(system, symbols)
     delayed = frozenset(() if system.delays is None else (*system.delays.values, *system.delays.derivatives))
     first = _first_results(function)
-    layouts = (system.signals_layout, system.states, system.algebraic, system.discrete)
+    layouts = (system.signals_layout, system.states, system.algebraic)
     names = [element for layout in layouts for slot in layout for element in slot.elements]
     found: dict[str, list[SX]] = {}
-    for number, distance in _limits(function, [*symbols, ticks], delayed).items():
+    for number, distance in _limits(function, symbols, delayed).items():
         if first[number] < len(names):
             found.setdefault(names[first[number]].rpartition("/")[0], []).append(distance)
     return {block: Function("f", symbols, [vertcat(*limits)]) for block, limits in found.items()}
 
 
 def _all_values(system: HybridSystem, symbols: Sequence[SX]) -> Function:
-    """The signals, the derivatives of states, the residual and the updated variables in one column."""
-    letters = dict(zip("txzwpm", symbols))
+    """The signals, the derivatives of states and the residual in one column."""
     columns: list[SX] = []
-    for traced in (system.signals, system.derivative, system.residual, system.update):
+    for traced in (system.signals, system.derivative, system.residual):
         function = Function("f", list(traced.arguments), [vertcat(*traced.results, SX(0, 1))])
-        columns += function.call([letters[name] for name in traced.inputs.names], True, False)
+        columns += function.call(list(symbols), True, False)
     return Function("f", list(symbols), [densify(vertcat(*columns))], {"cse": True})
 
 
