@@ -2,8 +2,7 @@
 
 A change of a parameter can move an event at the start into the run or before it. The derivatives for both
 differ, unless flow and signals are the same on both sides of the event. A change can also move a block that
-starts exactly at a limit or at a jump to one of its sides. The start is evaluated once, in Python, before a
-run.
+starts exactly at a limit or at a jump to one of its sides. The start is evaluated in Python, before a run.
 """
 
 from __future__ import annotations
@@ -45,8 +44,9 @@ MAX_NEWTON_STEPS, SAME_SOLUTION = 50, 1e-13
 def refuse_moving_start(system: HybridSystem, parameters: Sequence[str]) -> None:
     """Raise ``InputError`` for a parameter without a derivative at the start of a run.
 
-    An event is at the start, depends on the parameter, and its two sides differ; or a block starts exactly at
-    a limit or at a jump. If implicit equations have no solution here, nothing is checked: the run reports it.
+    There are two such cases. The parameter moves an event at the start whose two sides differ, or it moves a
+    block that starts exactly at a limit or at a jump. If the implicit equations have no solution at the
+    start, nothing is checked here, because the run then ends with its own error.
     """
     with contextlib.suppress(_UnsolvedError):
         start = _Start(_Equations(system))
@@ -284,10 +284,11 @@ class _Start:
         return sorted(guards)
 
     def _resting_guards(self, g: Array, rate: Array, entries: slice) -> set[int]:
-        """The guards that leave zero with a time derivative of zero, although one of these parameters moves
-        this zero: a comparison with the position of a body that starts from rest, for example.
+        """The guards that are zero with a zero time derivative at the start, and that a parameter moves.
 
-        The multiple zero splits, so that there are events for one sign of the change only.
+        An example is a comparison with the position of a body that starts from rest. Such a guard has a
+        multiple zero at t = 0. A small change of the parameter splits this zero, so that there are events
+        for one sign of the change only.
         """
         resting = (np.abs(g) <= RESTING) & (np.abs(rate) <= RESTING)
         if not resting.any():
@@ -310,8 +311,8 @@ class _Start:
         return guards
 
     def held_states(self, entries: slice) -> list[str]:
-        """The blocks with states whose derivative with respect to these parameters is changed by the reset at
-        the start."""
+        """The blocks for which the reset at the start changes the derivative of a state with respect to a
+        parameter."""
         changed = np.zeros(self.system.states.size)
         for direction in self._initial_directions(entries):
             after = self.equations.along(self.equations.reset_along, self.after, self.p, direction)
@@ -325,9 +326,9 @@ class _Start:
 
         The derivative by the traced equations is compared with the differences to both sides. The error of a
         difference decreases with the change of the parameter, except at a kink or a jump. A kink that the
-        run leaves at once does not count. A jump of a signal counts also then, because the time until the run
-        leaves it depends on the change. A jump of the flow alone does not: a rate limiter that starts beside
-        its input reaches it at once.
+        run leaves at once does not count. A jump of a signal always counts, because the time until the run
+        leaves the jump depends on the change. A jump of the flow alone counts as a kink only. An example is a
+        rate limiter that starts beside its input and reaches the input at once.
         """
         system = self.system
         layouts = (system.states, system.discrete, system.signals_layout, system.states)
@@ -358,8 +359,10 @@ class _Start:
     def _kinks_and_jumps(
         self, index: int, step: float, far: _Start, near: _Start, t: float = 0.0
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Which values at a time have a kink or a jump between the unchanged parameter and its changes to
-        ``far`` and ``near``, and which signals and variables have a jump."""
+        """Which values have a kink or a jump at time ``t``, and which signals and variables have a jump.
+
+        ``far`` and ``near`` are the starts after the changes ``step`` and ``step * CLOSER`` of the parameter.
+        """
         error, limit = self._error(index, step, far, t)
         remaining, _ = self._error(index, step * CLOSER, near, t)
         kinks = (error > limit) & (remaining > error / 2.0)
@@ -379,11 +382,12 @@ class _Start:
         return _Start(self.equations, p)
 
     def _lasts(self, far: _Start, near: _Start) -> bool:
-        """Whether modes that change with a parameter stay changed.
+        """Whether the run stays at a kink for longer than ``SHORT``. True if no mode differs at ``far``.
 
-        They do if no mode changes, or if no guard that is zero only for the unchanged parameter moves, or if
-        one of these guards does not move. ``far`` and ``near`` are starts with two changes of the parameter
-        in the ratio 1 to ``CLOSER``.
+        Otherwise the guards decide that are zero for the unchanged parameter only. The result is false if
+        there are such guards and all of them move, which means that they change by more than their value
+        within ``SHORT``. ``far`` and ``near`` are starts with two changes of the parameter in the ratio 1 to
+        ``CLOSER``.
         """
         if not self._modes_change(far):
             return True
@@ -409,8 +413,11 @@ class _Start:
         return np.concatenate([*columns])
 
     def _error(self, index: int, step: float, side: _Start, t: float) -> tuple[Array, Array]:
-        """The difference between the derivatives of all values by a step of one parameter and by the
-        equations, and the smallest difference that counts. ``side`` is the start after the step."""
+        """The errors of the finite differences of all values, and for each the smallest error that counts.
+
+        A finite difference uses a step of one parameter; its error is the deviation from the derivative by
+        the equations. ``side`` is the start after the step.
+        """
         values = self._values(t)
         with np.errstate(invalid="ignore", over="ignore"):  # infinite values have no difference
             rate = self._rate(index, side, step, t)
@@ -451,7 +458,7 @@ class _Start:
         return g, rate, np.abs(np.array(moves)).max(axis=0)
 
     def _sides_differ(self, guard: int) -> bool:
-        """Whether the flow or a signal jumps where a guard of both directions fires."""
+        """Whether an event of a guard, upwards or downwards, changes the flow or a signal."""
         others: list[Array] = []
         for direction in (-1.0, 1.0):
             event = np.zeros(len(self.system.guard_directions))

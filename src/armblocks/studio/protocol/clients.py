@@ -27,7 +27,7 @@ class InvalidRequestError(ValueError):
 
 @dataclass(eq=False)
 class StudioClient:
-    """One connected browser page. The hub manages its documents, runs and robots."""
+    """One connected browser tab. The hub manages its documents, runs and robots."""
 
     send_text: SendText
     send_bytes: SendBytes
@@ -36,7 +36,7 @@ class StudioClient:
     shows: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
     """Displayed documents, with the path of the displayed sheet."""
     records_in_progress: dict[str, int] = field(default_factory=dict[str, int])
-    """Runs whose record is being sent, with the number of sent messages; live messages are withheld."""
+    """Runs whose record is being sent, with the number of sent messages. Their live messages are withheld."""
 
     @property
     def congested(self) -> bool:
