@@ -259,11 +259,11 @@ def test_the_key_is_the_same_in_another_process() -> None:
     code = "import armblocks as ab; from armblocks.diagram import content_key as k; " + (
         "print(k(ab.load_diagram('puma560_payload_drop')))"
     )
-    message = subprocess.run(
+    key = subprocess.run(
         [sys.executable, "-c", code],
         env={**os.environ, "PYTHONHASHSEED": "1"},
         capture_output=True,
         text=True,
         check=True,
     ).stdout.strip()
-    assert message == content_key(ab.load_diagram("puma560_payload_drop"))
+    assert key == content_key(ab.load_diagram("puma560_payload_drop"))

@@ -57,7 +57,7 @@ def optimise(
         ),
     ] = None,
     runs: Annotated[int | None, typer.Option(help="Number of scenarios with random parameters.")] = None,
-    statistic: Annotated[str, typer.Option(help="mean, worst, or the probability of a quantile.")] = "mean",
+    statistic: Annotated[str, typer.Option(help="mean, worst, or a quantile such as 0.9.")] = "mean",
     share: Annotated[float, typer.Option(help="Share of scenarios in which constraints hold.")] = 1.0,
     method: Annotated[str, typer.Option(help="auto, gradient or search.")] = "auto",
     starts: Annotated[int, typer.Option(help="Number of starts of the method gradient.")] = 1,

@@ -51,8 +51,8 @@ class MechanismEquations:
     """``M(q) qdd + bias(q, qd) = torque + J' multipliers`` at one state that satisfies the constraints.
 
     ``bias`` includes gravity, springs, velocity terms and the ``wrench``; ``M`` and ``bias`` include the
-    ``payload``. ``J`` (m, n): of the independent relations; ``J_bias``: ``dJ/dt qd`` (m, 1). Couplings are
-    eliminated. ``near``: coordinates near which the closures are assembled.
+    ``payload``. ``J`` (m, n) is the Jacobian of the independent relations, ``J_bias`` (m, 1) is ``dJ/dt qd``.
+    Couplings are eliminated. ``near``: coordinates near which the closures are assembled.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class MechanismEquations:
         if payload is not None:
             tree = with_payload(tree, payload)
         coordinates = robot.coordinate_map
-        # The bias of the relations is a derivative with respect to q at constant speeds: both are symbols.
+        # J_bias is a derivative with respect to q at constant speeds, so coordinates and speeds are symbols.
         at, speeds = SX.sym("q", robot.nq), SX.sym("qd", robot.nv)
         tree_q, rates = tree_coordinates(coordinates, at), entries(tree_speeds(coordinates, speeds))
         joints = joint_motions(tree, tree_q)
@@ -100,7 +100,10 @@ class MechanismEquations:
         return if_else(stopping, 0.0, qd + change)
 
     def _solve(self, right: SX, free: SX, rates: SX) -> tuple[SX, SX]:
-        """``x`` with ``M x = right + J' multipliers`` for the free joints, ``J x = rates``; 0 if locked."""
+        """Return ``x`` and the multipliers with ``M x = right + J' multipliers`` and ``J x = rates``.
+
+        The first equation holds in the rows of the free joints; ``x`` is 0 for locked joints.
+        """
         n, m = self.M.shape[0], self.J.shape[0]
         masked = SX(self.M)
         for i in range(n):
@@ -128,7 +131,8 @@ def consistent_state(
     """Coordinates and speeds near ``q``, ``qd`` that satisfy the closures, by motions of the free joints.
 
     Locked joints keep their values exactly. The coordinates are NaN if ``q`` is too far from the closures.
-    ``newton_steps``: additional steps before the others, each with its own Jacobian, for distant ``q``.
+    ``newton_steps``: number of additional first steps for ``q`` far from the closures. Each of them has its
+    own Jacobian; the other steps share one.
     """
     relations = independent_relations(robot, near)
     if not relations:

@@ -37,7 +37,8 @@ _UNITS = {"m": "kg", "Jm": "kg m2", "B": "N m s/rad", "Tc": "N m", "Tc+": "N m",
 _CORRELATED = 0.2
 _GROUPING_WIDTH = 60
 _MISFIT_OF_NOISE, _MISFIT_OF_TORQUES = 0.3, 0.01
-"""Deviations of the torques of ``robot`` from the fit that are reported, relative to noise and torques."""
+"""A deviation of the torques of ``robot`` from the fit is reported if it exceeds both multiples: of the
+noise, and of the measured torques."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -253,7 +254,7 @@ class IdentificationResult(metaclass=ArgumentErrors):
         """Sentences on filters, missing samples, unidentified and impossible parameters, correlated noise."""
         found = list(self.notes)
         if self.dropped:
-            found.append(f"{counted(self.dropped, 'sample')} with missing values or at the ends omitted")
+            found.append(f"{counted(self.dropped, 'sample')} omitted, with missing values or at the ends")
         if self.not_identified:
             found.append(
                 "not identified, because the motion does not excite them: "

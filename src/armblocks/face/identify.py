@@ -67,13 +67,13 @@ def identify(
     - ``cutoff`` (Hz): the filter of the motion. By default complete logs are not filtered, and for other logs
       the cut-off follows from the spectrum.
     - ``decimate=k`` filters torques and regressor alike and keeps every k-th sample, so that the noise of the
-      kept samples is independent and the standard errors are right.
+      kept samples is independent and the standard errors are correct.
     - ``links``: only these links have unknown mass, centre and inertia (all links by default).
     - ``friction``: ``"asymmetric"`` estimates viscous friction B and Coulomb friction Tc+ and Tc- of each
       joint, ``"coulomb"`` B and a symmetric Tc, ``"viscous"`` B; ``"none"`` keeps the friction of the
       description.
     - ``rotor_inertia``: whether the inertia of the rotors is estimated.
-    - ``payload``: a known body at the tool during the measurement, a :class:`Payload` or kg.
+    - ``payload``: a known body at the tool during the measurement, as a :class:`Payload` or its mass in kg.
     - ``min_speed`` (rad/s or m/s): slower samples of a joint have no effect, because static friction is not
       in the model. If Coulomb friction is estimated, samples at rest (speed 0) of a joint that also moves
       have no effect either.
@@ -225,7 +225,7 @@ class _Rows:
         return moves & self.has_unknown_coulomb
 
     def parts(self) -> Sequence[tuple[Segment, Array, Array]]:
-        """Samples with the regressor X (n, b, N) and the torques y (n, N) without known parts; cached."""
+        """Samples with the regressor X (n, b, N) and the torques y (n, N) of unknown parameters; cached."""
         total = sum(len(segment.time) for segment in self.logs.segments)
         if "_parts" not in self.__dict__:
             evaluated = self._evaluated()

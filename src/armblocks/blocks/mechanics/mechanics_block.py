@@ -12,10 +12,11 @@ from armblocks.multibody.gathering import gather_mechanisms
 
 @dataclass(frozen=True, kw_only=True)
 class MechanicsBlock(Block):
-    """Base class of frames, bodies, force elements and sensors: :meth:`part` describes one.
+    """Base class of frames, bodies, force elements and sensors of mechanisms.
 
-    A subclass overrides ``frame_ports`` and ``part`` (:mod:`armblocks.multibody.parts`). The pass
-    :mod:`armblocks.multibody.gathering` converts all parts to equations.
+    A subclass overrides ``frame_ports``, and ``part``, which returns a description of the element
+    (:mod:`armblocks.multibody.parts`). The pass :mod:`armblocks.multibody.gathering` converts all parts to
+    equations.
     """
 
     virtual: ClassVar[bool] = True
