@@ -266,7 +266,7 @@ def test_missing_samples_outliers_and_slow_samples() -> None:
     gaps["tau"][10:20, 1] = np.nan
     gaps["qd"][100, 0] = np.nan
     result = ab.identify(arm, gaps)
-    assert result.dropped == 11 and "11 samples with missing values" in str(result)
+    assert result.dropped == 11 and "11 samples omitted, with missing values" in str(result)
     rows = np.ones(1500, dtype=bool)
     rows[10:20] = rows[100] = False
     kept = ab.identify(arm, {name: value[rows] for name, value in log.items()})
