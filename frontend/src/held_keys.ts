@@ -1,6 +1,6 @@
 /*
  * Keys that are pressed on the sheet while the result of an edit is awaited. They are queued and replayed
- * when the page shows the result. Each key then acts on the state that the user expects: a copy that was
+ * when the studio shows the result. Each key then acts on the state that the user expects: a copy that was
  * just pasted, the new name of a block, the sheet inside a subsystem.
  */
 
@@ -38,7 +38,7 @@ const areHeld = (): boolean => connected && operations > 0
 const isModifier = ({ key }: KeyboardEvent): boolean =>
   ['Control', 'Shift', 'Alt', 'Meta', 'AltGraph'].includes(key)
 
-/** Whether a key has the same effect on any displayed state; the server handles it after the edits before. */
+/** Whether a key has the same effect on any displayed state: the server handles it after earlier edits. */
 const isUndoOrRedo = ({ key, ctrlKey, metaKey, altKey }: KeyboardEvent): boolean =>
   (ctrlKey || metaKey) && !altKey && ['z', 'y'].includes(key.toLowerCase())
 
@@ -54,7 +54,7 @@ function onKeyDown(event: KeyboardEvent): void {
   keys.push(event)
 }
 
-/** Press the held keys one after the other, each after the page shows the effect of the previous one. */
+/** Press the held keys one after the other, each after the studio shows the effect of the previous one. */
 function replay(): void {
   if (areHeld()) return
   const event = keys.shift()

@@ -17,7 +17,7 @@ LIMITS: dict[str, Any] = {"speed": 2.5, "acceleration": 20.0, "torque": TORQUE}
 
 
 def pose(x: float, y: float, z: float) -> np.ndarray:
-    """The tool points down."""
+    """A pose (4, 4) at a position in m whose tool points down."""
     T = np.diag([1.0, -1.0, -1.0, 1.0])
     T[:3, 3] = x, y, z
     return T

@@ -38,7 +38,7 @@ def test_without_names_the_first_signals_are_drawn(result: ab.SimulationResult) 
     assert svg.count('font-weight="600"') == min(12, len(result.names))
 
 
-def test_refusals(result: ab.SimulationResult, tmp_path: Path) -> None:
+def test_unknown_names_and_too_many_signals_are_refused(result: ab.SimulationResult, tmp_path: Path) -> None:
     with pytest.raises(ArmblocksError, match="jtraj/qq"):
         result.plot("jtraj/qq")
     with pytest.raises(ArmblocksError, match=r"there is no format of figures named '\.bmp'"):

@@ -17,7 +17,8 @@ def base_parameter_tree(robot: Robot) -> KinematicTree:
     """The tree of a robot with regrouped parameters, for functions of its independent coordinates."""
     if not robot.couplings:
         return regrouped(KinematicTree.of(robot))
-    # Equal robots may differ in the sign of a zero.
+    # Robots that compare equal may differ in the sign of a zero. The text of the links distinguishes them in
+    # the cache.
     return _coupled_tree(robot, repr([replace(link, geometry=None) for link in robot.links]))
 
 

@@ -82,7 +82,7 @@ class Stage:
         x0, y0 = ((math.floor(float(v) / spacing) - 8) * spacing for v in low[:2])
         x1, y1 = ((math.ceil(float(v) / spacing) + 8) * spacing for v in high[:2])
         floor_corners = np.array([(x, y, floor) for x in (low[0], high[0]) for y in (low[1], high[1])])
-        # The corners of the floor may touch the edge of the panel, the arm must not.
+        # The camera also shows the part of the floor below the arm.
         camera = Camera.framing(
             np.concatenate([points, floor_corners]),
             width,
@@ -298,7 +298,7 @@ def _runs(flags: NDArray[np.bool_], first: int, last: int) -> list[tuple[int, in
 
 
 def _thinned(points: _Array, tolerance: float = 0.6) -> _Array:
-    """Points that are at least ``tolerance`` px apart along the line, including the first and the last."""
+    """One point for every ``4 * tolerance`` px of the line, with the first and the last point."""
     if len(points) < 3:
         return points
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])

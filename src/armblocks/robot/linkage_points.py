@@ -1,4 +1,4 @@
-"""Points of links at which a drawing ends: the ends of closed loops and of parallel rods."""
+"""Attachments of closed loops and parallel rods on links: drawings extend the links to these points."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def rod_points(robot: Robot, frames: Sequence[_Array], size: float) -> LinkPoint
 
 
 def configurations(robot: Robot) -> _Array:
-    """Configurations (N, nq) near the neutral configuration, in which points of different links are apart."""
+    """Random configurations (N, nq) near the neutral one, where points of different links do not coincide."""
     rng = np.random.default_rng(0)
     return robot.neutral + 0.3 * rng.standard_normal((_SAMPLES, robot.nq))
 

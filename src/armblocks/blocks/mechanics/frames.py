@@ -86,7 +86,7 @@ class MechanismConfiguration(MechanicsBlock):
 
 @dataclass(frozen=True, kw_only=True)
 class ReferenceFrame(MechanicsBlock):
-    """A named frame: it has no effect, and marks a frame at which lines meet."""
+    """A name for a frame at which the lines of several blocks meet, without effect on the motion."""
 
     title: ClassVar[str] = "Reference Frame"
     sign: ClassVar[FaceSign] = Words("Frame")

@@ -49,7 +49,10 @@ _FUNCTIONS: dict[Opcode, Callable[..., str]] = {
 
 
 def call(body: Body, opcode: Opcode, values: Sequence[str]) -> str:
-    """Emit ``opcode`` of ``values``, as a call that LLVM may inline."""
+    """Emit ``opcode`` of ``values``.
+
+    Sine and cosine are emitted in place, other functions as a call that LLVM may inline.
+    """
     if opcode in (Opcode.SIN, Opcode.COS):
         return _FUNCTIONS[opcode](body, *values)
     return _call(body, opcode, values)

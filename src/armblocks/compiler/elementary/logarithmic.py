@@ -1,5 +1,6 @@
-"""Logarithms and inverse hyperbolic functions, all from the logarithm of an unevaluated pair.
+"""Logarithms and inverse hyperbolic functions, all from the logarithm of a pair.
 
+A pair is the sum of two doubles that is not evaluated, so that it has more digits than one double.
 ``ln(2**k m) = k ln 2 + ln m`` with ``m`` between sqrt(1/2) and sqrt(2), and ``ln m = 2 atanh s``,
 ``s = (m - 1) / (m + 1)``. Every leading term is kept with its rounding error, so the relative error of the
 result is about 2**-65, also near 1. The argument may be such a pair as well.
@@ -146,7 +147,7 @@ def logarithm_of_pair(
 
 
 def _scaled_low(body: Body, high: str, low: str, exponent_bits: str) -> str:
-    """``low`` divided by the power of two that ``high`` was divided by."""
+    """``low`` divided by the power of two by which ``high`` was divided."""
     inverse = body.from_bits(body.word_op("sub", body.integer(1023 << 52), exponent_bits))
     # Near the largest double the reciprocal of the power is not a normal number. The low part is negligible
     # there.
@@ -155,7 +156,7 @@ def _scaled_low(body: Body, high: str, low: str, exponent_bits: str) -> str:
 
 
 def _square_root(body: Body, high: str, low: str) -> tuple[str, str]:
-    """Square root of an unevaluated pair, as such a pair."""
+    """Square root of a pair, as a pair."""
     root = body.intrinsic("sqrt", high)
     residual = body.add(body.fma(body.negate(root), root, high), low)
     rest = body.divide(residual, body.add(root, root))
