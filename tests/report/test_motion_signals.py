@@ -27,7 +27,7 @@ def test_the_papers_model_has_one_motion_with_exact_rates() -> None:
     assert motion.notes == ()
     assert motion.tau is not None
     assert np.degrees(np.abs(motion.qd).max(axis=0)) == pytest.approx([33.73, 0, 16.87, 0], abs=5e-3)
-    assert motion.tau[0] == pytest.approx((0, 2305.35, 2452.5, 0), abs=25)  # with friction: specification
+    assert motion.tau[0] == pytest.approx((0, 2305.35, 2452.5, 0), abs=25)  # torques of gravity
     assert motion.tool[-1] == pytest.approx((-2.949278739196, 1.254698768685, 2.347929043243), abs=1e-9)
 
 
@@ -69,7 +69,7 @@ def test_two_arms_have_two_motions(puma560: Robot, kr180: Robot) -> None:
 
 
 def test_a_controllers_model_with_other_masses_is_not_a_second_motion() -> None:
-    """A model with another tool is one, because its pictures differ."""
+    """A model with another tool is a second motion, because its pictures differ."""
     link = ab.Link(name="link", mass=2.0, centre_of_mass=(0.5, 0, 0), motor=ab.Motor(inertia=0.1))
     robot = Robot(name="pendulum", links=(link,), gravity=(0, -9.81, 0))
     model = replace(robot, name="model", links=(replace(link, mass=1.0, motor=None),), gravity=(0, -1.62, 0))

@@ -139,7 +139,7 @@ class _Effects:
         )
 
     def at(self, states: int) -> Array:
-        """The matrix of effects at so many random states (states nv, 10 n)."""
+        """The matrix of effects (states nv, 10 n) at the given number of random states."""
         return np.vstack([self._at_random_state() for _ in range(states)])
 
     def _at_random_state(self) -> Array:

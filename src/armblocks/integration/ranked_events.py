@@ -10,7 +10,7 @@ from armblocks.routines.values import Integer
 
 
 class RankedEvents:
-    """The functions of a program for the ranks of guards and controls."""
+    """The functions of a program for the ranks of guards and of the controls of conditional subsystems."""
 
     def __init__(self, program: Program, workspace: Workspace, sizes: LoopSizes) -> None:
         self.workspace = workspace
@@ -32,9 +32,12 @@ class RankedEvents:
         return lowest.value
 
     def _hold_controls(self, r: Routine, reals: Reals, rank: Integer) -> None:
-        """Set the modes of controls of higher ranks to their old values, so that a reset does not act on the
-        blocks that they control. Before the start of the run there are no old values. Events of negative rank
-        do not act on blocks."""
+        """Set the modes of controls of higher ranks to their old values.
+
+        The reset for the events of this rank then does not act on the blocks that these controls control. For
+        a negative rank nothing changes, because its events do not act on blocks. Before the start of the run
+        there are no old values.
+        """
         z = reals.after(self.workspace.z)
         modes, old_values, ranks = (
             r.integers(f"control.{role}", entries)

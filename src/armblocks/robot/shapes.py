@@ -128,7 +128,8 @@ class Sphere:
 
 @dataclass(frozen=True, kw_only=True)
 class Mesh:
-    """Triangles: ``faces`` name three ``vertices`` each, counter-clockwise seen from outside."""
+    """Triangles. Each row of ``faces`` has the indices of three ``vertices``, in counter-clockwise order seen
+    from outside."""
 
     vertices: tuple[Vector3, ...]
     faces: tuple[tuple[int, int, int], ...]

@@ -44,8 +44,8 @@ class Axis:
 class Chain:
     """The ``axes`` from the base to the tool, and the pose of the tool where all joints are at zero.
 
-    ``size``: the sum of the distances between neighbouring points, m. ``to_tree`` (joints of the tree, nq)
-    and ``constants``: the coordinates of the tree are ``to_tree q + constants``.
+    ``size``: the sum of the distances between neighbouring points, m. ``to_tree`` (joints of the tree, nq):
+    the coordinates of the tree are ``to_tree q`` plus the offsets of the couplings.
     """
 
     axes: tuple[Axis, ...]
@@ -59,8 +59,7 @@ class Chain:
         return one.parallel(other) and float(np.linalg.norm(apart)) <= SAME * self.size
 
     def from_tool_to_base(self) -> Chain:
-        """The reversed chain, from the tool to the base: for the same angles its end has the pose ``T_0
-        T⁻¹``.
+        """The reversed chain, from the tool to the base. Its end has the pose ``T_0 T⁻¹`` for equal angles.
 
         For ``T = E_1 … E_n T_0``, the reversed chain applies the inverse motions in reverse order.
         """

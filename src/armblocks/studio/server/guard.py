@@ -1,10 +1,10 @@
-"""Access control of the studio: checked first, for HTTP and websockets.
+"""Access control of the studio: checks of every HTTP request and websocket before anything else.
 
 A request must pass all of these checks; only the routes in ``Guard.OPEN`` need no session:
 
 1. exactly one ``Host`` header, which names this server (against DNS rebinding: CVE-2026-21883 and similar);
 2. an ``Origin``, if present, equals this server's own, compared as a whole string, never by a pattern
-   (CVE-2026-40110); a websocket without an ``Origin`` must send the token as a bearer;
+   (CVE-2026-40110); a websocket without an ``Origin`` must send the token as a bearer token;
 3. a request with ``Sec-Fetch-Site`` other than ``same-origin`` or ``none`` may not change anything;
 4. the session: the cookie from the one-time login link, or ``Authorization: Bearer TOKEN``;
 5. a request that changes something has the header ``X-Armblocks``, which a plain HTML form cannot send.
@@ -51,7 +51,7 @@ SECURITY_HEADERS: tuple[tuple[bytes, bytes], ...] = (
 class Keys:
     """The secrets of one server, created at its start.
 
-    ``token`` grants full access as a bearer. ``login`` is valid once; the login sets the cookie ``session``.
+    ``token`` grants full access as a bearer token. ``login`` is valid once; it sets the cookie ``session``.
     A given ``session`` is the session of the previous server, so that its clients can reconnect.
     """
 
@@ -63,7 +63,7 @@ class Keys:
         self._logins: list[str] = []
 
     def secrets(self) -> tuple[str, ...]:
-        """All secrets that must not be logged, including invalid secrets."""
+        """All secrets that must not be logged, including logins that are no longer valid."""
         return (self.token, self.session, *self._logins)
 
     def new_login(self) -> str:
