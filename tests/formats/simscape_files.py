@@ -19,7 +19,7 @@ def words(values: Array | list[float]) -> str:
 
 
 def turned_to(axis: Array) -> Array:
-    """A rotation whose z axis is a direction."""
+    """A homogeneous rotation (4, 4) whose z axis has the direction ``axis``."""
     z = np.asarray(axis) / np.linalg.norm(axis)
     x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
     x /= np.linalg.norm(x)
@@ -34,7 +34,10 @@ def transform(T: Array) -> str:
 
 
 class Export:
-    """The texts for a robot at q; ``swapped``: joints whose base is the child; ``mates``: no joints."""
+    """The files for a robot at ``q``, with joints or, if ``mates`` is true, with mates instead of joints.
+
+    In the joints of ``swapped``, the base frame is on the child and the follower frame on the parent.
+    """
 
     def __init__(self, robot: Robot, q: Array, *, mates: bool = False) -> None:
         self.robot = robot

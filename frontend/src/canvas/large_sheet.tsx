@@ -72,8 +72,8 @@ function MovingGrid({ bounds: { x, y, width, height } }: { bounds: Rectangle }) 
 
 /**
  * An almost transparent rectangle without anti-aliasing, for the layer that contains it. Chromium draws
- * layers with many paths with multisampling, unless a shape has no anti-aliasing: then lines thinner than a
- * pixel have gaps, and drawing without a graphics processor takes several times as long.
+ * layers with many paths by multisampling, unless a shape has no anti-aliasing. With multisampling, lines
+ * thinner than a pixel have gaps, and drawing without a graphics processor takes several times as long.
  */
 const NoMultisampling = () => (
   <svg className="no-multisampling" aria-hidden>
