@@ -79,7 +79,7 @@ class _Links:
         return with_inertias(tree, added)
 
     def torques(self, name: str, inputs: Sequence[str], near: Array | None) -> TracedFunction:
-        """The torques of a motion; missing inputs of ``q``, ``qd``, ``qdd`` are zero, without friction."""
+        """The torques of a motion. Without the inputs ``qd`` and ``qdd`` both are zero, without friction."""
 
         def equations(q: SX, *values: SX) -> SX:
             *motion, parameters = values

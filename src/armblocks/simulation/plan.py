@@ -111,8 +111,11 @@ class ListedTimes(SampleTimes):
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """The settings of one run, with all choices made. ``tableau`` is the method, ``None`` for a system
-    without states. ``stiff`` is the method that replaces it if the system proves stiff, or ``None``."""
+    """The settings of one run, with all choices made.
+
+    ``tableau`` is the method, ``None`` for a system without states. ``stiff`` is the method that replaces it
+    if the system proves stiff, or ``None``.
+    """
 
     tableau: Tableau | None
     stiff: Tableau | None

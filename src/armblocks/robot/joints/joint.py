@@ -143,7 +143,7 @@ class Joint(ABC, metaclass=ArgumentErrors, methods=False):
         return None
 
     def with_offset(self, added: float) -> Self:
-        """The joint with a larger offset of its single coordinate."""
+        """The joint with ``added`` (rad or m) added to the offset of its single coordinate."""
         return replace(self, offset=self.offset + added)
 
     def motion(self, q: Sequence[float]) -> Transform:

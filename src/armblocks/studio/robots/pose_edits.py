@@ -1,4 +1,4 @@
-"""The edits of the named configurations of a robot, its recorded poses; each is a pure function."""
+"""Edits of the recorded poses of a robot, which are its named configurations. Each is a pure function."""
 
 from __future__ import annotations
 
