@@ -229,4 +229,4 @@ def pendulum(**hinge: Any) -> DiagramBuilder:
 
 
 INERTIA = 2.0 * ((0.3**2 + 0.4**2) / 12 + 0.25)
-"""Of the pendulum about its hinge, kg m2."""
+"""Moment of inertia of the pendulum about its hinge, kg m2."""
