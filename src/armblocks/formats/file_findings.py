@@ -1,5 +1,4 @@
-"""Findings about robot files: parts that a reader omitted or changed, each with file, line and a stable
-code."""
+"""Findings about robot files: parts that a reader omitted or changed, with file, line and a stable code."""
 
 from __future__ import annotations
 
