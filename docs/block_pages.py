@@ -402,8 +402,10 @@ RULES = """
 article figure{margin:1.2rem 0}article figure svg,.symbol svg{display:block;max-width:100%;height:auto}
 article figure.wide svg{width:100%}article figure.narrow svg{max-width:400px;width:100%}
 article figure.drawing{overflow-x:auto}
-article h1{font-size:2.1em}article .highlight pre{font-size:.79rem}
+article h1{font-size:2.1em}article h2{font-size:1.55em}article h3{font-size:1.2em}
+article .highlight pre{font-size:.79rem}
 article table.docutils{margin-left:0}
+article code .option{white-space:nowrap}
 article table.docutils:has(th:nth-child(5)){font-size:.875rem}
 article table.docutils:has(th:nth-child(9)) :is(th,td){padding:.25rem .12rem}
 #parameters td:last-child{min-width:9rem}
@@ -414,12 +416,12 @@ article table.docutils:has(th:nth-child(9)) :is(th,td){padding:.25rem .12rem}
 .robot-entry img{display:block;width:100%;height:auto}
 .robot-entry p{margin:.2rem 0;line-height:1.35;font-size:.9em}
 .robot-entry p:empty{display:none}article figure.robot img{width:100%;max-width:400px;height:auto}
-#all-robots td:last-child{overflow-wrap:anywhere}
 .block-entry p{margin:.2rem 0;line-height:1.35;font-size:.92em}
 .block-entry .symbol{justify-self:center}
-@media(max-width:46em){article table.docutils td:not(:first-child) code{overflow-wrap:anywhere}}
-@media(max-width:46em){article table.docutils:has(th:nth-child(5)){min-width:44rem}}
-@media(max-width:46em){article table.docutils:has(th:nth-child(7)){min-width:72rem}}
+@media(max-width:46em){article table.docutils:not(:has(th:nth-child(3))) td+td code{overflow-wrap:anywhere}}
+@media(max-width:46em){article h1{font-size:1.45em}article h2{font-size:1.3em}article h3{font-size:1.15em}}
+@media(max-width:46em){article table.docutils:has(th:nth-child(5)){width:max-content;max-width:44rem}}
+@media(max-width:46em){article table.docutils:has(th:nth-child(7)){width:max-content;max-width:72rem}}
 @media(max-width:46em){article table.docutils:has(th:nth-child(5)) td code{overflow-wrap:normal!important}}
 @media(max-width:46em){article figure.wide{overflow-x:auto}article figure.wide svg{min-width:560px}}
 """

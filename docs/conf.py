@@ -2,6 +2,7 @@
 
 import gc
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -64,6 +65,8 @@ python_maximum_signature_line_length = 110
 add_module_names = False
 
 
+OPTION = re.compile(r'<span class="pre">(--[\w-]+)</span>')
+
 navigation_of_folder = {}
 """The navigation of the pages outside the table of contents, for each folder."""
 
@@ -82,6 +85,14 @@ def share_navigation(app, pagename, templatename, context, doctree):
         context["toctree"] = navigation
 
 
+def mark_options(app, pagename, templatename, context, doctree):
+    """Mark the options of commands in the text; browsers would break a line between their hyphens."""
+    if "body" in context:
+        context["body"] = OPTION.sub(
+            r'<span class="pre option">\1</span>', context["body"]
+        )
+
+
 def setup(app):
     """Connect the functions of this folder to the events of Sphinx, which calls this function."""
     shorten_annotations()
@@ -91,6 +102,7 @@ def setup(app):
     app.connect(
         "html-page-context", share_navigation, priority=100
     )  # before the theme reads it
+    app.connect("html-page-context", mark_options)
 
 
 # Called before Sphinx searches for sources and static files.
