@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Iterator
 from html import escape
@@ -155,13 +156,18 @@ def _row(name: str, reach: float) -> tuple[str, ...]:
         f"{reach:g}",
         facts.masses.value if facts.masses is not None else "",
         prose(facts.licence),
-        prose("; ".join(facts.sources)),
+        _breakable(prose("; ".join(facts.sources))),
     )
+
+
+def _breakable(text: str) -> str:
+    """Markdown whose paths and identifiers may continue on the next line after a slash or underscore."""
+    return re.sub(r"(/|\\_)(?=\w)", r"\1<wbr>", text)
 
 
 def _robot_page(name: str, robot: Robot, reach: float) -> Iterator[str]:
     facts = shipped_facts(name)
-    maker = f" ({robot.manufacturer})" if robot.manufacturer else ""
+    maker = f", {robot.manufacturer}" if robot.manufacturer else ""
     title = prose(
         f"{robot.name}{maker}: {robot.comment}"
         if robot.comment
@@ -192,6 +198,7 @@ def _robot_page(name: str, robot: Robot, reach: float) -> Iterator[str]:
     yield from (*lines, "", prose(facts.notes), "")
     yield from _dh_table(robot)
     yield from _limits(robot)
+    yield from ("[All robots](../robots.md).", "")
 
 
 def _dh_table(robot: Robot) -> Iterator[str]:
@@ -208,7 +215,7 @@ def _dh_table(robot: Robot) -> Iterator[str]:
             "`q`" if row.sigma else f"{row.d:.6g}",
             f"{row.a:.6g}",
             f"{row.alpha * 180 / np.pi:g}°",
-            f"{row.offset:.4g}",
+            f"{row.offset:.4g} {'m' if row.sigma else 'rad'}" if row.offset else "0",
         )
         for name, row in rows
     ]
