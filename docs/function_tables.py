@@ -10,7 +10,8 @@ def function_tables() -> str:
     groups = dict.fromkeys(function.group for function in TABLE.values())
     lines: list[str] = []
     for group in groups:
-        lines += [f"### {group}", "", "| | |", "|---|---|"]
+        kind = "constant" if group == "Constants" else "function"
+        lines += [f"### {group}", "", f"| {kind} | value |", "|---|---|"]
         for name, function in TABLE.items():
             if function.group == group:
                 call = (

@@ -89,7 +89,8 @@ def _first_sentence(value: object) -> str:
     paragraph = (
         inspect.cleandoc(value.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
     )
-    return re.split(r"(?<=[.:]) (?=[A-Z])|::$", paragraph)[0].rstrip(":")
+    sentence = re.split(r"(?<=[.:]) (?=[A-Z])|::$", paragraph)[0].rstrip(":")
+    return sentence if sentence.endswith(".") else f"{sentence}."
 
 
 def solver_table() -> str:

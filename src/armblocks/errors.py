@@ -3,22 +3,22 @@
 ::
 
     ArmblocksError(ValueError)
-    ├── InputError            a call was given a wrong shape, dtype, value or option
-    │   └── ArgumentError     a missing, repeated or unknown argument; also a TypeError
-    ├── UnknownNameError      an unknown name; suggests the nearest known names
-    │   └── UnknownArgumentError   an unknown keyword argument; also an ArgumentError
-    ├── RobotError            a robot description that contradicts itself
-    │   └── AssemblyError     no configuration satisfies the constraints
-    ├── DiagramError          a diagram that cannot be built
-    │   └── AlgebraicLoopError
-    ├── FormatError           a file that cannot be read or written (file:line)
-    ├── MissingLibraryError   a library of an optional extra is not installed
-    ├── CompileError          equations that the compiler cannot translate
-    └── SimulationError       a run that failed (with the results up to that time)
+    ├── InputError                  a call was given a wrong shape, dtype, value or option
+    │   └── ArgumentError           a missing, repeated or unknown argument; also a TypeError
+    ├── UnknownNameError            an unknown name; suggests the nearest known names
+    │   └── UnknownArgumentError    an unknown keyword argument; also an ArgumentError
+    ├── RobotError                  a robot description that contradicts itself
+    │   └── AssemblyError           no configuration satisfies the constraints
+    ├── DiagramError                a diagram that cannot be built
+    │   └── AlgebraicLoopError      an algebraic loop that cannot be solved
+    ├── FormatError                 a file that cannot be read or written (file:line)
+    ├── MissingLibraryError         a library of an optional extra is not installed
+    ├── CompileError                equations that the compiler cannot translate
+    └── SimulationError             a run that failed (with the results up to that time)
 
     ArmblocksWarning(UserWarning)
-    ├── InertiaWarning        an inertia that no body can have
-    └── LimitWarning          a joint beyond its range, speed or torque
+    ├── InertiaWarning              an inertia that no body can have
+    └── LimitWarning                a joint beyond its range, speed or torque
 """
 
 from __future__ import annotations

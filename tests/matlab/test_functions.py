@@ -236,6 +236,7 @@ def test_the_documentation_has_all_functions_and_operators() -> None:
     tables = runpy.run_path(str(DOCS / "function_tables.py"))["function_tables"]()
     rows = [re.split(r"(?<!\\)\|", line) for line in tables.splitlines() if line.startswith("| `")]
     assert {len(row) for row in rows} == {4}
+    assert "| | |" not in tables  # every column has a heading
     assert {re.split(r"[`(]", row[1].strip())[1] for row in rows} == set(TABLE)
     page = (DOCS / "formulas.md").read_text(encoding="utf-8").replace("\\|", "∨")
     table = [line.split("|")[1].replace("∨", "|") for line in page.splitlines() if line.startswith("| `")]
