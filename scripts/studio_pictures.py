@@ -220,7 +220,7 @@ def robot_editor(browser: Browser) -> None:
 
 def library(browser: Browser) -> None:
     """Figure 7: the blocks of the library roblocks, in the palette."""
-    with open_page(browser, (1440, 640)) as page:
+    with open_page(browser, (1440, 720)) as page:
         enlarge_library(page, 420)
         page.get_by_role("textbox", name="Search the library").fill("robot")
         page.wait_for_timeout(400)
