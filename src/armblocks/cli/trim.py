@@ -107,7 +107,7 @@ def _list_names(
     from armblocks.cli.trimmable import print_trimmable
     from armblocks.face.linearizing import operating_point_at, resolved_diagram
 
-    resolved = resolved_diagram(diagram, parameters)
+    resolved = resolved_diagram(diagram, parameters, "trim")
     start = operating_point_at(resolved, at)
     print_trimmable(ab.compile_diagram(resolved).system, start, model, console)
 

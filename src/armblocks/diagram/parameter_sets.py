@@ -14,7 +14,7 @@ from armblocks.diagram.mask_tuning import dependent_parameters
 from armblocks.diagram.names import check_new_name
 from armblocks.diagram.parameter import Parameter, ParameterKind, Value
 from armblocks.diagram.variation import check_settable, found_block, with_parameters
-from armblocks.errors import ArmblocksError, DiagramError, UnknownNameError
+from armblocks.errors import ArmblocksError, DiagramError, UnknownNameError, check_type
 
 MAX_SETS = 1000
 """Maximum number of parameter sets of a diagram."""
@@ -145,5 +145,6 @@ def with_parameter_set(diagram: Diagram, name: str) -> Diagram:
     an unknown set, and for a set with a parameter that does not exist; ``DiagramError`` for values that the
     diagram does not allow.
     """
+    check_type(diagram, Diagram, "a Diagram", where="with_parameter_set")
     values = checked_set(diagram, parameter_set(diagram, name), set_location(diagram, name))
     return with_parameters(diagram, values)

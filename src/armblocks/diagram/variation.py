@@ -12,7 +12,7 @@ from armblocks.diagram.comments import Comment, check_comment
 from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.mask import formula_names
 from armblocks.diagram.structure import DiagramBlock
-from armblocks.errors import DiagramError, InputError, UnknownNameError
+from armblocks.errors import DiagramError, InputError, UnknownNameError, check_type
 
 _Changed = TypeVar("_Changed")
 
@@ -46,6 +46,8 @@ def with_comments(diagram: Diagram, comments: Mapping[str, Comment | None]) -> D
     ``UnknownNameError`` for an unknown block, ``DiagramError`` for a block that cannot be commented, or is
     linked to a library, and for an inconsistent diagram.
     """
+    check_type(diagram, Diagram, "a Diagram", where="with_comments")
+    check_type(comments, Mapping, "a dictionary of comments by block", where="with_comments")
     for path, comment in comments.items():
         outside, level, name = found_block(diagram, path)
         _check_unlinked(outside, path)

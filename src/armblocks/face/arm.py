@@ -61,14 +61,16 @@ class Arm(NativeFunctions):
     for a quaternion of zeros. :meth:`neutral`, :meth:`integrate` and :meth:`difference` replace zeros, sums
     and differences of coordinates.
 
-    ``near`` (nq,): coordinates of a robot with closed loops near which its constraints can be assembled.
-    At this configuration, ``accel``, ``rne`` and ``gravload`` determine the independent equations of the
-    loops. By default they search near the neutral configuration, then within the ranges of the joints.
+    ``robot``: a robot, or another arm, whose robot is used. ``near`` (nq,): coordinates of a robot with
+    closed loops near which its constraints can be assembled. At this configuration, ``accel``, ``rne`` and
+    ``gravload`` determine the independent equations of the loops. By default they search near the neutral
+    configuration, then within the ranges of the joints.
 
     Units are SI: rad or m, N m or N. Frames: world, unless stated otherwise.
     """
 
-    def __init__(self, robot: Robot, near: ArrayLike | None = None) -> None:
+    def __init__(self, robot: Robot | Arm, near: ArrayLike | None = None) -> None:
+        robot = robot.robot if isinstance(robot, Arm) else robot
         check_kind(robot, Robot, where="Arm")
         self.robot = robot
         self._near = None if near is None else coordinates(robot, "near", near, robot.nq)

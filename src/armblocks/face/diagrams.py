@@ -25,20 +25,27 @@ def load_diagram(
     return formats.load_diagram(name_or_path, BLOCKS.with_kinds("own", blocks), trust=trust)
 
 
-def save_diagram(diagram: Diagram, path: str | PathLike[str]) -> Path:
+def stored_diagram(diagram: Diagram | str | PathLike[str], where: str) -> Diagram:
+    """The diagram of an argument of the function ``where``: a diagram, the name of a shipped diagram, or the
+    path of a file."""
+    if isinstance(diagram, str | PathLike):
+        return load_diagram(diagram)
+    check_type(diagram, Diagram, "a Diagram, or the name or path of a diagram", where=where)
+    return diagram
+
+
+def save_diagram(diagram: Diagram | str | PathLike[str], path: str | PathLike[str]) -> Path:
     """Write a diagram as canonical JSON, atomically; returns the path."""
-    check_type(diagram, Diagram, "a Diagram", where="save_diagram")
-    return formats.write_diagram(path, diagram)
+    return formats.write_diagram(path, stored_diagram(diagram, "save_diagram"))
 
 
-def to_python(diagram: Diagram) -> str:
+def to_python(diagram: Diagram | str | PathLike[str]) -> str:
     """The Python program that builds a diagram, as ``diagram``, and runs it, as ``result``.
 
     Layout, notes and description are omitted. Raises ``FormatError`` if a block has a Python function, or a
     robot that is neither shipped nor from a file.
     """
-    check_type(diagram, Diagram, "a Diagram", where="to_python")
-    return formats.diagram_to_python(diagram)
+    return formats.diagram_to_python(stored_diagram(diagram, "to_python"))
 
 
 def load_library(name_or_path: str | PathLike[str], *, trust: bool = False) -> Mapping[str, Subsystem]:

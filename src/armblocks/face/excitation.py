@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from os import PathLike
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,9 +15,11 @@ from armblocks.argument_errors import ArgumentErrors
 from armblocks.errors import InputError
 from armblocks.face.arm import Arm
 from armblocks.face.least_time import MotionLimits, check_joint_space, motion_limits
+from armblocks.face.robots import given_arm
 from armblocks.face.torque_model import TorqueModel
 from armblocks.face.trajectory import JointTrajectory
 from armblocks.face.trajectory_arguments import positive
+from armblocks.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -55,7 +58,7 @@ class Excitation(metaclass=ArgumentErrors):
 
 @interrupts.kept()
 def excitation(
-    arm: Arm,
+    arm: Arm | Robot | str | PathLike[str],
     duration: float = 10.0,
     *,
     harmonics: int = 5,
@@ -92,6 +95,7 @@ def excitation(
     Raises InputError for arguments out of range and if no motion within the torque limits is found,
     RobotError for robots with ball joints or closed loops.
     """
+    arm = given_arm(arm, "excitation")
     where = "excitation"
     check_joint_space(arm, where)
     period, step = positive("duration", duration, "s", where), positive("dt", dt, "s", where)

@@ -71,7 +71,7 @@ def fit(
     """
     check_settings(settings, fit)
     require("analysis", "parameter estimation")
-    resolved = resolved_diagram(diagram, values)
+    resolved = resolved_diagram(diagram, values, "fit")
     where = f"fit of '{resolved.name}'"
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
     if not names or evaluations < 1 or int(evaluations) != evaluations:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from os import PathLike
 from typing import Literal
 
 import numpy as np
@@ -22,6 +23,7 @@ from armblocks.face.arm import Arm
 from armblocks.face.identification_result import IdentificationResult
 from armblocks.face.joint_log import LogSource, PreparedLogs, Segment, prepared, read_logs
 from armblocks.face.payload import Payload
+from armblocks.face.robots import given_arm
 from armblocks.face.torque_model import FRICTION, TorqueModel
 from armblocks.robot import Robot
 
@@ -40,7 +42,7 @@ _COULOMB = ("asymmetric", "coulomb")
 
 @interrupts.kept()
 def identify(
-    arm: Arm | Robot,
+    arm: Arm | Robot | str | PathLike[str],
     data: LogSource,
     *,
     links: str | Sequence[str] | None = None,
@@ -82,9 +84,9 @@ def identify(
     Raises InputError for unsuitable data, UnknownNameError for unknown links and columns, RobotError for
     robots with closed loops.
     """
+    arm = given_arm(arm, "identify")
     where = "identify"
-    robot = arm.robot if isinstance(arm, Arm) else arm
-    arm = arm if isinstance(arm, Arm) else Arm(robot)
+    robot = arm.robot
     chosen = _links(robot, links)
     if friction not in FRICTION:
         raise UnknownNameError("kind of friction", str(friction), FRICTION, where=where)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from os import PathLike
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,10 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from armblocks.errors import InputError, RobotError, counted
 from armblocks.face.arm import Arm
 from armblocks.face.payload import Payload
+from armblocks.face.robots import given_arm
 from armblocks.face.trajectory import JointTrajectory, sampled
 from armblocks.face.trajectory_arguments import joint_limits, positive, via_points
 from armblocks.planning.least_time import Limits, segment_times, solve
 from armblocks.report.motion_summary import limit_findings, warn_of_limits
+from armblocks.robot import Robot
 from armblocks.trajectories import Motion, PiecewisePolynomial
 from armblocks.trajectories.paths import blended_path, spline_path, turning_points
 from armblocks.trajectories.piecewise import hermite
@@ -48,7 +51,7 @@ class MotionLimits:
 
 
 def least_time(
-    arm: Arm,
+    arm: Arm | Robot | str | PathLike[str],
     points: ArrayLike,
     *,
     speed: ArrayLike | None = None,
@@ -82,6 +85,7 @@ def least_time(
     without a limit; RobotError for robots with ball joints or closed loops. Warns of positions outside the
     limits of the joints, which a spline may pass between the points.
     """
+    arm = given_arm(arm, "least_time")
     where = "least_time"
     robot = arm.robot
     check_joint_space(arm, where)

@@ -26,8 +26,7 @@ from armblocks.diagram.mask_tuning import with_mask_parameters
 from armblocks.equations import HybridSystem
 from armblocks.equations.evaluation import EvaluatedSystem, Point
 from armblocks.errors import InputError
-from armblocks.face.diagrams import load_diagram
-from armblocks.face.model import CompiledDiagram, compile_diagram, simulate
+from armblocks.face.model import CompiledDiagram, compile_diagram, given_diagram, simulate
 from armblocks.face.settings import RunSettings, check_settings, takes_settings
 from armblocks.simulation import RunState
 from armblocks.simulation.whole_run import check_interrupt
@@ -100,7 +99,7 @@ def linearize(
     run or a derivative is not finite.
     """
     check_settings(settings, linearize)
-    resolved = resolved_diagram(diagram, parameters)
+    resolved = resolved_diagram(diagram, parameters, "linearize")
     input_names, output_names, opening_names = _names(inputs), _names(outputs), _names(open)
     if isinstance(at, float | int | RunState | OperatingPoint):
         return _linearized(
@@ -117,14 +116,13 @@ def linearize(
 
 
 def resolved_diagram(
-    diagram: Diagram | CompiledDiagram | str | PathLike[str], parameters: Mapping[str, object] | None
+    diagram: Diagram | CompiledDiagram | str | PathLike[str],
+    parameters: Mapping[str, object] | None,
+    where: str,
 ) -> Diagram:
-    """The diagram, with the given parameter values."""
-    if isinstance(diagram, CompiledDiagram):
-        diagram = diagram.diagram
-    elif not isinstance(diagram, Diagram):
-        diagram = load_diagram(diagram)
-    return with_parameters(diagram, parameters) if parameters else diagram
+    """The diagram of an argument of the function ``where``, with the given parameter values."""
+    given = given_diagram(diagram, where)
+    return with_parameters(given, parameters) if parameters else given
 
 
 def _names(names: str | Sequence[str]) -> tuple[str, ...]:
@@ -161,7 +159,7 @@ def frequency_response(
     dead time together with sampled blocks raises ``InputError``.
     """
     check_settings(settings, frequency_response)
-    resolved = resolved_diagram(diagram, parameters)
+    resolved = resolved_diagram(diagram, parameters, "frequency_response")
     prepared = _PreparedLinearisation(resolved, _names(inputs), _names(outputs), _names(open))
     frequency_vector = np.asarray(frequencies, dtype=np.float64).reshape(-1)
     return prepared.response(operating_point_at(resolved, at, **settings), frequency_vector)

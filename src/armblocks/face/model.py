@@ -22,7 +22,7 @@ from armblocks.diagram.signal_names import signal_titles
 from armblocks.equations import HybridSystem, Signature, SimulationOptions
 from armblocks.errors import InputError
 from armblocks.face.diagram_run import DiagramRun, tuned_parameters
-from armblocks.face.diagrams import load_diagram
+from armblocks.face.diagrams import stored_diagram
 from armblocks.face.limit_watch import LimitWatch
 from armblocks.face.python_calls import called_functions
 from armblocks.face.settings import RunSettings, check_settings, takes_settings, with_settings
@@ -132,10 +132,18 @@ Start = RunState | OperatingPoint | str | PathLike[str]
 _compiled: dict[int, CompiledDiagram] = {}
 
 
-def compile_diagram(diagram: Diagram | str | PathLike[str]) -> CompiledDiagram:
+def given_diagram(diagram: Diagram | CompiledDiagram | str | PathLike[str], where: str) -> Diagram:
+    """The diagram of an argument of the function ``where``: a diagram, compiled or not, the name of a shipped
+    diagram, or the path of a file."""
+    return diagram.diagram if isinstance(diagram, CompiledDiagram) else stored_diagram(diagram, where)
+
+
+def compile_diagram(diagram: Diagram | CompiledDiagram | str | PathLike[str]) -> CompiledDiagram:
     """The compiled form of a diagram, cached for the lifetime of the diagram object."""
+    if isinstance(diagram, CompiledDiagram):
+        return diagram
     if not isinstance(diagram, Diagram):
-        return CompiledDiagram(load_diagram(diagram))
+        return CompiledDiagram(given_diagram(diagram, "compile_diagram"))
     entry = _compiled.get(id(diagram))
     if entry is None:
         # Cached by identity, because comparing by content would take longer than a run. The entry is removed
@@ -147,7 +155,7 @@ def compile_diagram(diagram: Diagram | str | PathLike[str]) -> CompiledDiagram:
 
 def state_at(diagram: Diagram | CompiledDiagram, point: OperatingPoint) -> RunState:
     """The run state at an operating point."""
-    system = (diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)).compiled
+    system = compile_diagram(diagram).compiled
     layouts = (system.states, system.discrete, system.algebraic)
     parts = (point.states, point.discrete, point.algebraic)
     states, discrete, algebraic = (layout.pack(part) for layout, part in zip(layouts, parts))
@@ -191,7 +199,7 @@ def simulate(
     ``SimulationError`` (with the ``partial`` result) if the run fails.
     """
     check_settings(settings, simulate)
-    model = diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)
+    model = compile_diagram(diagram)
     return model.simulate(
         parameters=parameters,
         progress=progress,
@@ -216,7 +224,7 @@ def begin(
     Arguments and errors as for :func:`simulate`.
     """
     check_settings(settings, begin)
-    model = diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)
+    model = compile_diagram(diagram)
     return model.begin(
         parameters=parameters,
         initial_state=_starting_state(model, initial_state),

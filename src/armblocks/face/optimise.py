@@ -88,7 +88,7 @@ def optimise(
     """
     check_settings(settings, optimise)
     require("analysis", "optimisation")
-    model = diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)
+    model = compile_diagram(diagram)
     if parameters:
         model = CompiledDiagram(with_parameters(model.diagram, parameters))
     where = f"optimisation of '{model.diagram.name}'"

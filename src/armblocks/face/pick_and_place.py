@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from os import PathLike
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,10 +19,12 @@ from armblocks.face.least_time import (
     path_through,
 )
 from armblocks.face.payload import Payload
+from armblocks.face.robots import given_arm
 from armblocks.face.toolbox_trajectories import ctraj, pose_of
 from armblocks.face.trajectory import JointTrajectory, sampled
 from armblocks.face.trajectory_arguments import check_same_length, joint_vector, positive
 from armblocks.report.motion_summary import limit_findings, warn_of_limits
+from armblocks.robot import Robot
 from armblocks.spatial import Transform
 from armblocks.trajectories import PiecewisePolynomial
 from armblocks.trajectories.piecewise import chained
@@ -68,7 +71,7 @@ class PickAndPlaceCycle(metaclass=ArgumentErrors):
 
 
 def pick_and_place(
-    arm: Arm,
+    arm: Arm | Robot | str | PathLike[str],
     q0: ArrayLike,
     pick: ArrayLike | Transform,
     place: ArrayLike | Transform,
@@ -100,6 +103,7 @@ def pick_and_place(
     Raises InputError for a pose that the arm does not reach, with the reason, and for a vertical line on
     which the configuration of the arm changes. Warns of positions outside the limits of the joints.
     """
+    arm = given_arm(arm, "pick_and_place")
     where = "pick_and_place"
     check_joint_space(arm, where)
     start = joint_vector("q0", q0, where)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 from armblocks.diagram import Diagram
 from armblocks.errors import check_type
+from armblocks.face.model import CompiledDiagram, given_diagram
 from armblocks.simulation import SimulationResult
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 def write_report(
     folder: str | PathLike[str],
-    diagram: Diagram,
+    diagram: Diagram | CompiledDiagram | str | PathLike[str],
     result: SimulationResult,
     *,
     formats: Sequence[str] | None = None,
@@ -35,12 +36,16 @@ def write_report(
     """
     from armblocks import report
 
-    check_type(diagram, Diagram, "a Diagram", where="write_report")
+    diagram = given_diagram(diagram, "write_report")
     check_type(result, SimulationResult, "the result of simulate", where="write_report")
     return report.write_report(folder, diagram, result, formats=formats, data=data)
 
 
-def write_files(folder: str | PathLike[str], diagram: Diagram, result: SimulationResult) -> tuple[Path, ...]:
+def write_files(
+    folder: str | PathLike[str],
+    diagram: Diagram | CompiledDiagram | str | PathLike[str],
+    result: SimulationResult,
+) -> tuple[Path, ...]:
     """Write the files of the To File blocks of a run into an existing folder.
 
     The paths of the blocks are relative to this folder, or to the folder of ``write_report``; paths outside
@@ -49,11 +54,12 @@ def write_files(folder: str | PathLike[str], diagram: Diagram, result: Simulatio
     """
     from armblocks.report.sink_files import write_files
 
-    return write_files(folder, diagram, result)
+    check_type(result, SimulationResult, "the result of simulate", where="write_files")
+    return write_files(folder, given_diagram(diagram, "write_files"), result)
 
 
 def draw_diagram(
-    diagram: Diagram,
+    diagram: Diagram | CompiledDiagram | str | PathLike[str],
     path: str | PathLike[str],
     *,
     sheet: str = "",
@@ -73,5 +79,5 @@ def draw_diagram(
     """
     from armblocks import drawing
 
-    check_type(diagram, Diagram, "a Diagram", where="draw_diagram")
+    diagram = given_diagram(diagram, "draw_diagram")
     return drawing.draw_diagram(path, diagram, result, sheet=sheet, theme=theme, rates=rates)

@@ -46,16 +46,26 @@ def load_robot(
     return arm if friction_model is None else arm.with_friction_model(friction_model)
 
 
-def save_robot(robot: Robot | Arm, path: str | PathLike[str]) -> Path:
-    """Write a robot atomically; returns the path.
+def given_arm(arm: Arm | Robot | str | PathLike[str], where: str) -> Arm:
+    """The arm of an argument of the function ``where``: an arm, a robot, the name of a shipped robot, or the
+    path of a file."""
+    if isinstance(arm, Arm):
+        return arm
+    if isinstance(arm, str | PathLike):
+        return load_robot(arm)
+    check_type(arm, Robot, "an Arm, a Robot, or the name or path of a robot", where=where)
+    return Arm(arm)
+
+
+def save_robot(robot: Robot | Arm | str | PathLike[str], path: str | PathLike[str]) -> Path:
+    """Write a robot atomically; returns the path. ``robot`` is also the name or the path of a robot.
 
     The suffix selects the format: ``.urdf``, ``.sdf``, ``.xml`` or ``.mjcf`` (MJCF), else canonical JSON.
     JSON contains all data of a robot. Data that another format cannot store are omitted with a warning.
     Raises FormatError for joint types that the format does not have.
     """
-    check_type(robot, (Robot, Arm), "a Robot or an Arm", where="save_robot")
+    described = given_arm(robot, "save_robot").robot
     target = Path(path)
-    described = robot.robot if isinstance(robot, Arm) else robot
     write_atomically(target, formats.robot_bytes(described, target.name))
     return target
 

@@ -17,6 +17,7 @@ from armblocks.face.arm_pictures import (
     checked_rate,
     write_arm_film,
 )
+from armblocks.face.model import CompiledDiagram, given_diagram
 from armblocks.pictures.film import FilmProgress, check_film, exact_rate, frame_times
 from armblocks.rendering.arm_film import ArmMotion, resampled
 from armblocks.robot.geometry import link_frames
@@ -28,7 +29,7 @@ MAX_ARMS = 4
 
 def write_film(
     path: str | PathLike[str],
-    diagram: Diagram,
+    diagram: Diagram | CompiledDiagram | str | PathLike[str],
     result: SimulationResult,
     *,
     rate: float = 25.0,
@@ -55,7 +56,7 @@ def write_film(
     """
     from armblocks.report.motion import moving_arms
 
-    check_type(diagram, Diagram, "a Diagram", where="write_film")
+    diagram = given_diagram(diagram, "write_film")
     check_type(result, SimulationResult, "the result of simulate", where="write_film")
     where = f"video of '{diagram.name}'"
     look = Appearance.checked(theme, size, view, where)

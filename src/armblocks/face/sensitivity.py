@@ -106,7 +106,7 @@ def sensitivity(
     - implicit equations together with delays, or with a parameter that determines a jump time.
     """
     check_settings(settings, sensitivity)
-    resolved = resolved_diagram(diagram, values)
+    resolved = resolved_diagram(diagram, values, "sensitivity")
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
     system = with_mask_parameters(compile_diagram(resolved).system, resolved, names)
     output_names = (outputs,) if isinstance(outputs, str) else tuple(outputs)

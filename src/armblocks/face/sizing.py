@@ -16,6 +16,7 @@ from armblocks.errors import InputError, RobotError, UnknownNameError, counted
 from armblocks.face.arm import Arm
 from armblocks.face.payload import Payload
 from armblocks.face.pick_and_place import PickAndPlaceCycle
+from armblocks.face.robots import given_arm
 from armblocks.face.text_table import text_table
 from armblocks.face.trajectory import JointTrajectory
 from armblocks.face.trajectory_report import motion_with_torques, save_picture
@@ -126,7 +127,7 @@ class SizingReport(metaclass=ArgumentErrors):
 
 
 def size_drives(
-    arm: Arm,
+    arm: Arm | Robot | str | PathLike[str],
     trajectory: JointTrajectory | PickAndPlaceCycle,
     drives: Sequence[Drive],
     *,
@@ -150,6 +151,7 @@ def size_drives(
     Raises InputError without a drive for some joint, UnknownNameError for an unknown joint of a drive,
     RobotError for robots with closed loops, ball joints, or motors at joints that depend on others.
     """
+    arm = given_arm(arm, "size_drives")
     where = "size_drives"
     if isinstance(pause, str) or not 0.0 <= pause < math.inf:  # pyright: ignore[reportUnnecessaryIsInstance]
         raise InputError(

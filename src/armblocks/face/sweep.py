@@ -93,7 +93,7 @@ def sweep(
     ``out`` contains the results of another sweep.
     """
     check_settings(settings, sweep)
-    model = diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)
+    model = compile_diagram(diagram)
     if parameters:
         model = CompiledDiagram(with_parameters(model.diagram, parameters))
     _check_numbers(max_steps, threads)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.argument_errors import ArgumentErrors
-from armblocks.errors import InputError, counted
+from armblocks.errors import InputError, check_type, counted
 from armblocks.face.arm import Arm
 from armblocks.face.collisions.check import collisions
 from armblocks.face.collisions.obstacles import Obstacle
@@ -18,6 +18,7 @@ from armblocks.face.collisions.report import CollisionReport
 from armblocks.face.least_time import MotionLimits, check_joint_space, motion_limits
 from armblocks.face.payload import Payload, payload_numbers
 from armblocks.face.pick_and_place import PickAndPlaceCycle
+from armblocks.face.robots import given_arm
 from armblocks.face.text_table import text_table
 from armblocks.face.trajectory import JointTrajectory
 from armblocks.files import write_atomically
@@ -27,6 +28,7 @@ from armblocks.pictures.png import picture_png
 from armblocks.pictures.style import FIGURE_WIDTH
 from armblocks.pictures.svg import svg_file
 from armblocks.report.charts.time_chart import Panel, Trace, time_chart
+from armblocks.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -224,7 +226,7 @@ class TrajectoryReport(metaclass=ArgumentErrors):
 
 
 def trajectory_report(
-    arm: Arm,
+    arm: Arm | Robot | str | PathLike[str],
     trajectory: JointTrajectory | PickAndPlaceCycle,
     *,
     speed: ArrayLike | None = None,
@@ -248,6 +250,7 @@ def trajectory_report(
 
     Raises InputError for a trajectory with another number of joints.
     """
+    arm = given_arm(arm, "trajectory_report")
     where = "trajectory_report"
     limits = motion_limits(arm, where, speed, acceleration, torque)
     time, q, qd, qdd, tau, _ = motion_with_torques(arm, trajectory, payload, where)
@@ -277,6 +280,7 @@ def motion_with_torques(
     """
     check_joint_space(arm, where)
     trajectory = motion.trajectory if isinstance(motion, PickAndPlaceCycle) else motion
+    check_type(trajectory, JointTrajectory, "a JointTrajectory or a PickAndPlaceCycle", where=where)
     if trajectory.n != arm.n:
         raise InputError(
             f"the trajectory has {counted(trajectory.n, 'joint')}",

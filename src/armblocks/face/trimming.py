@@ -60,7 +60,7 @@ def trim(
     found as ``partial``; ``UnknownNameError`` and ``InputError`` for invalid names and values.
     """
     check_settings(settings, trim)
-    resolved = resolved_diagram(diagram, parameters)
+    resolved = resolved_diagram(diagram, parameters, "trim")
     system = compile_diagram(resolved).system
     known = operating_point_at(resolved, at, **settings)
     x = system.states.pack(known.states)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from functools import cache
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,9 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.diagram import Diagram, View, ViewKind, diagram_views
-from armblocks.errors import InputError
+from armblocks.errors import InputError, check_type
 from armblocks.extras import from_extra
 from armblocks.face.arm import Arm
+from armblocks.face.model import CompiledDiagram, given_diagram
+from armblocks.face.robots import given_arm
 from armblocks.robot import Robot
 from armblocks.simulation import SimulationResult
 from armblocks.studio.built_page import built_page
@@ -39,7 +42,11 @@ SCRIPT = Path(__file__).parent / "notebook_widget.js"
 
 
 def run_widget(
-    diagram: Diagram, result: SimulationResult, *, show: str | None = None, height: int = HEIGHT
+    diagram: Diagram | CompiledDiagram | str | PathLike[str],
+    result: SimulationResult,
+    *,
+    show: str | None = None,
+    height: int = HEIGHT,
 ) -> AnyWidget:
     """Show the record of a run of ``diagram`` as the studio does: scopes, the arm, a time cursor.
 
@@ -47,6 +54,8 @@ def run_widget(
     result share a time cursor; ``widget.time`` (s) reads and sets it. Raises ``InputError`` if the diagram
     has nothing to show, ``MissingLibraryError`` if anywidget is not installed.
     """
+    diagram = given_diagram(diagram, "run_widget")
+    check_type(result, SimulationResult, "the result of simulate", where="run_widget")
     if show not in (None, *PARTS):
         raise InputError(
             f"show is {show!r}",
@@ -69,7 +78,9 @@ def run_widget(
     return _widget(f"Run of {diagram.name}", height, content, frame)
 
 
-def robot_widget(robot: Arm | Robot, q: ArrayLike | None = None, *, height: int = HEIGHT) -> AnyWidget:
+def robot_widget(
+    robot: Arm | Robot | str | PathLike[str], q: ArrayLike | None = None, *, height: int = HEIGHT
+) -> AnyWidget:
     """Show an arm at the joint coordinates ``q`` (nq,), rad or m, with a slider for each of them.
 
     The default is the neutral configuration. ``widget.q`` reads and sets the coordinates.
@@ -77,7 +88,7 @@ def robot_widget(robot: Arm | Robot, q: ArrayLike | None = None, *, height: int 
     Raises ``InputError`` for a wrong number of coordinates, ``MissingLibraryError`` if anywidget is not
     installed.
     """
-    described = robot.robot if isinstance(robot, Arm) else robot
+    described = given_arm(robot, "robot_widget").robot
     coordinates = described.neutral if q is None else np.asarray(q, dtype=np.float64)
     link_frames_of(described, coordinates.tolist())  # raises for a wrong number of coordinates
     return content_widget(arm_content(described, coordinates), height)

@@ -46,7 +46,7 @@ def check_suffix(path: Path) -> None:
     if path.suffix.lower() not in SUFFIXES:
         raise UnknownNameError("file type", path.suffix or path.name, SUFFIXES, where=str(path))
     if not installed("pyarrow"):
-        raise MissingLibraryError("pyarrow", "data", "Parquet files", where=str(path))
+        raise MissingLibraryError("pyarrow", "data", "files with the rows of a sweep", where=str(path))
 
 
 class SweepFile:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from os import PathLike
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,8 +14,10 @@ from armblocks.face.arm import Arm
 from armblocks.face.collisions.obstacles import Box, Cylinder, Obstacle, Plane, Sphere
 from armblocks.face.collisions.report import CollisionPair, CollisionReport
 from armblocks.face.collisions.scene import Pair, Scene
+from armblocks.face.robots import given_arm
 from armblocks.face.trajectory import JointTrajectory
 from armblocks.face.trajectory_arguments import as_array, positive
+from armblocks.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -25,7 +28,7 @@ WHERE = "collisions"
 
 
 def collisions(
-    arm: Arm,
+    arm: Arm | Robot | str | PathLike[str],
     motion: JointTrajectory | ArrayLike,
     obstacles: Sequence[Obstacle] = (),
     *,
@@ -53,6 +56,7 @@ def collisions(
 
     Raises UnknownNameError for an unknown name in ``ignore``, InputError for motions of another robot.
     """
+    arm = given_arm(arm, "collisions")
     where = f"{WHERE} of robot '{arm.name}'"
     named_obstacles = _named(obstacles, where)
     clearance = float(as_array(margin)) if as_array(margin).ndim == 0 else math.nan

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from os import PathLike
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,10 +12,12 @@ from armblocks.compiler import cached_kernel
 from armblocks.errors import InputError, counted
 from armblocks.face.arm import Arm
 from armblocks.face.arm_kernels import ArmKernels
+from armblocks.face.robots import given_arm
 from armblocks.face.trajectory import JointTrajectory
 from armblocks.face.trajectory_arguments import as_array
 from armblocks.face.trajectory_report import motion_with_torques
 from armblocks.face.workspace.arguments import check_robot, load_arguments
+from armblocks.robot import Robot
 
 if TYPE_CHECKING:
     from armblocks.equations import TracedFunction
@@ -23,7 +26,7 @@ Array = NDArray[np.float64]
 
 
 def payload_capacity(
-    arm: Arm,
+    arm: Arm | Robot | str | PathLike[str],
     q: ArrayLike | JointTrajectory,
     qd: ArrayLike | None = None,
     qdd: ArrayLike | None = None,
@@ -47,6 +50,7 @@ def payload_capacity(
 
     Raises InputError without any torque limit, RobotError for closed loops.
     """
+    arm = given_arm(arm, "payload_capacity")
     where = f"payload_capacity of robot '{arm.name}'"
     check_robot(arm, where)
     (limits, place, _, _), _ = load_arguments(arm, torque, centre, None, None, where)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from os import PathLike
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.errors import InputError, UnknownNameError
 from armblocks.face.arm import Arm
+from armblocks.face.robots import given_arm
 from armblocks.face.trajectory_arguments import as_array
 from armblocks.face.workspace.arguments import whole
+from armblocks.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -23,7 +26,7 @@ free, but a search towards a target that is rotated by almost 180 degrees about 
 
 
 def dexterity(
-    arm: Arm,
+    arm: Arm | Robot | str | PathLike[str],
     points: ArrayLike,
     directions: int | ArrayLike = 50,
     *,
@@ -50,6 +53,7 @@ def dexterity(
     Source: Vijaykumar, Waldron, Tsai, IJRR 5(2), 1986 (dexterous workspace). Raises InputError for wrong
     shapes.
     """
+    arm = given_arm(arm, "dexterity")
     where = f"dexterity of robot '{arm.name}'"
     if axis not in ("x", "y", "z"):
         raise UnknownNameError("axis", str(axis), ("x", "y", "z"), where=where)

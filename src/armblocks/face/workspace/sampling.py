@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,7 @@ from armblocks.compiler import Kernel, cached_kernel
 from armblocks.errors import InputError
 from armblocks.face.arm import Arm
 from armblocks.face.arm_kernels import ArmKernels
+from armblocks.face.robots import given_arm
 from armblocks.face.trajectory_arguments import positive
 from armblocks.face.workspace.arguments import (
     MAX_SAMPLES,
@@ -27,6 +29,7 @@ from armblocks.face.workspace.arguments import (
 from armblocks.face.workspace.cells import UNITS, MeasureMap
 from armblocks.face.workspace.result import Workspace
 from armblocks.pictures.numbers import nice_step
+from armblocks.robot import Robot
 
 if TYPE_CHECKING:
     from armblocks.equations import TracedFunction
@@ -45,7 +48,7 @@ ROUNDING = 1e-12
 
 
 def workspace(
-    arm: Arm,
+    arm: Arm | Robot | str | PathLike[str],
     samples: int = 1_000_000,
     *,
     measures: str | Sequence[str] = "manipulability",
@@ -89,6 +92,7 @@ def workspace(
 
     Raises RobotError for closed loops and for translations without limits, InputError for too many cells.
     """
+    arm = given_arm(arm, "workspace")
     where = f"workspace of robot '{arm.name}'"
     check_robot(arm, where)
     names = checked_measures(measures, where)
