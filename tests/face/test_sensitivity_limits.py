@@ -20,6 +20,7 @@ from armblocks.blocks import (
     Modulo,
     Quantizer,
     Ramp,
+    RateLimiterContinuous,
     Relay,
     ResettableIntegrator,
     Rounding,
@@ -28,6 +29,7 @@ from armblocks.blocks import (
     SineWave,
     Step,
     Sum,
+    TransportDelay,
     UnitDelay,
     ZeroOrderHold,
 )
@@ -183,3 +185,22 @@ def test_an_event_at_the_time_of_a_tick(level: Block, period: float) -> None:
     else:
         # x = r t, and x = r t - 1 from 1/r on: the sampled values have the derivatives t.
         assert derivative() == pytest.approx(0.3 * (0.3 + 0.6 + 0.9 + 1.2 + 1.5 + 1.8), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["y.rising", "delay.delay", "u.amplitude"])
+def test_a_limit_of_the_rate_of_a_delayed_signal(name: str) -> None:
+    """The guards depend on the time derivative of the delayed signal."""
+    builder = ab.DiagramBuilder("rate")
+    delayed = builder.add(
+        "delay", TransportDelay(delay=0.3), builder.add("u", SineWave(amplitude=1.0, frequency=2.0))
+    )
+    limited = builder.add("y", RateLimiterContinuous(rising=0.5, falling=-0.5), delayed)
+    builder.add("x", Integrator(), limited)
+    diagram = builder.build()
+    settings = {"stop_time": 2.0, "rtol": 1e-10, "atol": 1e-12}
+    value = {"y.rising": 0.5, "delay.delay": 0.3, "u.amplitude": 1.0}[name]
+    low, high = (
+        ab.simulate(diagram, parameters={name: value + step}, **settings)["x"][-1] for step in (-1e-5, 1e-5)
+    )
+    derivative = ab.sensitivity(diagram, name, "x", **settings)["x", name][-1]
+    assert derivative == pytest.approx((high - low) / 2e-5, rel=1e-6)

@@ -105,7 +105,7 @@ class Instants:
         self.g = c.value(system.guards)
         self.g_rate = self.over_time(self.g)
         self.times, self.moving_breakpoints = self._breakpoints()
-        self.ties = Ties(columns, delays.rate_along, self.g, self.g_rate) if self.guards else None
+        self.ties = Ties(columns, delays, self.g, self.g_rate) if self.guards else None
 
     def _breakpoints(self) -> tuple[SX, list[int]]:
         """The breakpoints, and the indices of breakpoints that depend on the parameters."""

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from casadi import SX, Function, densify, fabs, fmax, if_else, logic_and, logic_or, vertcat, vertsplit
 
+from armblocks.equations.sensitivity_delays import DelayedSensitivities
 from armblocks.equations.sensitivity_layout import Columns, any_marked
 
 AT_ZERO = 1e-12
@@ -29,16 +30,18 @@ LATER = 1e-4
 class Ties:
     """The search for guards that are 0 after a call of ``reset``."""
 
-    def __init__(self, columns: Columns, rate_along: SX, g: SX, g_rate: SX) -> None:
-        """``rate_along`` (nz,): the time derivatives of the discrete variables; ``g``, ``g_rate`` (ng,): the
-        guards and their time derivatives."""
+    def __init__(self, columns: Columns, delays: DelayedSensitivities, g: SX, g_rate: SX) -> None:
+        """``g``, ``g_rate`` (ng,): the guards and their time derivatives."""
         self.columns = c = columns
-        self.rate_along = rate_along
+        self.rate_along = delays.rate_along
+        """The time derivatives of the discrete variables (nz,)."""
+        self.rates = vertcat(c.V, delays.curvature)
+        """The time derivatives of the unknowns and of delayed time derivatives."""
         symbols = [c.t, c.x, c.z, c.w, c.p]
         moved = [SX.sym("along", symbol.numel()) for symbol in symbols]
         along = [c.derivative_along(column, **dict(zip("txzwp", moved))) for column in (g, g_rate)]
-        self.rate = Function("g_rate", [*symbols, c.V], [g_rate])
-        self.along = Function("g_along", [*symbols, c.V, *moved], along)
+        self.rate = Function("g_rate", [*symbols, self.rates], [g_rate])
+        self.along = Function("g_along", [*symbols, self.rates, *moved], along)
         self.no_event = SX.zeros(g.numel())
         self.guards, self.flow, self.signals, self.reset = (
             Function("f", list(traced.arguments), [densify(vertcat(*traced.results, SX(0, 1)))])
@@ -65,7 +68,7 @@ class Ties:
         c = self.columns
         at = [c.t if t is None else t, x[0], z[0], c.w, c.p]
         (g,) = self.guards.call(at, True, False)
-        (rate,) = self.rate.call([*at, c.V], True, False)
+        (rate,) = self.rate.call([*at, self.rates], True, False)
         (flow,) = self.flow.call(at, True, False)
         rests = fabs(rate) <= AT_ZERO
         tied = SX.zeros(g.numel())
@@ -73,7 +76,7 @@ class Ties:
         for k, instant in enumerate(instants):
             within, beside = opened * instant, (1.0 - opened) * instant
             Z = z[k + 1] + self.rate_along * within
-            moved = self.along.call([*at, c.V, within, x[k + 1], Z, c.W[k], c.seeds[k]], True, False)
+            moved = self.along.call([*at, self.rates, within, x[k + 1], Z, c.W[k], c.seeds[k]], True, False)
             moves = fabs(moved[0] + rate * beside) > MOVES * (1.0 + fabs(rate))
             # A double zero that splits.
             splits = logic_and(logic_and(rests, beside == 0.0), fabs(moved[1]) > MOVES)
