@@ -56,10 +56,10 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
 
 DIAGRAM = ab.load_diagram("van_der_pol_pid")
 WRONG_TYPES: dict[str, tuple[Callable[[], object], str]] = {
-    "a diagram": (lambda: ab.simulate(3), "a Diagram, the name of a shipped diagram, or the path of a file"),
+    "compile_diagram": (lambda: ab.simulate(3), "a Diagram, or the name or path of a diagram"),
     "load_robot": (lambda: ab.load_robot(3), "the name of a shipped robot, or the path of a file"),
     "load_table": (lambda: ab.load_table(3), "the path of a file"),
-    "save_robot": (lambda: ab.save_robot(3, "x.json"), "a Robot or an Arm"),
+    "save_robot": (lambda: ab.save_robot(3, "x.json"), "an Arm, a Robot, or the name or path of a robot"),
     "save_diagram": (lambda: ab.save_diagram(3, "x.json"), "a Diagram"),
     "to_python": (lambda: ab.to_python(3), "a Diagram"),
     "draw_diagram": (lambda: ab.draw_diagram(3, "x.svg"), "a Diagram"),

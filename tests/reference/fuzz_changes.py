@@ -261,7 +261,7 @@ def differences(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             runs = [
-                ab.simulate(resolved_diagram(case.diagram, {name: value + step * n}), **settings)
+                ab.simulate(resolved_diagram(case.diagram, {name: value + step * n}, "simulate"), **settings)
                 for n in (-2.0, -1.0, 1.0, 2.0)
             ]
     except ArmblocksError as error:

@@ -26,8 +26,9 @@ _STEPS = COMPARISONS | {
     casadi.OP_OR,
 }
 """Operations whose values are constant between their jumps."""
-_BETWEEN_OPERANDS = COMPARISONS | {casadi.OP_FMIN, casadi.OP_FMAX}
-"""Operations with a limit where their operands are equal."""
+_BETWEEN_OPERANDS = frozenset({casadi.OP_LT, casadi.OP_LE, casadi.OP_FMIN, casadi.OP_FMAX})
+"""Operations with a limit where their operands are equal. Formulas use == and ~= to protect a division by 0,
+where the result is smooth; these are not included."""
 _TIME, _STATES, _DISCRETE, _UNKNOWNS = range(4)
 """The inputs of the functions that change during a run."""
 
