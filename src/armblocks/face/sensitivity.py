@@ -184,40 +184,41 @@ class InstantChecks:
 
     def _refuse(self, run: SimulationResult, instants: Mapping[str, Array]) -> None:
         for name, values in instants.items():
-            time = f"{values[0]:.9g} s"
             if values[0] < 0.0:
                 continue
-            if name == MIXED:
-                raise SimulationError(
-                    f"several events coincide at {time}, one of '{self._guarded(values[1])}' among them, and "
-                    "a parameter change would separate them: the derivative does not exist",
-                    where=self._system.name,
-                    allowed="events that coincide, or do not, for all small parameter changes",
-                    fix="shift one of the events, or use the difference of two runs",
-                    partial=run,
-                )
-            if name == SAMPLED:
-                raise SimulationError(
-                    f"block '{self._samples(values[1])}' samples a signal exactly at a limit or at a jump at "
-                    f"{time}, and a parameter change would move it away: the derivative does not exist",
-                    where=self._system.name,
-                    allowed="sampled signals that have derivatives at the ticks",
-                    fix="shift the ticks or the signal a little, or use the difference of two runs",
-                    partial=run,
-                )
-            block = name.removeprefix(LIMIT) if name.startswith(LIMIT) else self._guarded(values[1])
+            what, allowed, fix = self._description(name, f"{values[0]:.9g} s", int(values[-1]) - 1)
             raise SimulationError(
-                f"block '{block}' is exactly at a limit or at a jump after an event or a tick at {time}, "
-                "and a parameter change would move it away: the derivative does not exist",
+                f"{what}: the derivative does not exist",
                 where=self._system.name,
-                allowed="signals that jump at all small parameter changes, or at none",
-                fix="change the new value or the limit a little, or use the difference of two runs",
+                allowed=allowed,
+                fix=f"{fix}, or use the difference of two runs",
                 partial=run,
             )
 
-    def _samples(self, number: float) -> str:
-        elements = [element for slot in self._system.discrete for element in slot.elements]
-        return elements[int(number) - 1].rpartition("/")[0]
-
-    def _guarded(self, number: float) -> str:
-        return self._system.guard_names[int(number) - 1]
+    def _description(self, name: str, time: str, index: int) -> tuple[str, str, str]:
+        """What happened at an instant, what is allowed, and a remedy. ``index``: that of a guard or of a
+        discrete variable."""
+        if name == MIXED:
+            block = self._system.guard_names[index]
+            return (
+                f"several events coincide at {time}, one of '{block}' among them, and a parameter change "
+                "would separate them",
+                "events that coincide, or do not, for all small parameter changes",
+                "shift one of the events",
+            )
+        if name == SAMPLED:
+            elements = [element for slot in self._system.discrete for element in slot.elements]
+            block = elements[index].rpartition("/")[0]
+            return (
+                f"block '{block}' samples a signal exactly at a limit or at a jump at {time}, and a "
+                "parameter change would move it away",
+                "sampled signals that have derivatives at the ticks",
+                "shift the ticks or the signal a little",
+            )
+        block = name.removeprefix(LIMIT) if name.startswith(LIMIT) else self._system.guard_names[index]
+        return (
+            f"block '{block}' is exactly at a limit or at a jump after an event or a tick at {time}, and a "
+            "parameter change would move it away",
+            "signals that jump at all small parameter changes, or at none",
+            "change the new value or the limit a little",
+        )
