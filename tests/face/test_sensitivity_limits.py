@@ -15,6 +15,7 @@ from armblocks.blocks import (
     CompareToZero,
     Constant,
     DeadZone,
+    Expression,
     Integrator,
     LogicalOperator,
     Modulo,
@@ -98,6 +99,8 @@ HELD = [
     Rounding(function="floor"),
     Abs(),
     Saturation(lower=0.0),
+    Expression(formula="if(u==0,1,2)"),
+    LogicalOperator(operator="NOT"),
 ]
 
 
@@ -124,6 +127,21 @@ def test_a_signal_that_is_held_at_a_limit(block: Block, ends: bool, sampled: boo
     before = ab.sensitivity(diagram, "u.initial", "integral", stop_time=2.0)["integral", "u.initial"]
     expected = -(1.0 if sampled else 0.9) if isinstance(block, Abs) else 0.0
     assert before[-1] == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_formula_that_protects_a_division() -> None:
+    """The branch for 0 is a constant: right for an even function, wrong for the slope 1/2 of the other."""
+
+    def diagram(formula: str) -> ab.Diagram:
+        builder = ab.DiagramBuilder("protected")
+        u = builder.add("u", Step(time=0.9, initial=2.0, final=0.0))
+        builder.add("y", Expression(formula=formula), u)
+        return builder.build()
+
+    even = ab.sensitivity(diagram("if(u==0,1,sin(u)/u)"), "u.final", "y", stop_time=2.0)
+    assert not even["y", "u.final"].any()
+    with pytest.raises(SimulationError, match=r"block 'y' is exactly at a limit .* at 0\.9 s"):
+        ab.sensitivity(diagram("if(u==0,1,(exp(u)-1)/u)"), "u.final", "y", stop_time=2.0)
 
 
 def test_a_divisor_that_is_held_at_zero() -> None:

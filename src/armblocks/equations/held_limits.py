@@ -14,21 +14,13 @@ from casadi import SX, Function, densify, fabs, if_else, vertcat
 
 from armblocks.equations.constant_folding import called_entries, operation_value
 from armblocks.equations.hybrid_system import HybridSystem
-from armblocks.equations.jump_modes import COMPARISONS
+from armblocks.equations.jump_modes import COMPARISONS, STEPS
 from armblocks.equations.remainders import nearest
 
-_STEPS = COMPARISONS | {
-    casadi.OP_SIGN,
-    casadi.OP_FLOOR,
-    casadi.OP_CEIL,
-    casadi.OP_NOT,
-    casadi.OP_AND,
-    casadi.OP_OR,
-}
-"""Operations whose values are constant between their jumps."""
-_BETWEEN_OPERANDS = frozenset({casadi.OP_LT, casadi.OP_LE, casadi.OP_FMIN, casadi.OP_FMAX})
-"""Operations with a limit where their operands are equal. Formulas use == and ~= to protect a division by 0,
-where the result is smooth; these are not included."""
+_BETWEEN_OPERANDS = COMPARISONS | {casadi.OP_FMIN, casadi.OP_FMAX}
+"""Operations with a limit where their operands are equal."""
+_EQUALITIES = frozenset({casadi.OP_EQ, casadi.OP_NE})
+"""Comparisons that can also protect a division by 0, where the result is smooth."""
 _TIME, _STATES, _DISCRETE, _UNKNOWNS = range(4)
 """The inputs of the functions that change during a run."""
 
@@ -44,8 +36,8 @@ class _Node(NamedTuple):
 
 
 def held_limits(system: HybridSystem) -> dict[str, Function]:
-    """For each block the distances between held signals and their limits: functions (n,) of ``t, x, z, w,
-    p``.
+    """For each block the distances between held signals and their limits: functions of ``t, x, z, w, p`` with
+    two results, the distances (n,) from limits and those (m,) in comparisons by == and ~=.
 
     The block is the one of the first signal, state or unknown that depends on the operation with the limit.
     """
@@ -57,11 +49,15 @@ def held_limits(system: HybridSystem) -> dict[str, Function]:
     first = _first_results(function)
     layouts = (system.signals_layout, system.states, system.algebraic)
     names = [element for layout in layouts for slot in layout for element in slot.elements]
-    found: dict[str, list[SX]] = {}
+    found: dict[str, tuple[list[SX], list[SX]]] = {}
     for number, distance in _limits(function, symbols, delayed).items():
         if first[number] < len(names):
-            found.setdefault(names[first[number]].rpartition("/")[0], []).append(distance)
-    return {block: Function("f", symbols, [vertcat(*limits)]) for block, limits in found.items()}
+            of_block = found.setdefault(names[first[number]].rpartition("/")[0], ([], []))
+            of_block[function.instruction_id(number) in _EQUALITIES].append(distance)
+    return {
+        block: Function("f", symbols, [vertcat(*distances, SX(0, 1)) for distances in both])
+        for block, both in found.items()
+    }
 
 
 def _all_values(system: HybridSystem, symbols: Sequence[SX]) -> Function:
@@ -124,7 +120,7 @@ def _limits(function: Function, symbols: Sequence[SX], delayed: frozenset[int]) 
                     found[k] = distance
         for target, value in zip(targets, results):
             if target >= 0:
-                work[target] = _Node(value, varies and operation not in _STEPS, stored)
+                work[target] = _Node(value, varies and operation not in STEPS, stored)
     return found
 
 

@@ -19,6 +19,9 @@ JUMPS = COMPARISONS | {
     casadi.OP_ATAN2,
 }
 """The operations that jump."""
+LOGIC = frozenset({casadi.OP_NOT, casadi.OP_AND, casadi.OP_OR})
+STEPS = (JUMPS | LOGIC) - {casadi.OP_FMOD, casadi.OP_ATAN2}
+"""Operations whose values are constant between their jumps."""
 
 
 @dataclass

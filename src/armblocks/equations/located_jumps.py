@@ -37,7 +37,7 @@ from casadi import (
 
 from armblocks.equations.constant_folding import called_entries, operation_value
 from armblocks.equations.hybrid_system import HybridSystem
-from armblocks.equations.jump_modes import COMPARISONS, JUMPS, JumpModes
+from armblocks.equations.jump_modes import COMPARISONS, JUMPS, LOGIC, STEPS, JumpModes
 from armblocks.equations.signatures import Signature, Slot, signature
 from armblocks.equations.traced_function import TracedFunction
 
@@ -49,9 +49,6 @@ SAME_EXPRESSION = 20
 """Depth to which expressions are compared."""
 _TIME, _STATES, _DISCRETE, _UNKNOWNS, _PARAMETERS, _TICKS, _EVENTS = range(7)
 """The inputs of the functions."""
-_LOGIC = frozenset({casadi.OP_NOT, casadi.OP_AND, casadi.OP_OR})
-_STEPS = (JUMPS | _LOGIC) - {casadi.OP_FMOD, casadi.OP_ATAN2}
-"""Operations whose values are constant between their jumps."""
 
 
 @dataclass(frozen=True)
@@ -171,7 +168,7 @@ class _Located:
         """The value of an operation on which a searched function depends."""
         if _is_refusal(node):
             return _plain(node, operands)
-        conditions = {casadi.OP_IF_ELSE_ZERO: 1}.get(node.operation, 2 if node.operation in _LOGIC else 0)
+        conditions = {casadi.OP_IF_ELSE_ZERO: 1}.get(node.operation, 2 if node.operation in LOGIC else 0)
         for k, operand in enumerate(node.operands[:conditions]):
             condition = _Node(casadi.OP_NE, (operand, _Node(casadi.OP_CONST)), varies=operand.varies)
             if operand.varies and operand.shifts and _changes(condition):
@@ -296,7 +293,7 @@ def _combined(operation: int, operands: Sequence[_Node]) -> _Node:
     return _Node(
         operation,
         tuple(operands),
-        varies=operation not in _STEPS and any(operand.varies for operand in operands),
+        varies=operation not in STEPS and any(operand.varies for operand in operands),
         shifts=any(operand.shifts for operand in operands),
         momentary=any(operand.momentary for operand in operands) or _compares_instants(operation, operands),
     )

@@ -15,11 +15,8 @@ from casadi import SX, Function, densify, fabs, fmax, if_else, logic_and, logic_
 
 from armblocks.equations.hybrid_system import HybridSystem
 from armblocks.equations.sensitivity_layout import any_marked
+from armblocks.equations.side_differences import combined, without_derivative
 
-STEP = 1e-9
-"""The change of a parameter."""
-KINK, ROUNDING = 1e-2, 1e-5
-"""The smallest relative difference of two derivatives, and the part of it for each unit of a value."""
 JUMPS = 1e-4
 """The smallest relative change of a sampled value by an event."""
 LATER = 2e-8
@@ -53,19 +50,19 @@ class Sampling:
         derivatives, ``along``: the derivatives of ``t, x, z, w, p`` before the ticks. ``events`` (ng,): the
         events at the time of the ticks that the parameters shift.
         """
-        weights = [1.0 + 0.37 * k for k in range(len(Z))]  # with different weights no changes cancel
-        change = [sum(weight * part for weight, part in zip(weights, parts)) for parts in zip(*along)]
-        rate = sum(weight * part for weight, part in zip(weights, Z)) - change[2]
+        direction = [combined(parts) for parts in zip(*along)]
         present = updated - self.symbols[2]
-        limit = STEP * (KINK * (1.0 + fabs(rate)) + ROUNDING * (fabs(updated) + fabs(self.symbols[2])))
         later = self._later()
         jumps = fabs(self._sampled(later, m, events) - present) > JUMPS * (1.0 + fabs(present))
         jumps = logic_or(jumps, self._causes_events(later, events))
-        differs = logic_and(jumps, any_marked(events))
-        for step in (-STEP, STEP):
-            at = [value + step * part for value, part in zip(self.symbols, change)]
-            error = self._sampled(at, m, SX.zeros(events.numel())) - present - step * rate
-            differs = logic_or(differs, fabs(error) > limit)
+        jumps = logic_and(jumps, any_marked(events))
+
+        def change(step: float) -> SX:
+            at = [value + step * part for value, part in zip(self.symbols, direction)]
+            return self._sampled(at, m, SX.zeros(events.numel())) - present
+
+        size = fabs(updated) + fabs(self.symbols[2])
+        differs = logic_or(jumps, without_derivative(change, combined(Z) - direction[2], size))
         found = SX(0.0)
         for row in reversed(self.rows):
             found = if_else(differs[row], row + 1.0, found)

@@ -28,6 +28,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from functools import cached_property
 from itertools import accumulate
 
 from casadi import (
@@ -54,6 +55,7 @@ from armblocks.equations.sampled_limits import Sampling
 from armblocks.equations.sensitivity_delays import DelayedSensitivities
 from armblocks.equations.sensitivity_layout import Columns, any_marked, limit_name
 from armblocks.equations.sensitivity_ties import AT_ZERO, MOVES, Ties
+from armblocks.equations.side_differences import combined, without_derivative
 
 LOCATION_TOLERANCE = 1e-8
 """A guard whose zero is within this relative time counts as located; otherwise it has jumped."""
@@ -216,10 +218,39 @@ class Instants:
     def _stays_at_limit(self, block: str) -> SX:
         """Whether a held signal of a block has been at a limit since the last instant."""
         c = self.columns
-        (distances,) = self.limits[block].call([c.t * JUST_BEFORE, c.x, c.z, c.w, c.p], True, False)
-        moved = [fabs(self.by_parameter(distances, k)) > MOVES for k in range(len(c.names))]
-        at_limit = fabs(distances) <= AT_ZERO
-        return logic_and(self._lasts, any_marked(vertcat(*(logic_and(at_limit, moves) for moves in moved))))
+        at = [c.t * JUST_BEFORE, c.x, c.z, c.w, c.p]
+        limits, equalities = self.limits[block].call(at, True, False)
+        stays = self._moved_zero(limits)
+        if equalities.numel():
+            stays = logic_or(stays, logic_and(self._moved_zero(equalities), self._sides_differ))
+        return logic_and(self._lasts, stays)
+
+    def _moved_zero(self, distances: SX) -> SX:
+        """Whether a distance is 0 and depends on a parameter."""
+        moves = SX.zeros(distances.numel())
+        for k in range(len(self.columns.names)):
+            moves = logic_or(moves, fabs(self.by_parameter(distances, k)) > MOVES)
+        return any_marked(logic_and(fabs(distances) <= AT_ZERO, moves))
+
+    @cached_property
+    def _sides_differ(self) -> SX:
+        """Whether a signal or the flow has no derivative just before the present time."""
+        c = self.columns
+        at = [c.t * JUST_BEFORE, c.x, c.z, c.w, c.p]
+        direction = [combined([self._present_along(k)[j] for k in range(len(c.names))]) for j in range(5)]
+
+        def values(*point: SX) -> SX:
+            parts = (c.system.signals, c.system.derivative)
+            functions = [Function("f", list(part.arguments), list(part.results)) for part in parts]
+            return densify(vertcat(*(f.call(list(point), True, False)[0] for f in functions)))
+
+        present = values(*at)
+        rate = combined([self.by_parameter(present, k) for k in range(len(c.names))])
+
+        def change(step: float) -> SX:
+            return values(*(value + step * part for value, part in zip(at, direction))) - present
+
+        return any_marked(without_derivative(change, rate, fabs(present)))
 
     def _resting_tie(self) -> SX:
         """The time of the last instant and the number of a guard that has been 0 since then, or never."""

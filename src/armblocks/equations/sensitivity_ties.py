@@ -12,17 +12,15 @@ from casadi import SX, Function, densify, fabs, fmax, if_else, logic_and, logic_
 
 from armblocks.equations.sensitivity_delays import DelayedSensitivities
 from armblocks.equations.sensitivity_layout import Columns, any_marked
+from armblocks.equations.side_differences import KINK, ROUNDING, STEP
 
 AT_ZERO = 1e-12
 """The largest value of a guard that counts as 0."""
 MOVES = 1e-6
 """The smallest derivative of a guard with respect to a parameter that counts, relative to 1 plus its time
 derivative."""
-STEP, JUMPS = 1e-9, 1e-4
-"""The change of a parameter, and the smallest change of a signal or of a state that is a jump, relative to 1
-plus its value."""
-KINK, ROUNDING = 1e-2, 1e-5
-"""The smallest difference of two derivatives at a kink, and the part of it for each unit of the value."""
+JUMPS = 1e-4
+"""The smallest change of a signal or of a state that is a jump, relative to 1 plus its value."""
 LATER = 1e-4
 """The time after which a change of a rate has moved a guard, s."""
 
