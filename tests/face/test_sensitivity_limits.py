@@ -15,6 +15,7 @@ from armblocks.blocks import (
     CompareToZero,
     Constant,
     DeadZone,
+    EdgeDetection,
     Expression,
     Integrator,
     LogicalOperator,
@@ -151,6 +152,20 @@ def test_a_divisor_that_is_held_at_zero() -> None:
     builder.add("y", Modulo(), held, held)
     with pytest.raises(SimulationError, match=r"block 'y' is exactly at a limit .* at 0.45 s"):
         ab.sensitivity(builder.build(), "q.interval", "y", stop_time=1.0)
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+def test_an_edge_that_only_a_tick_computes(sampled: bool) -> None:
+    """A step from below to 0 is a rising edge only for a larger final value. The diagram has no events."""
+    builder = ab.DiagramBuilder("edge")
+    u = builder.add("u", Step(time=0.9, initial=-3.2, final=0.0))
+    u = builder.add("hold", ZeroOrderHold(sample_time=0.25), u) if sampled else u
+    builder.add("x", Integrator(), builder.add("y", EdgeDetection(sample_time=0.25), u))
+    diagram = builder.build()
+    with pytest.raises(SimulationError, match=r"block 'y' (samples|is exactly at a limit)"):
+        ab.sensitivity(diagram, "u.final", "x", stop_time=2.0)
+    beside = ab.sensitivity(diagram, "u.final", "x", stop_time=2.0, values={"u.final": 0.3})
+    assert not beside["x", "u.final"].any()
 
 
 SOURCES: dict[str, Callable[[], Block]] = {

@@ -14,21 +14,23 @@ import casadi
 from casadi import SX, Function, densify, fabs, fmax, if_else, logic_and, logic_or, sign, vertcat, vertsplit
 
 from armblocks.equations.hybrid_system import HybridSystem
+from armblocks.equations.jump_modes import JUMPS
 from armblocks.equations.sensitivity_layout import any_marked
 from armblocks.equations.side_differences import combined, without_derivative
 
-JUMPS = 1e-4
+SMALLEST_JUMP = 1e-4
 """The smallest relative change of a sampled value by an event."""
 LATER = 2e-8
 """The time after which an event has occurred, relative to the time of the tick, s."""
-_KINKS = frozenset({casadi.OP_FABS, casadi.OP_FMIN, casadi.OP_FMAX})
+_LIMITED = JUMPS | {casadi.OP_FABS, casadi.OP_FMIN, casadi.OP_FMAX}
+"""Operations with a jump or a kink."""
 
 
-def samples_kinks(system: HybridSystem) -> bool:
-    """Whether sampled values have kinks."""
+def samples_limits(system: HybridSystem) -> bool:
+    """Whether sampled values have jumps or kinks."""
     function = system.update.casadi_function()
     operations = {function.instruction_id(k) for k in range(function.n_instructions())}
-    return bool(system.clocks) and not _KINKS.isdisjoint(operations)
+    return bool(system.clocks) and not _LIMITED.isdisjoint(operations)
 
 
 class Sampling:
@@ -53,7 +55,7 @@ class Sampling:
         direction = [combined(parts) for parts in zip(*along)]
         present = updated - self.symbols[2]
         later = self._later()
-        jumps = fabs(self._sampled(later, m, events) - present) > JUMPS * (1.0 + fabs(present))
+        jumps = fabs(self._sampled(later, m, events) - present) > SMALLEST_JUMP * (1.0 + fabs(present))
         jumps = logic_or(jumps, self._causes_events(later, events))
         jumps = logic_and(jumps, any_marked(events))
 
@@ -86,7 +88,7 @@ class Sampling:
         before, after = (
             self.guards.call(list(point), True, False)[0] for point in (at, self._after(at, events))
         )
-        jumps = fabs(after - before) > JUMPS * (1.0 + fabs(before))
+        jumps = fabs(after - before) > SMALLEST_JUMP * (1.0 + fabs(before))
         return any_marked(logic_and(logic_and(jumps, sign(before) != sign(after)), events == 0.0))
 
     def _after(self, at: Sequence[SX], events: SX) -> list[SX]:

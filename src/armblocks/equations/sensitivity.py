@@ -19,7 +19,7 @@ from armblocks.equations.forward_differentiation import directional_derivative
 from armblocks.equations.held_limits import held_limits
 from armblocks.equations.hybrid_system import HybridSystem, LinearLoops
 from armblocks.equations.located_jumps import with_located_jumps
-from armblocks.equations.sampled_limits import samples_kinks
+from armblocks.equations.sampled_limits import samples_limits
 from armblocks.equations.sensitivity_delays import DelayedSensitivities
 from armblocks.equations.sensitivity_instants import Instants
 from armblocks.equations.sensitivity_layout import PREFIX, Columns, limit_name, sensitivity_name
@@ -157,7 +157,11 @@ class _AugmentedSystem:
         _refuse_implicit_jumps(system, sources=sources)
         limits = held_limits(system)
         self.moving = bool(
-            system.guard_directions or system.delays is not None or sources or limits or samples_kinks(system)
+            system.guard_directions
+            or system.delays is not None
+            or sources
+            or limits
+            or samples_limits(system)
         )
         self.outputs = [system.signals_layout[name] for name in outputs]
         self.columns = Columns(system, parameters, moving=self.moving)
