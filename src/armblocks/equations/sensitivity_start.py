@@ -17,7 +17,7 @@ from casadi import SX, Function, densify, jtimes, vertcat
 from numpy.typing import NDArray
 
 from armblocks.equations.hybrid_system import HybridSystem
-from armblocks.equations.table_reading import evaluate_with_reads, reads_tables
+from armblocks.equations.table_reading import evaluated, reads_tables
 from armblocks.equations.traced_function import TracedFunction
 from armblocks.errors import InputError
 
@@ -101,9 +101,7 @@ class _Equations:
         key = id(function)
         if key not in self._reading:
             self._reading[key] = reads_tables(function)
-        reads = self._reading[key]
-        values = evaluate_with_reads(function, arguments) if reads else function.call(list(arguments))
-        return [np.array(value, dtype=np.float64).ravel() for value in values]
+        return evaluated(function, arguments, reads=self._reading[key])
 
     def along(
         self, function: Function, point: _Point, p: Array, direction: Sequence[Array], t: float = 0.0

@@ -78,11 +78,11 @@ def tables_read(function: Function) -> set[tuple[int, int, int]]:
     return tables
 
 
-def evaluated(function: Function, arguments: Sequence[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
-    """The values of a function that may read tables, each a flat array."""
-    values = (
-        evaluate_with_reads(function, arguments) if reads_tables(function) else function.call(list(arguments))
-    )
+def evaluated(
+    function: Function, arguments: Sequence[NDArray[np.float64]], *, reads: bool
+) -> list[NDArray[np.float64]]:
+    """The values of a function, each a flat array. ``reads``: whether the function reads tables."""
+    values = evaluate_with_reads(function, arguments) if reads else function.call(list(arguments))
     return [np.array(value, dtype=np.float64).ravel() for value in values]
 
 

@@ -20,7 +20,7 @@ from armblocks.diagram.mask_tuning import mask_parameters, with_mask_parameters
 from armblocks.equations import HybridSystem, Signature, Slot
 from armblocks.equations.sensitivity import LIMIT, MIXED, SAMPLED, TIES, sensitivity_system
 from armblocks.equations.sensitivity_layout import entry_name, sensitivity_name
-from armblocks.equations.table_reading import evaluated
+from armblocks.equations.table_reading import evaluated, reads_tables
 from armblocks.errors import InputError, SimulationError, UnknownNameError, counted
 from armblocks.face.linearizing import resolved_diagram
 from armblocks.face.model import CompiledDiagram, compile_diagram
@@ -168,7 +168,7 @@ class InstantChecks:
         self._refuse(run, {name: values[places] for name, places in self._ranges.items()})
         p = np.asarray(self._system.parameter_values if p is None else p, dtype=np.float64)
         arguments = [np.array([state.time]), state.states, values, state.algebraic, p]
-        (column,) = evaluated(self._at_end, arguments)
+        (column,) = evaluated(self._at_end, arguments, reads=self._reads_tables)
         ends = itertools.accumulate(places.stop - places.start for places in self._ranges.values())
         self._refuse(run, dict(zip(self._ranges, np.split(column, list(ends)[:-1]))))
 
@@ -181,6 +181,10 @@ class InstantChecks:
         arguments = list(update.arguments[:5])
         (z,) = function.call([*arguments, SX.zeros(len(self._system.clocks))], True, False)
         return Function("f", arguments, [vertcat(*(z[places] for places in self._ranges.values()))])
+
+    @cached_property
+    def _reads_tables(self) -> bool:
+        return reads_tables(self._at_end)
 
     def _refuse(self, run: SimulationResult, instants: Mapping[str, Array]) -> None:
         for name, values in instants.items():
