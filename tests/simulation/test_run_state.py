@@ -146,7 +146,8 @@ def delayed_sine() -> ab.Diagram:
 
 
 @pytest.mark.parametrize(
-    "damage", ["rows", "first row", "last row", "stage", "reals", "counts", "method", "past", "order"]
+    "damage",
+    ["rows", "first row", "last row", "searched", "stage", "reals", "counts", "method", "past", "order"],
 )
 def test_a_state_with_damaged_arrays_is_refused(damage: str, tmp_path: Path) -> None:
     diagram = delayed_sine()
@@ -160,6 +161,8 @@ def test_a_state_with_damaged_arrays_is_refused(damage: str, tmp_path: Path) -> 
             counts[-2] = 10**9
         case "last row":
             counts[-1] = 10**9
+        case "searched":
+            counts[-1] = -(10**9)
         case "stage":
             counts[Count.STAGE] = 7
         case "reals":
@@ -176,6 +179,14 @@ def test_a_state_with_damaged_arrays_is_refused(damage: str, tmp_path: Path) -> 
     dataclasses.replace(state, checkpoint=checkpoint).save(tmp_path / "state.npz")
     with pytest.raises(InputError, match="the state of 'delayed' at 1 s is damaged"):
         ab.simulate(diagram, stop_time=2.0, initial_state=RunState.load(tmp_path / "state.npz"))
+
+
+def test_the_search_for_delayed_jumps_goes_on_where_it_ended() -> None:
+    checkpoint = ab.simulate(delayed_sine(), stop_time=1.0).final_state.checkpoint
+    assert checkpoint is not None
+    # The last row of a line without jumps is -1 - n, and no jump begins before row n.
+    searched_rows = -1 - checkpoint.counts[-1]
+    assert 10 < searched_rows < checkpoint.counts[Count.HISTORY_ROWS]
 
 
 def test_a_stop_time_before_the_time_of_the_state_is_refused() -> None:

@@ -83,7 +83,8 @@ class DelayHistory:
         return counts.after(self.first)
 
     def last_rows(self, counts: Integers) -> Integers:
-        """The last row that each line reads: a jump of its signal; -1 for the newest row."""
+        """The last row that each line reads, where its signal jumps. -1 - n: the line reads up to the newest
+        row, and no jump is known to begin before row n."""
         return counts.after(self.first + self.count)
 
     # Reading.
@@ -250,14 +251,16 @@ class DelayHistory:
                 continue
             i = r.integer(0)
             with r.part() as search, r.loop():
-                with r.when(last_rows[k] >= 0):
+                last = last_rows[k]
+                i.value = select(last < 0, -1 - last, 0)
+                with r.when(last >= 0):
                     tau = reals[self.workspace.taus + k]
-                    search.leave_unless(self.time(reals, last_rows[k]) + tau <= until)
-                    first_rows[k] = last_rows[k] + 1
-                last_rows[k] = -1
-                i.value = first_rows[k]
+                    search.leave_unless(self.time(reals, last) + tau <= until)
+                    first_rows[k] = last + 1
+                    i.value = last + 1
                 with r.part() as rows:
                     row = i.value
+                    last_rows[k] = -1 - row
                     next_row = row + 1
                     search.leave_unless(next_row < counts[Count.HISTORY_ROWS])
                     i.value = next_row
@@ -311,11 +314,12 @@ class DelayHistory:
             reals[target] = reals[target + shift]
         for k in range(self.count):
             first, last = self.first_rows(counts), self.last_rows(counts)
-            # ``first`` becomes 0 if its row was dropped. -1 in ``last`` means the newest row and is not
-            # changed.
-            for rows, unknown in ((first, 0), (last, last[k])):
-                shifted = rows[k] - dropped_rows
-                rows[k] = select(shifted >= 0, shifted, unknown)
+            first_left, last_row = first[k] - dropped_rows, last[k]
+            first[k] = select(first_left >= 0, first_left, 0)
+            # A negative last row contains the number of rows in which no jump begins.
+            searched = last_row + dropped_rows
+            searched = select(searched < 0, searched, -1)
+            last[k] = select(last_row >= dropped_rows, last_row - dropped_rows, searched)
         # Also request more memory if less than half is free, so that requests are rare.
         half_is_free = remaining_rows * 2 <= capacity
         fits = remaining_rows + ROWS_OF_A_STEP <= capacity

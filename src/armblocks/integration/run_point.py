@@ -64,10 +64,8 @@ def fits(checkpoint: Checkpoint, workspace: Workspace, sizes: LoopSizes) -> bool
     width, rows = workspace.history_width, int(counts[Count.HISTORY_ROWS])
     numbers = reals[workspace.history :]
     first, last = counts[-2 * len(sizes.delays) :].reshape(2, -1)
-    if not 0 < rows <= numbers.size // width or not ((first >= 0) & (last < rows)).all():
+    if not 0 < rows <= numbers.size // width or not ((first >= 0) & (last >= -rows) & (last < rows)).all():
         return False
     history = numbers[: rows * width]
     jumps = history[1::width][last] == 0.0
-    return is_history(history, width) and bool(
-        ((last == -1) & (first < rows) | (last >= first) & jumps).all()
-    )
+    return is_history(history, width) and bool(((last < 0) & (first < rows) | (last >= first) & jumps).all())

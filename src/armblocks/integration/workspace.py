@@ -64,7 +64,7 @@ class Count(IntEnum):
     """Indices in the array of integers.
 
     Behind them are the number of the next tick of every clock, and the first and the last row of the history
-    that each delayed signal reads. A last row of -1 means the newest row.
+    that each delayed signal reads. A negative last row means the newest row.
     """
 
     SAMPLE = 0
