@@ -46,3 +46,79 @@ def test_the_strokes_of_the_stewart_platform_assemble_at_the_desired_pose() -> N
         # Errors of the difference quotients: h^2 / 6 times the third derivative, which jumps at the stations.
         difference = (value[2:] - value[:-2]) / 0.02 - rate[1:-1]
         assert np.abs(np.delete(difference, [99, 199], axis=0)).max() < 6e-3
+
+
+def test_the_arms_of_the_delta_robot_follow_from_its_path_in_closed_form() -> None:
+    """Three degrees of freedom, the pose at all times, and the derivatives of the angles."""
+    names = example("delta_robot")
+    robot, motion = names["delta"](), names["arm_motion"]()
+    arm, mechanism = ab.Arm(robot), Mechanism(robot)
+    assert mechanism.mobility(robot.neutral).degrees_of_freedom == 3
+    arms = ("arm1", "arm2", "arm3")
+    entries = [[entry.name for entry in robot.positions].index(name) for name in arms]
+    for k in (0, 50, 70, 120, 160):
+        q = robot.neutral.copy()
+        q[entries] = motion.q[k]
+        pose = arm.fkine(arm.assemble(q, locked=arms).q)
+        assert pose[:3, 3] == pytest.approx(names["desired"](motion.t[[k]])[0][0], abs=1e-9)
+        assert pose[:3, :3] == pytest.approx(np.eye(3), abs=1e-9)
+    # Between samples the motion is a quintic with these derivatives; the accelerations have no jumps.
+    t = np.linspace(0.0, motion.t[-1], 40)[1:-1]
+    found, expected = motion(t), names["arm_angles"](*names["desired"](t))
+    assert found.q == pytest.approx(expected[0], abs=1e-6)
+    assert found.qd == pytest.approx(expected[1], abs=1e-3)
+
+
+def test_the_torques_of_the_delta_robot_do_the_virtual_work_of_its_point_masses() -> None:
+    """A slender rod has the virtual work of 1/6, 2/3 and 1/6 of its mass at its start, middle and end."""
+    names = example("delta_robot")
+    robot, arms = names["delta"](), ("arm1", "arm2", "arm3")
+    arm = ab.Arm(robot)
+    columns = [[entry.name for entry in robot.speeds].index(name) for name in arms]
+    t, step = 0.28, 1e-4
+    path = names["desired"](np.array([t]))
+
+    def points(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Angles (3,) of the arms, and all point masses of arms, rods and platform (13, 3)."""
+        angle = names["arm_angles"](p[None], np.zeros((1, 3)), np.zeros((1, 3)))[0][0]
+        rows = []
+        for k, value in enumerate(angle):
+            u = np.array([np.cos(2 * np.pi / 3 * k), np.sin(2 * np.pi / 3 * k), 0.0])
+            hinge, end = names["BASE_RADIUS"] * u, p + names["PLATFORM_RADIUS"] * u
+            elbow = hinge + names["ARM"] * (np.cos(value) * u - (0, 0, np.sin(value)))
+            rows += [(hinge + elbow) / 2, elbow, (elbow + end) / 2, end]
+        return angle, np.array([*rows, p])
+
+    beam, rods = names["ARM_MASS"], 2 * names["ROD_MASS"]
+    load = 1.0
+    masses = [4 / 6 * beam, beam / 6 + rods / 6, 4 / 6 * rods, rods / 6] * 3
+    masses = np.array([*masses, names["PLATFORM_MASS"] + load])
+    # Accelerations of the points and their derivatives by the position of the platform, by differences.
+    around = [points(names["desired"](np.array([t + k * step]))[0][0])[1] for k in (-1, 0, 1)]
+    acceleration = (around[0] - 2 * around[1] + around[2]) / step**2 - np.array((0, 0, robot.gravity[2]))
+    moved = [[points(path[0][0] + s * step * axis) for s in (-1, 1)] for axis in np.eye(3)]
+    force = [
+        (masses[:, None] * acceleration * (ahead[1] - behind[1])).sum() / (2 * step)
+        for behind, ahead in moved
+    ]
+    turns = np.array([(ahead[0] - behind[0]) / (2 * step) for behind, ahead in moved])  # (3 xyz, 3 arms)
+    angle, rate, second = (value[0] for value in names["arm_angles"](*path))
+    motor = names["MOTOR"]
+    drive = motor.gear_ratio**2 * (motor.inertia * second + motor.viscous_friction * rate)
+    expected = np.linalg.solve(turns, force) + drive
+
+    q = robot.neutral.copy()
+    q[columns] = angle
+    q = arm.assemble(q, locked=arms).q
+    J = Mechanism(robot).jacobian(q)
+    others = np.setdiff1d(np.arange(robot.nv), columns)
+    qd, qdd = np.zeros((2, robot.nv))
+    qd[columns] = rate
+    qd[others] = -np.linalg.lstsq(J[:, others], J[:, columns] @ rate)[0]
+    ahead, behind = (Mechanism(robot).jacobian(arm.integrate(q, qd, s * 1e-6)) @ qd for s in (1, -1))
+    qdd[columns] = second
+    drift = (ahead - behind) / 2e-6
+    qdd[others] = -np.linalg.lstsq(J[:, others], J[:, columns] @ second + drift)[0]
+    torque = arm.rne(q, qd, qdd, payload=ab.Payload(mass=load))
+    assert torque[columns] == pytest.approx(expected, abs=1e-4)
+    assert np.abs(np.delete(torque, columns)).max() == 0.0
