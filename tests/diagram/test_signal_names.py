@@ -134,7 +134,7 @@ def test_a_name_that_is_not_unique_or_not_legal_is_refused(name: str, message: s
     builder = DiagramBuilder("x")
     gain = builder.add("sub", Gain(), builder.add("gain", SineWave()))
     builder.name_signal(builder["gain"], "speed")
-    with pytest.raises(DiagramError, match=message.replace("gain/y", "gain/y")):
+    with pytest.raises(DiagramError, match=message):
         builder.name_signal(gain, name)
 
 

@@ -296,7 +296,7 @@ def test_springs_that_a_format_does_not_have_are_named() -> None:
     ("joint", "reason"),
     [
         ('type="ball" stiffness="2"', "the spring of the ball joint is omitted"),
-        ('stiffness="2 1"', "stiffness of higher degree than the displacement is omitted"),
+        ('stiffness="2 1"', "the nonlinear part of the stiffness is omitted"),
         ('springdamper="0.1 0"', "springdamper 0.1 0 is omitted"),
         ('stiffness="-2"', "the stiffness -2 is omitted"),
         ('name="j" type="ball"', "armature and damping of the actuators of the ball joint are omitted"),
@@ -313,7 +313,7 @@ def test_other_springs_and_actuators_of_mjcf_are_findings(joint: str, reason: st
     read_mjcf(text.encode(), "m.xml", context)
     assert reason in [finding.what for finding in context.findings]
     if "ball" in joint and "actuators" in reason:
-        high = "damping of higher degree than the speed itself is omitted"
+        high = "the nonlinear part of the damping is omitted"
         assert high in [finding.what for finding in context.findings]
 
 

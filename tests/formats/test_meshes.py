@@ -153,7 +153,11 @@ INVALID = [
     (".obj", "v 1 2 3\nf 1 1 -2\n", "a triangle refers to point -1"),
     (".obj", "v 1 2 3\nf 0 1 1\n", "a triangle refers to point -1"),
     (".obj", "v 1 nan 3\nf 1 1 1\n", "points that are not finite"),
-    (".obj", "v 1 1e300 3\nf 1 1 1\n", "points that are not finite. Allowed: triangles within 1000 km"),
+    (
+        ".obj",
+        "v 1 1e300 3\nf 1 1 1\n",
+        "points that are not finite or too far away. Allowed: triangles within 1000 km",
+    ),
     (".obj", f"v 0 0 0\nf{' 1' * (MAX_READ * 3 + 9)}", f"Allowed: at most {MAX_READ}"),
     (".dae", "", "this is not well-formed XML"),
     (".dae", "<robot/>", "the root element is <robot>"),

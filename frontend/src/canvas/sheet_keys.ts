@@ -24,7 +24,7 @@ export function removeSelected(selectedWires: ReadonlySet<string>): void {
 /** Fit the sheet when space is released, unless the pointer was pressed: space and a drag move the sheet. */
 function fitAtRelease({ isTrusted, repeat }: KeyboardEvent): void {
   if (repeat) return
-  // A held key is replayed without a release.
+  // A replayed key (held_keys.ts) has no keyup event.
   if (!isTrusted) return sheetView.fit?.()
   const listeners = new AbortController()
   const { signal } = listeners

@@ -272,7 +272,7 @@ class Arm(NativeFunctions):
         - ``dt``: interval of the samples, s.
         - ``settings``: of ``ab.simulate``.
 
-        Coulomb friction sticks.
+        Joints with Coulomb friction can stick.
         """
         return simulate_arm(self.robot, duration, torque, q0, qd0, sample_time, dt, settings)
 

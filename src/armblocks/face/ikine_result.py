@@ -61,7 +61,7 @@ class IkineResult(metaclass=ArgumentErrors):
 
     @classmethod
     def trusted(cls, **values: object) -> IkineResult:
-        """A result with all fields by name, without the constructor, which takes as long as a search."""
+        """Create a result from all fields without checks; the constructor takes as long as a search."""
         result = object.__new__(cls)
         vars(result).update(values)
         return result

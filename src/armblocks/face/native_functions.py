@@ -111,7 +111,8 @@ class NativeFunctions(metaclass=ArgumentErrors):
     def rne(self) -> MotionFunction:
         """``rne(q, qd, qdd)`` → tau (n,) N m or N: joint torques of a motion, with motors and friction.
 
-        - ``wrench=``: [fx fy fz mx my mz] in the last link's frame, N and N m.
+        - ``wrench=``: [fx fy fz mx my mz], N and N m, that the tip exerts on its surroundings, in the
+          last link's frame.
         - ``payload=``: a :class:`Payload` at the tool, or a point mass (kg).
 
         The torques of a motion that violates the constraints of the robot are NaN.
@@ -123,8 +124,8 @@ class NativeFunctions(metaclass=ArgumentErrors):
         """``joint_wrenches(q, qd, qdd)`` → (L + K, 6): reaction force (N) and moment (N m) of each joint.
 
         - Row k of the first L rows is the wrench that its parent exerts on link k, about the origin and in
-          the axes of the distal frame of the joint (NOTATION.md). The component along the axis is the torque
-          of the rigid bodies: ``rne`` without friction and rotor inertia.
+          the axes of the distal frame of the joint, the joint frame that is fixed to the link. The component
+          along the axis is the torque of the rigid bodies: ``rne`` without friction and rotor inertia.
         - The last K rows are the wrenches of the closures of loops, which the first link exerts on the second
           link, in the second frame. Forces of redundant closure equations are statically indeterminate and
           are 0 in the result.
@@ -182,7 +183,10 @@ class NativeFunctions(metaclass=ArgumentErrors):
 
     @cached_property
     def potential_energy(self) -> ConfigurationFunction:
-        """``potential_energy(q)`` → energy in J, zero with the centre of mass at the origin's height."""
+        """``potential_energy(q)`` → energy in J, of gravity and springs.
+
+        The energy of gravity is zero with the centre of mass at the height of the world's origin.
+        """
         return self._code.entry("potential_energy")
 
     @cached_property

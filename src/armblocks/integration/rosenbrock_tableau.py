@@ -143,7 +143,7 @@ class RosenbrockTableau:
         return self.stages + 2
 
     def derivative_weights(self, theta: float) -> Row:
-        """``x'(t + theta h)`` of the values between the steps, over the rows of ``K``."""
+        """Weights of the rows of ``K`` in ``x'(t + theta h)``, the derivative of the dense output."""
         powers = [(m + 1) * theta**m for m in range(len(self.dense[0]))]
         return (0.0, *(sum(a * b for a, b in zip(row, powers)) for row in self.dense))
 

@@ -45,7 +45,7 @@ class Drive(metaclass=ArgumentErrors):
     - ``gear_max_speed``: at the input of the gear.
     - ``viscous_friction`` (N m s), ``coulomb_friction`` (N m): as for :class:`~armblocks.Motor`.
     - ``torque_constant`` (N m/A), ``resistance`` (Ω): for the copper losses.
-    - ``max_inertia_ratio``: largest load inertia divided by the own inertia.
+    - ``max_inertia_ratio``: largest load inertia divided by the inertia of the drive.
     - ``joints``: the names of the joints for which the drive is a candidate; none: all joints.
     """
 
@@ -251,8 +251,9 @@ class DriveLoad(metaclass=ArgumentErrors):
 
     @property
     def most_cycles_per_hour(self) -> float:
-        """The largest number of cycles for which the RMS torque is allowed, with a longer or shorter pause.
+        """The largest number of cycles per hour for which the RMS torque is allowed.
 
+        The pause is longer or shorter for another number of cycles.
         The result is 0 if the torque of the pause exceeds the continuous torque.
         """
         allowed = float(self.drive.continuous_torque(self.mean_speed)) ** 2

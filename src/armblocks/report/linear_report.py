@@ -49,7 +49,7 @@ def write_linear_report(
     hertz: bool = False,
     formats: Sequence[str] | None = None,
 ) -> tuple[Path, ...]:
-    """Write each figure, and ``linear-system.json``, into a folder, created if absent.
+    """Write each figure, and ``linear-system.json``, into a folder, created if absent; returns the paths.
 
     The default format is svg, also png if matplotlib is installed. Raises ``UnknownNameError`` for a format
     that is not svg or png, ``MissingLibraryError`` for png without matplotlib, ``FormatError`` if the folder

@@ -38,8 +38,8 @@ class Configuration(NamedTuple):
 class Configurations(Mapping[str, Array], metaclass=ArgumentErrors):
     """The named configurations of a robot in their order: ``robot.configurations["ready"]`` is q (nq,).
 
-    Each access returns a new array, rad or m. The mapping is immutable. Two of them are equal, with the same
-    hash, if names, numbers and order are the same. ``entries``: names and coordinates as tuples.
+    Each access returns a new array, rad or m. The mapping is immutable. Two mappings are equal, with the
+    same hash, if names, numbers and order are the same. ``entries``: names and coordinates as tuples.
     ``layout``: the joints of the robot that the coordinates belong to, with their units; None: not known.
 
     Created from a mapping of names to coordinates, or from pairs of name and coordinates. Raises RobotError

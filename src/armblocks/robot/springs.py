@@ -91,8 +91,8 @@ class LineSpring(Spring):
 
     The points attract each other with the force ``preload + stiffness (L - length)``, N, where L is their
     distance, m; a negative force pushes them apart. The energy is
-    ``preload (L - length) + stiffness (L - length)^2 / 2``. Without a distance between the points the force
-    has no direction, and results are NaN.
+    ``preload (L - length) + stiffness (L - length)^2 / 2``. If the points coincide, the force has
+    no direction, and results are NaN.
 
     - ``first``, ``second``: the two frames.
     - ``stiffness``: N/m, zero or more; 0 is a constant force.

@@ -66,7 +66,7 @@ class Simulation:
         signals_layout: Signature | None = None,
         times: Array | None = None,
     ) -> None:
-        """``times`` (N,) s: the samples, instead of the samples of ``options``; from 0 to the stop time."""
+        """``times`` (N,) s: the sample times from 0 to the stop time, instead of those of ``options``."""
         if {function.block for function in calls} != set(compiled.called):
             raise InputError(
                 f"no function is given for the blocks {', '.join(map(repr, compiled.called))}",
@@ -337,7 +337,7 @@ class Simulation:
             self._fail(failure)
 
     def _fail(self, failure: SimulationError) -> NoReturn:
-        """Raise the error with the valid samples. An earlier non-finite signal is raised instead."""
+        """Raise the error with the valid samples, or the error of a signal that is not finite before it."""
         self._result(failure)
         assert self._failure is not None
         raise self._failure

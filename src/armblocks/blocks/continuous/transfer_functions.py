@@ -37,7 +37,7 @@ class TransferFunction(RationalBlock):
         return Fraction(polynomial("b", self.numerator), polynomial("a", self.denominator))
 
     def states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", (self.degree,), "the canonical state"),)
+        return (State("x", (self.degree,), "states of the controllable canonical form"),)
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return self._shifted(x, u, p)

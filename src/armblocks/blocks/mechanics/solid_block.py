@@ -25,7 +25,9 @@ COLOURS = {
 
 @dataclass(frozen=True, kw_only=True)
 class SolidBlock(Block):
-    """Base class of solids. Frame R has the axes of the shape and is at its centre, or where a subclass says.
+    """Base class of solids. Frame R has the axes of the shape.
+
+    The origin of R is the centre of the shape, unless a subclass states another point.
 
     The mass is given, or the volume times the density. A subclass gives the volume, the moments of inertia
     for unit mass, and the shape for drawings; for a shape without symmetry also the centre of mass and the

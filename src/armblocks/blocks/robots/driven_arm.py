@@ -70,7 +70,7 @@ class DrivenArm(Block):
         0.0,
         kind=ParameterKind.ARRAY,
         dimensions=(0, 1),
-        doc="joint coordinates at t = 0 (n,), or one number for all",
+        doc="joint coordinates at t = 0 (nq,), or one number for all",
         unit="rad",
     )
     qd0: ArrayLike = parameter(

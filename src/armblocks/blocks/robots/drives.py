@@ -53,7 +53,10 @@ class DcMotor(Block):
     initial_angle: float = parameter(0.0, doc="the angle at t = 0", unit="rad")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("v", "voltage", "V", ()), Port("load", "load torque, opposite to the motion", "N m", ()))
+        return (
+            Port("v", "voltage", "V", ()),
+            Port("load", "load torque; a positive load acts against positive rotation", "N m", ()),
+        )
 
     def output_ports(self) -> tuple[Port, ...]:
         return (

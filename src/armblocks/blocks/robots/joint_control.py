@@ -25,7 +25,7 @@ from armblocks.blocks.robots.ports import (
     check_speeds_are_rates,
     q_port,
     qd_port,
-    qdd_port,
+    reference_ports,
     tau_port,
 )
 from armblocks.blocks.robots.robot_field import RobotField
@@ -151,7 +151,7 @@ class GravityCompensation(Block):
         _check_gains(self, self.robot)
 
     def input_ports(self) -> tuple[Port, ...]:
-        return q_port(self.robot, "qr"), q_port(self.robot), qd_port(self.robot)
+        return reference_ports(self.robot)[0], q_port(self.robot), qd_port(self.robot)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (tau_port(self.robot, "torque or force at the joints"),)
@@ -204,9 +204,7 @@ class ComputedTorque(Block):
         _check_gains(self, self.robot)
 
     def input_ports(self) -> tuple[Port, ...]:
-        robot = self.robot
-        reference = (q_port(robot, "qr"), qd_port(robot, "qdr"), qdd_port(robot, "qddr"))
-        return *reference, q_port(robot), qd_port(robot)
+        return *reference_ports(self.robot), q_port(self.robot), qd_port(self.robot)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (tau_port(self.robot, "torque or force at the joints"),)
@@ -262,9 +260,7 @@ class FeedForward(Block):
         _check_gains(self, self.robot)
 
     def input_ports(self) -> tuple[Port, ...]:
-        robot = self.robot
-        reference = (q_port(robot, "qr"), qd_port(robot, "qdr"), qdd_port(robot, "qddr"))
-        return *reference, q_port(robot), qd_port(robot)
+        return *reference_ports(self.robot), q_port(self.robot), qd_port(self.robot)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (tau_port(self.robot, "torque or force at the joints"),)

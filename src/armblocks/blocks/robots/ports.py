@@ -41,25 +41,28 @@ def speed_names(robot: Robot) -> tuple[str, ...]:
     return tuple(entry.name for entry in robot.speeds)
 
 
-def q_port(robot: Robot, name: str = "q") -> Port:
+def q_port(robot: Robot, name: str = "q", doc: str = "joint coordinates") -> Port:
     """A port of joint coordinates (nq,)."""
     unit = coordinate_unit(robot) if robot.nq == robot.nv else ""
-    return Port(name, "joint coordinates", unit, (robot.nq,), tuple(entry.name for entry in robot.positions))
+    return Port(name, doc, unit, (robot.nq,), tuple(entry.name for entry in robot.positions))
 
 
-def qd_port(robot: Robot, name: str = "qd") -> Port:
+def qd_port(robot: Robot, name: str = "qd", doc: str = "joint speeds") -> Port:
     """A port of joint speeds (n,)."""
-    return Port(name, "joint speeds", rate_unit(coordinate_unit(robot)), (robot.n,), speed_names(robot))
+    return Port(name, doc, rate_unit(coordinate_unit(robot)), (robot.n,), speed_names(robot))
 
 
-def qdd_port(robot: Robot, name: str = "qdd") -> Port:
+def qdd_port(robot: Robot, name: str = "qdd", doc: str = "joint accelerations") -> Port:
     """A port of joint accelerations (n,)."""
-    return Port(
-        name,
-        "joint accelerations",
-        rate_unit(rate_unit(coordinate_unit(robot))),
-        (robot.n,),
-        speed_names(robot),
+    return Port(name, doc, rate_unit(rate_unit(coordinate_unit(robot))), (robot.n,), speed_names(robot))
+
+
+def reference_ports(robot: Robot) -> tuple[Port, Port, Port]:
+    """The ports of the desired motion of a controller: coordinates, speeds and accelerations."""
+    return (
+        q_port(robot, "qr", "desired joint coordinates"),
+        qd_port(robot, "qdr", "desired joint speeds"),
+        qdd_port(robot, "qddr", "desired joint accelerations"),
     )
 
 

@@ -20,7 +20,7 @@ Counts = NDArray[np.int64]
 Statistic = Literal["most", "least", "mean"]
 
 UNITS = {"manipulability": "", "singularity": "", "condition": "", "limits": "", "payload": "kg"}
-"""The measures and their units; empty: the unit depends on the joints."""
+"""The measures and their units; empty: dimensionless, or dependent on the types of the joints."""
 STATISTICS = ("most", "least", "mean")
 AXES = ("x", "y", "z")
 
@@ -137,7 +137,9 @@ class WorkspaceCells(metaclass=ArgumentErrors):
     def slice(self, normal: str = "y", at: float | None = None) -> WorkspaceSlice:
         """The layer of cells normal to the axis ``"x"``, ``"y"`` or ``"z"`` that contains the coordinate.
 
-        ``at`` (m): by default the layer with the most reached cells. Raises InputError outside of the region.
+        ``at`` (m): the coordinate; by default that of the layer with the most reached cells.
+
+        Raises InputError outside of the region, UnknownNameError for another axis.
         """
         where = f"slice of the workspace of {self.name}"
         if normal not in AXES:
@@ -182,7 +184,7 @@ class WorkspaceCells(metaclass=ArgumentErrors):
         )
 
     def table(self) -> dict[str, Array]:
-        """The reached cells as columns (M,): ``x``, ``y``, ``z`` m, ``count``, and three of each measure."""
+        """The reached cells as columns (M,): ``x``, ``y``, ``z`` m, ``count``, statistics of the measures."""
         used = self.counts > 0
         columns = dict(zip(AXES, self.centres().T)) | {"count": self.counts[used].astype(np.float64)}
         for name, entry in self.maps.items():
@@ -191,7 +193,7 @@ class WorkspaceCells(metaclass=ArgumentErrors):
         return columns
 
     def point_table(self) -> dict[str, Array]:
-        """The kept samples as columns (P,): ``x``, ``y``, ``z`` m, the coordinates, and the measures."""
+        """The stored samples as columns (P,): ``x``, ``y``, ``z`` m, the coordinates, and the measures."""
         return (
             dict(zip(AXES, self.points.T))
             | {f"q {name}": column for name, column in zip(self.coordinates, self.q.T)}

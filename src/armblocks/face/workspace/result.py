@@ -51,7 +51,7 @@ class Workspace(WorkspaceCells):
     def save(self, path: str | PathLike[str], *, content: str = "cells", theme: Theme | None = None) -> Path:
         """Write a file by its suffix: reached cells as ``.csv``, ``.parquet`` or ``.npz``, or a picture.
 
-        ``content="points"``: the kept samples instead of the cells. Pictures: ``.svg``, ``.png``, ``.pdf``.
+        ``content="points"``: the stored samples instead of the cells. Pictures: ``.svg``, ``.png``, ``.pdf``.
         Parquet files need the extra ``data``, PNG and PDF files the extra ``figures``. Raises
         UnknownNameError for other suffixes.
         """

@@ -53,7 +53,7 @@ def mesh_corners(data: bytes, name: str, scale: ArrayLike = (1.0, 1.0, 1.0)) -> 
         corners = scaled(READERS[suffix](data, name), np.asarray(scale))
     if not len(corners) or not np.isfinite(corners).all() or np.abs(corners).max() > MAX_LENGTH:
         raise FormatError(
-            "the mesh has no triangles, or points that are not finite",
+            "the mesh has no triangles, or points that are not finite or too far away",
             where=name,
             allowed="triangles within 1000 km",
             fix="export the mesh again",

@@ -1,4 +1,4 @@
-"""Joints of MJCF: kind, axis, limits, friction, and the torque limits that actuators give."""
+"""Joints of MJCF: type, axis, limits, friction, and the torque limits that actuators give."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def _motor_of(element: Element, driven: Actuation, context: FileContext) -> Moto
     damping, friction = _first(element, "damping"), element.number("frictionloss", 0.0)
     armature = element.number("armature", 0.0)
     if "damping" in element.attributes and any(element.numbers("damping", range(1, 9))[1:]):
-        note(context, FRICTION, element, "damping of higher degree than the speed itself is omitted")
+        note(context, FRICTION, element, "the nonlinear part of the damping is omitted")
     if min(damping, friction, armature) < 0.0:
         text = f"damping {damping:g}, frictionloss {friction:g}, armature {armature:g}"
         what = f"{text}: negative values are omitted"
@@ -128,7 +128,7 @@ def _motor_of(element: Element, driven: Actuation, context: FileContext) -> Moto
 
 
 def _force_limit(element: Element, attribute: str, factor: float = 1.0) -> float | None:
-    """The magnitude of a range of forces that is symmetric about zero; ``None`` without one."""
+    """The largest magnitude in a range of forces, times ``factor``; ``None`` if there is no finite range."""
     if attribute not in element.attributes:
         return None
     low, high = element.numbers(attribute, (2,))
@@ -162,7 +162,7 @@ def actuation_of(root: Element, defaults: Defaults, context: FileContext) -> dic
             force = _force_limit(actuator, "ctrlrange", gear)
         armature, damping = actuator.number("armature", 0.0), _first(actuator, "damping")
         if "damping" in actuator.attributes and any(actuator.numbers("damping", range(1, 9))[1:]):
-            note(context, FRICTION, actuator, "damping of higher degree than the speed itself is omitted")
+            note(context, FRICTION, actuator, "the nonlinear part of the damping is omitted")
         if min(armature, damping) < 0.0:
             what = f"damping {damping:g}, armature {armature:g}: negative values are omitted"
             note(context, FRICTION, actuator, what)

@@ -49,7 +49,7 @@ def spring_of(element: Element, kind: str, unit: float, context: FileContext) ->
         note(context, STIFFNESS, element, f"the spring of the {kind} joint is omitted")
         return None
     if any(higher):
-        note(context, STIFFNESS, element, "stiffness of higher degree than the displacement is omitted")
+        note(context, STIFFNESS, element, "the nonlinear part of the stiffness is omitted")
     by_inertia = (time, ratio) if time > 0.0 and ratio > 0.0 else None
     if by_inertia is None and (time or ratio):
         note(context, STIFFNESS, element, f"springdamper {time:g} {ratio:g} is omitted")

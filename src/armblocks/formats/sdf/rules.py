@@ -52,16 +52,16 @@ GRAVITY = Rule(
 FREE_LINK = Rule(
     code="sdf-free-link",
     allowed="links that joints connect with each other or with the world",
-    remedy="add the missing joint, or make separate models of them",
+    remedy="add the missing joint, or write the unconnected parts as separate models",
 )
 MODEL = Rule(
     code="sdf-model",
     allowed="models that can be read",
-    remedy="correct the model, or load its own file",
+    remedy="correct the model, or load the file of the model itself",
 )
 FRAME = Rule(
     code="sdf-frame",
-    allowed="the attribute relative_to with the name of a frame (before SDF 1.7: no attribute frame)",
+    allowed="names of frames in the attribute relative_to, or in the attribute frame before SDF 1.7",
     remedy="remove the attribute, or correct the name",
 )
 ANGLE = Rule(
