@@ -1632,7 +1632,8 @@ export interface FoundBlock {
  *
  * ``time`` (N,) s, ``q``, ``qd``, ``qdd`` (N, n) in rad or m and s. ``poses`` (N, L+2, 12): the first three
  * rows of the poses of base, links and tool. ``via``: the times of the recorded poses, s. ``tool_speed``:
- * largest speed of the tool, m/s. ``exceeded``: a sentence for each exceeded limit.
+ * largest speed of the tool, m/s. ``rows``: the number L+2 of poses at each time. ``exceeded``: a
+ * sentence for each exceeded limit.
  */
 export interface PlannedMotion {
   time: number[];
@@ -1647,7 +1648,10 @@ export interface PlannedMotion {
   exceeded: string[];
 }
 /**
- * Extremes of one joint in a motion, in rad or m, s, N m or N; ``None`` without a limit.
+ * Extremes of one joint in a motion, with its limits, in rad or m, s, N m or N.
+ *
+ * ``lowest``, ``highest``: the extreme positions; ``low``, ``high``: the limits of the position. ``speed``,
+ * ``torque``: the largest magnitudes. A limit is ``None`` if it is unknown.
  */
 export interface JointPeaks {
   name: string;
