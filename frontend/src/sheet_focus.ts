@@ -31,6 +31,15 @@ export const focusBlock = (name: string): void =>
     .querySelector<HTMLElement>(`.canvas .react-flow__node[data-id="${CSS.escape(name)}"]`)
     ?.focus({ preventScroll: true })
 
+/** Time after which a closed field is removed, and the result of its edit is drawn, ms. */
+const RETURN_DELAY_MS = 50
+
+/** Return the focus to a block after a key has closed a field on the sheet, unless something else has it. */
+export const returnFocus = (name: string): void =>
+  void setTimeout(() => {
+    if (document.activeElement === document.body) focusBlock(name)
+  }, RETURN_DELAY_MS)
+
 let lastKey = ''
 addEventListener('keydown', ({ key }) => (lastKey = key), true)
 

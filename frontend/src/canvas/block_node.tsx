@@ -5,6 +5,7 @@ import { memo } from 'react'
 import { create } from 'zustand'
 import { isCommandKey } from '../model/field_keys'
 import type { Finding, SheetPort, SheetBlock } from '../protocol'
+import { returnFocus } from '../sheet_focus'
 import { change } from '../store'
 import { ResizeHandles } from './resize_handles'
 import { nameWidth, PORT, portSide, MAX_NAME_WIDTH } from './sheet_layout'
@@ -105,9 +106,11 @@ function Port({ port, output, finding }: PortProps) {
 function Name({ block }: { block: SheetBlock }) {
   const editing = useRenaming((s) => s.name === block.name)
   const close = () => useRenaming.setState({ name: null })
-  const done = (name: string) => {
+  const done = async (name: string) => {
     close()
-    if (name && name !== block.name) void change({ kind: 'rename', block: block.name, name })
+    if (!name || name === block.name) return
+    const version = await change({ kind: 'rename', block: block.name, name })
+    returnFocus(version === undefined ? block.name : name)
   }
   if (!editing)
     return (
@@ -128,11 +131,12 @@ function Name({ block }: { block: SheetBlock }) {
       autoFocus
       defaultValue={block.name}
       onFocus={(event) => event.target.select()}
-      onBlur={(event) => done(event.target.value.trim())}
+      onBlur={(event) => void done(event.target.value.trim())}
       onKeyDown={(event) => {
         if (!isCommandKey(event)) event.stopPropagation()
         if (event.key === 'Enter') event.currentTarget.blur()
         if (event.key === 'Escape') close()
+        if (event.key === 'Enter' || event.key === 'Escape') returnFocus(block.name)
       }}
     />
   )

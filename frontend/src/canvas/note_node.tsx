@@ -4,6 +4,7 @@ import { create } from 'zustand'
 import type { SheetNote } from '../protocol'
 import { holdKeys } from '../held_keys'
 import { isCommandKey } from '../model/field_keys'
+import { returnFocus } from '../sheet_focus'
 import { change, selectIfUnchanged, useStudio } from '../store'
 
 export type NoteNodeType = Node<{ note: SheetNote }, 'note'>
@@ -84,8 +85,10 @@ function NoteEditor({ id, note }: { id: string; note: SheetNote }) {
       onKeyDown={(event) => {
         // Ctrl+Enter accepts the note; it does not run the model.
         if (!isCommandKey(event) || event.key === 'Enter') event.stopPropagation()
-        if (event.key === 'Enter' && (event.ctrlKey || event.metaKey)) event.currentTarget.blur()
+        const isAccepted = event.key === 'Enter' && (event.ctrlKey || event.metaKey)
+        if (isAccepted) event.currentTarget.blur()
         if (event.key === 'Escape') useNoteEditing.setState({ id: null })
+        if (isAccepted || event.key === 'Escape') returnFocus(id)
       }}
     />
   )

@@ -4,6 +4,7 @@ import { isCommandKey } from '../model/field_keys'
 import type { Lines } from '../model/wire_lines'
 import { blockOf, portOf } from '../model/wires'
 import type { SheetBlock, WireLines } from '../protocol'
+import { returnFocus } from '../sheet_focus'
 import { change, useStudio } from '../store'
 
 /** The output whose signal is being named. */
@@ -74,6 +75,7 @@ function NameField({ port, name }: { port: string; name: string }) {
         if (!isCommandKey(event)) event.stopPropagation()
         if (event.key === 'Enter') event.currentTarget.blur()
         if (event.key === 'Escape') commit(null)
+        if (event.key === 'Enter' || event.key === 'Escape') returnFocus(blockOf(port))
       }}
     />
   )

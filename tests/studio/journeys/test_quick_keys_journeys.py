@@ -42,12 +42,16 @@ def test_keys_after_an_edit_act_on_its_result(sheet: Page) -> None:
     x, y = position(sheet, "damping")
     select_block(sheet, "damping")
     sheet.keyboard.press("F2")
+    sheet.keyboard.press("Escape")
+    expect(block(sheet, "damping")).to_be_focused()
+    sheet.keyboard.press("F2")
     sheet.keyboard.type("friction")
     for key in ("Enter", "ArrowDown", "ArrowDown", "Control+d", "ArrowRight"):
         sheet.keyboard.press(key)
     copy = block(sheet, "friction 2")
     expect(copy).to_have_class(re.compile("selected"))
     last_edit(sheet, "move friction 2")
+    expect(block(sheet, "friction")).to_be_focused()
     assert position(sheet, "friction") == (x, y + 10)
     assert position(sheet, "friction 2") == (x + 35, y + 40)
     for key in ("ArrowDown", "Control+z", "ArrowDown", "Control+r", "Control+r"):
@@ -66,6 +70,7 @@ def test_text_typed_directly_after_a_command_reaches_the_field_that_the_command_
     sheet.keyboard.type("hello")
     sheet.keyboard.press("Control+Enter")
     expect(sheet.locator(".note")).to_have_text("hello")
+    expect(sheet.locator(".react-flow__node-note")).to_be_focused()
     expect(sheet.get_by_role("dialog")).to_have_count(0)
 
 

@@ -134,6 +134,7 @@ def test_a_double_click_on_a_wire_names_its_signal(sheet: Page) -> None:
     sheet.get_by_role("menuitem", name="Name the signal …").click()
     expect(field).to_have_value("velocity")
     field.press("Escape")
+    expect(block(sheet, "x2")).to_be_focused()  # not the page: Tab continues on the sheet
     sheet.keyboard.press("Control+z")
     sheet.keyboard.press("Control+z")
     expect(sheet.locator(".signal-name")).to_have_count(0)
