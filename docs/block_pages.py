@@ -418,7 +418,9 @@ article table.docutils:has(th:nth-child(9)) :is(th,td){padding:.25rem .12rem}
 .robot-entry p:empty{display:none}article figure.robot img{width:100%;max-width:400px;height:auto}
 .block-entry p{margin:.2rem 0;line-height:1.35;font-size:.92em}
 .block-entry .symbol{justify-self:center}
-@media(max-width:46em){article table.docutils:not(:has(th:nth-child(3))) td+td code{overflow-wrap:anywhere}}
+article td wbr{display:none}
+@media(max-width:46em){article table.docutils:not(:has(th:nth-child(3))) td+td code{overflow-wrap:break-word}}
+@media(max-width:46em){article table.docutils:not(:has(th:nth-child(3))) wbr{display:inline}}
 @media(max-width:46em){article h1{font-size:1.45em}article h2{font-size:1.3em}article h3{font-size:1.15em}}
 @media(max-width:46em){article table.docutils:has(th:nth-child(5)){width:max-content;max-width:44rem}}
 @media(max-width:46em){article table.docutils:has(th:nth-child(7)){width:max-content;max-width:72rem}}

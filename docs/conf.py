@@ -13,6 +13,7 @@ os.environ.setdefault("ARMBLOCKS_EFFORT", "little")
 # Most objects live until the end. By default, garbage collection takes a seventh of the processor time.
 gc.set_threshold(100_000, 10, 1000)
 
+from code_breaks import break_code_in_tables  # noqa: E402
 from generated_pages import write_generated_pages  # noqa: E402
 from name_links import link_names  # noqa: E402
 from reference_signatures import ALIASES, readable_signature, shorten_annotations  # noqa: E402
@@ -103,6 +104,7 @@ def setup(app):
         "html-page-context", share_navigation, priority=100
     )  # before the theme reads it
     app.connect("html-page-context", mark_options)
+    app.connect("html-page-context", break_code_in_tables)
 
 
 # Called before Sphinx searches for sources and static files.

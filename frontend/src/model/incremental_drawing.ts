@@ -45,7 +45,8 @@ export class IncrementalDrawing {
   }
 
   /**
-   * Draw the new rows; from the rows `ends` on, values may still change. `ratio` is device px per CSS px.
+   * Draw the new rows; from the rows `ends` on, values may still change. `factor` converts the values to the
+   * displayed unit, and `ratio` is device px per CSS px.
    */
   append([time, ...columns]: PlotColumns, factor: number, ends: number[], ratio: number): void {
     const { ctx, bbox } = this.plot

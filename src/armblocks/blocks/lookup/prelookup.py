@@ -63,7 +63,10 @@ class Prelookup(BlockWithAxes):
         return (Port("u", "the position"),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("k", "index of the interval, from 0"), Port("f", "fraction of the interval, 0 to 1"))
+        return (
+            Port("k", "index of the interval, from 0"),
+            Port("f", "fraction of the interval; 0 to 1 with clip"),
+        )
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"k": inputs["u"], "f": inputs["u"]}
