@@ -257,6 +257,7 @@ def warn(text: str, category: type[ArmblocksWarning] = ArmblocksWarning) -> None
 
 
 def _in_package(frame: FrameType) -> bool:
-    """Whether a frame runs code of the package, including the generated methods of dataclasses."""
+    """Whether a frame runs code of the package, including the generated methods of dataclasses and the
+    decorators made by ``contextlib``."""
     package = __name__.partition(".")[0]
-    return str(frame.f_globals.get("__name__", "")).partition(".")[0] == package
+    return str(frame.f_globals.get("__name__", "")).partition(".")[0] in (package, "contextlib")

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from armblocks.analysis.dead_time import MAX_ORDER, PadeApproximation, dead_time
 from armblocks.analysis.linear_system import LinearSystem
+from armblocks.analysis.one_sided import warn_of_one_side
 from armblocks.analysis.operating_point import OperatingPoint
 from armblocks.equations import HybridSystem, Signature
 from armblocks.equations.clock_ratios import common_period, exact_clocks
@@ -151,11 +152,16 @@ def exact_response(
 def _jacobians(
     evaluated: EvaluatedSystem, point: Point, unknowns: Jacobians | None, ports: SystemPorts
 ) -> tuple[Jacobians, Jacobians]:
-    """The derivatives of the flow and of the outputs. Raises an error if one is not finite."""
+    """The derivatives of the flow and of the outputs. Raises an error if one is not finite. Warns if they
+    hold to one side only."""
     flow = _without(evaluated.derivative_jacobians(point), unknowns)
     outputs = _without(evaluated.signal_jacobians(point), unknowns)
     _check_finite(evaluated.system, _elements(evaluated.system.states)[0], flow, "the rate of state")
     _check_finite(evaluated.system, ports.outputs, outputs, "the output")
+    update = None
+    if clocks := len(evaluated.system.clocks):
+        update = _without(evaluated.update_jacobians(point, np.ones(clocks)), unknowns)
+    warn_of_one_side(evaluated, point, flow, outputs, update)
     return flow, outputs
 
 

@@ -73,7 +73,7 @@ class EvaluatedSystem:
     ) -> None:
         refuse_called(system, "derivatives")
         self.system = system
-        self._parameters = list(parameters)
+        self.parameters = list(parameters)
         self._signals = None if signals is None else list(signals)
         self._functions: dict[str, Function] = {}
         self._jacobians: dict[str, Function] = {}
@@ -93,7 +93,7 @@ class EvaluatedSystem:
     def _differentiate(self, traced: TracedFunction, arguments: Sequence[Array]) -> Jacobians:
         t, x, z, w, p = traced.arguments[:5]
         if traced.name not in self._jacobians:
-            chosen = p[self._parameters] if self._parameters else SX(0, 1)
+            chosen = p[self.parameters] if self.parameters else SX(0, 1)
             by = vertcat(t, x, z, w, chosen)
             matrix = jacobian(self._rows(traced), by)
             function = Function("j", list(traced.arguments), [matrix], {"cse": True})
@@ -102,7 +102,7 @@ class EvaluatedSystem:
             self._jacobians[traced.name] = function
         count = self._rows(traced).numel()
         whole = _numbers(self._jacobians[traced.name], arguments).reshape(
-            (count, 1 + x.numel() + z.numel() + w.numel() + len(self._parameters)), order="F"
+            (count, 1 + x.numel() + z.numel() + w.numel() + len(self.parameters)), order="F"
         )
         offsets = np.cumsum([1, x.numel(), z.numel(), w.numel()]).tolist()
         by_t, by_x, by_z, by_w, by_p = np.split(whole, offsets, axis=1)

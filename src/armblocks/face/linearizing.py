@@ -92,8 +92,10 @@ def linearize(
     - ``parameters``: other values of parameters.
     - ``settings``: settings of the run up to ``at``, as in :func:`simulate`.
 
-    Modes (a limiter at its limit) are constant. A diagram with sample times gives a discrete system with the
-    common period of all clocks and a zero-order hold at the inputs. The time t in equations is constant.
+    Modes (a limiter at its limit) are constant. If a signal is exactly at a limit or at a jump, and small
+    changes to its two sides have different effects, there is an ``ArmblocksWarning``. A diagram with sample
+    times gives a discrete system with the common period of all clocks and a zero-order hold at the inputs.
+    The time t in equations is constant.
 
     Raises ``UnknownNameError`` and ``InputError`` for invalid names, ``SimulationError`` if a signal of the
     run or a derivative is not finite.
