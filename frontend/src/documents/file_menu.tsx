@@ -12,7 +12,8 @@ import {
 import type { DocumentState } from '../protocol'
 import { ask, bringToFront, useStudio } from '../store'
 import { save, showDialog } from '../dialogs'
-import { closeDocument } from './tabs'
+import { documentLabels } from '../model/tabs'
+import { closeDocument, useTabs } from './tabs'
 
 /** Maximum number of files in the menu; the dialog lists all. */
 const MAX_FILES = 12
@@ -124,6 +125,10 @@ function Shipped() {
 function OpenDocuments() {
   const documents = useStudio((s) => s.documents)
   const current = useStudio((s) => s.document?.state.document)
+  const labels = documentLabels(
+    useTabs((s) => s.tabs),
+    documents,
+  )
   const others = documents.filter(({ document }) => document !== current)
   const diagrams = others.filter(({ kind }) => kind === 'diagram')
   const robots = others.filter(({ kind }) => kind === 'robot')
@@ -131,21 +136,28 @@ function OpenDocuments() {
     <>
       {diagrams.length > 0 && <Menu.Label>Open now</Menu.Label>}
       {diagrams.map((state) => (
-        <OpenItem key={state.document} state={state}>
-          {state.path ?? state.title}
+        <OpenItem key={state.document} state={state} label={labels.get(state.document)!}>
+          {state.path ?? labels.get(state.document)}
         </OpenItem>
       ))}
       {robots.length > 0 && <Menu.Label>Open robots</Menu.Label>}
       {robots.map((state) => (
-        <OpenItem key={state.document} state={state}>
-          {state.title} {state.path && <span className="unit">{state.path}</span>}
+        <OpenItem key={state.document} state={state} label={labels.get(state.document)!}>
+          {state.path ? state.title : labels.get(state.document)}{' '}
+          {state.path && <span className="unit">{state.path}</span>}
         </OpenItem>
       ))}
     </>
   )
 }
 
-function OpenItem({ state, children }: { state: DocumentState; children: React.ReactNode }) {
+interface OpenItemProps {
+  state: DocumentState
+  label: string
+  children: React.ReactNode
+}
+
+function OpenItem({ state, label, children }: OpenItemProps) {
   return (
     <Menu.Item
       leftSection={state.kind === 'robot' ? <IconRobot size={15} /> : <IconPencil size={15} />}
@@ -158,7 +170,7 @@ function OpenItem({ state, children }: { state: DocumentState; children: React.R
           <IconX
             size={14}
             role="img"
-            aria-label={`Close ${state.title}`}
+            aria-label={`Close ${label}`}
             onClick={(event) => {
               event.stopPropagation()
               void closeDocument(state.document)

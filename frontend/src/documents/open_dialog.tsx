@@ -3,6 +3,8 @@ import { IconFile, IconHistory, IconPencil, IconRobot } from '@tabler/icons-reac
 import { useEffect, useState } from 'react'
 import { ask, bringToFront, useStudio } from '../store'
 import { projectFiles, showDialog, useDialogs } from '../dialogs'
+import { documentLabels } from '../model/tabs'
+import { useTabs } from './tabs'
 
 /** The Open dialog: open documents, recent files, and all files of the project folder. */
 export function OpenDialog() {
@@ -22,6 +24,10 @@ function OpenList() {
   const [query, setQuery] = useState('')
   useEffect(() => void projectFiles().then(setListing), [])
   const matches = (name: string) => name.toLowerCase().includes(query.trim().toLowerCase())
+  const labels = documentLabels(
+    useTabs((s) => s.tabs),
+    documents,
+  )
   const closeAnd = (open: () => Promise<unknown>) => {
     showDialog(null)
     void open()
@@ -54,7 +60,7 @@ function OpenList() {
               key={entry.document}
               component="button"
               leftSection={entry.kind === 'robot' ? <IconRobot size={15} /> : <IconPencil size={15} />}
-              label={entry.path ?? entry.title}
+              label={entry.path ?? labels.get(entry.document)}
               rightSection={
                 entry.dirty && (
                   <Badge variant="light" color="gray">

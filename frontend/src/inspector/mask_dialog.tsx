@@ -196,7 +196,8 @@ function AddRow({ rows, setRows }: { rows: Row[]; setRows: (rows: Row[]) => void
       leftSection={<IconPlus size={14} />}
       style={{ alignSelf: 'start' }}
       onClick={add}
-      data-autofocus={rows.length === 0 || undefined}
+      // The rows are loaded after the dialog has taken the focus.
+      autoFocus={rows.length === 0}
     >
       Add a parameter
     </Button>
@@ -229,7 +230,7 @@ function RowFields({ row, update, first, last, swap, remove }: RowProps) {
         error={key === 'range' && !hasValidRange(row)}
         onChange={(event) => update({ [key]: event.currentTarget.value })}
         {...(mono ? { classNames: { input: 'typed' } } : {})}
-        {...(key === 'name' && first ? { 'data-autofocus': true } : {})}
+        {...(key === 'name' && first ? { autoFocus: true } : {})}
       />
     </span>
   )

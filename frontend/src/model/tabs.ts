@@ -52,6 +52,17 @@ export function tabLabels(tabs: readonly Tab[]): string[] {
   })
 }
 
+/** The labels of the open documents, as the tabs show them; documents without a tab follow the others. */
+export function documentLabels(
+  tabs: readonly Tab[],
+  documents: readonly DocumentState[],
+): ReadonlyMap<string, string> {
+  const shown = new Set(tabs.map(({ document }) => document))
+  const all = [...tabs, ...documents.filter(({ document }) => !shown.has(document)).map(tabOf)]
+  const labels = tabLabels(all)
+  return new Map(all.map(({ document }, k) => [document, labels[k]!]))
+}
+
 /**
  * The tabs that the server can open again. A document without file and origin that is missing on the server
  * had no edits, or they were discarded.

@@ -21,6 +21,7 @@ export function ParameterSetMenu() {
           <Button
             size="compact-xs"
             variant="default"
+            fw={400}
             justify="space-between"
             w={260}
             maw="100%"

@@ -78,6 +78,7 @@ function SaveForm({ table }: { table: ParameterSetTable }) {
           size="sm"
           flex={1}
           data-autofocus
+          autoFocus // the sets are loaded after the dialog has taken the focus
           value={name}
           maxLength={200}
           onChange={(event) => setName(event.currentTarget.value)}

@@ -1,6 +1,7 @@
 import { describe, expect, it } from 'vitest'
 import { arePressed } from '../../src/model/key_combinations'
 import {
+  documentLabels,
   neighbour,
   restorableTabs,
   tabAfter,
@@ -59,6 +60,15 @@ describe('the tabs of documents', () => {
       tab('5', { title: 'motor', path: 'left/motor.json' }),
     ]
     expect(tabLabels(tabs)).toEqual(['left/arm', 'right/arm', 'arm', 'arm (2)', 'motor'])
+  })
+  it('give their labels to lists of documents, which number further documents', () => {
+    const tabs = [tab('1', { title: 'arm' }), tab('2', { title: 'motor' })]
+    const documents = [tab('0', { title: 'arm' }), ...tabs] as DocumentState[]
+    expect([...documentLabels(tabs, documents)]).toEqual([
+      ['1', 'arm'],
+      ['2', 'motor'],
+      ['0', 'arm (2)'],
+    ])
   })
   it('are restored if the server knows the document, or its file or origin is known', () => {
     const tabs = [

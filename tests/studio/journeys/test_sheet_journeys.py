@@ -268,6 +268,7 @@ def test_a_mask_is_created_used_renamed_and_undone(sheet: Page) -> None:
     expect(subsystem).to_have_class(re.compile("selected"))
     sheet.keyboard.press("Control+m")
     dialog = sheet.get_by_role("dialog")
+    expect(dialog.get_by_role("button", name="Add a parameter")).to_be_focused()
     dialog.get_by_role("textbox", name="Text on the block").fill("Viscous damper")
     dialog.get_by_role("button", name="Add a parameter").click()
     for field, text in (("Default", "0.25"), ("Unit", "N s/m"), ("Range", "> 0"), ("Name", "d")):
@@ -439,6 +440,8 @@ def test_a_theme_is_chosen_by_button_or_command_and_remembered(sheet: Page) -> N
     command(sheet, "theme of the system")
     expect(html).to_have_attribute("data-mantine-color-scheme", "light")
     expect(sheet.get_by_role("button", name="Theme: system")).to_be_visible()
+    # The page fills the window exactly: a focus at its lower edge scrolls nothing.
+    assert sheet.evaluate("document.documentElement.scrollHeight - innerHeight") == 0
 
 
 def picture(page: Page, title: str) -> str:

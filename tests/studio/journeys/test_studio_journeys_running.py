@@ -198,6 +198,7 @@ def test_parameter_sets_are_saved_applied_and_compared(opened: Opened, studio: S
     page.keyboard.type("parameter sets")
     page.keyboard.press("Enter")
     dialog = page.locator(DIALOG)
+    expect(dialog.get_by_role("textbox", name="Name of a new set")).to_be_focused()
     row = dialog.get_by_role("row", name="gain.gain")
     expect(row.get_by_role("cell")).to_have_text(["2", "2", "6", ""])
     dialog.get_by_role("button", name="Commands for fast").click()
