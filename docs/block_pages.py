@@ -30,7 +30,7 @@ from armblocks.pictures.picture import Picture
 from armblocks.pictures.style import theme_variables
 from armblocks.pictures.svg import page_rules, svg_inline
 from armblocks.report.figures import Figure, motion_figures, view_figures
-from armblocks.report.motion import motions
+from armblocks.report.motion import Motion, motions
 
 FIGURE_WIDTH = 736.0
 """Width of the theme's text column, px. Figures of this width have their nominal font size."""
@@ -253,7 +253,8 @@ def allowed(rule: Parameter) -> str:
 
 def unit_text(unit: str) -> str:
     """A unit as printed: ``rad/s2`` as rad/s², without line breaks."""
-    return unit.replace("2", "²").replace(" ", "\N{NO-BREAK SPACE}")
+    powers = unit.replace("2", "²").replace("3", "³")
+    return powers.replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def default_text(rule: Parameter) -> str:
@@ -338,13 +339,20 @@ DIRECTIONS = {
 }
 
 
+def has_shapes(motion: Motion, diagram: Diagram) -> bool:
+    """Whether a drawing shows the motion: a drawn mechanism without solids has no shapes."""
+    return not diagram.frame_lines or any(link.geometry for link in motion.robot.links)
+
+
 def worked_example(kind: type[Block], diagram: Diagram) -> list[str]:
     """The example: its drawing, the results of a run, and its Python and JSON form."""
     result = ab.simulate(diagram)
     figures = list(view_figures(diagram, result, FIGURE_WIDTH))
     if any(view.kind is ViewKind.ROBOT for _, view in diagram_views(diagram)):
         figures += [
-            next(motion_figures(motion, "")) for motion in motions(diagram, result)
+            next(motion_figures(motion, ""))
+            for motion in motions(diagram, result)
+            if has_shapes(motion, diagram)
         ]
     drawing = diagram_picture(diagram, result)
     lines = ["## Example", "", prose(caption(kind)), ""]

@@ -221,7 +221,9 @@ def test_too_many_arms_are_refused(tmp_path: Path) -> None:
         ({"save": "arm.bmp"}, r"there is no format of pictures named '\.bmp'"),
     ],
 )
-def test_pictures_refuse_by_name(puma: ab.Arm, call: dict[str, object], message: str) -> None:
+def test_invalid_arguments_of_pictures_are_refused(
+    puma: ab.Arm, call: dict[str, object], message: str
+) -> None:
     with pytest.raises(ArmblocksError, match=message):
         puma.plot(**{"save": "arm.svg", **call})  # type: ignore[arg-type]
 
@@ -240,7 +242,7 @@ def test_pictures_refuse_by_name(puma: ab.Arm, call: dict[str, object], message:
         ({"save": "a.avi"}, r"there is no format of pictures named '\.avi'.*\.gif"),
     ],
 )
-def test_films_refuse_by_name(puma: ab.Arm, call: dict[str, object], message: str) -> None:
+def test_invalid_arguments_of_videos_are_refused(puma: ab.Arm, call: dict[str, object], message: str) -> None:
     with pytest.raises(ArmblocksError, match=message):
         puma.animate(np.zeros((3, 6)), **{"save": "a.gif", **call})  # type: ignore[arg-type]
 

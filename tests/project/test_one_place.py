@@ -92,7 +92,7 @@ assert type(arm.robot.links[0].joint) is Telescope
 assert [entry.name for entry in arm.robot.speeds] == ["tube.wx", "tube.wy", "tube.wz", "tube.stroke"]
 q = np.array([1.0, 0.0, 0.0, 1.0, 0.5])  # a quarter turn about z, and 0.5 m along the rotated x axis
 assert np.allclose(arm.fkine(q)[:3, 3], [0.0, 0.5, 0.0])
-# Moments of inertia about the centre of the ball, and gravity, which presses on the tilted axis only.
+# Moments of inertia about the centre of the ball; gravity has a moment about one axis of the ball only.
 assert np.allclose(arm.inertia(q), np.diag([0.1, 0.2 + 0.5, 0.3 + 0.5, 2.0]))
 assert np.allclose(arm.gravload(q), [0.0, -2.0 * 9.81 * 0.5, 0.0, 0.0])
 assert np.allclose(arm.difference(q, arm.integrate(q, np.ones(4), 0.5)), 0.5)

@@ -136,7 +136,7 @@ class VariableTimeDelay(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class VariableTransportDelay(Block):
-    """A transport delay in a pipe: y(t) = u(t - d), where ``T(t)`` is the transit time at the inlet.
+    """A transport delay in a pipe: y(t) = u(t - d). The input T is the transit time at the inlet.
 
     The flow between t - d and t fills the pipe, so the integral of 1/T over that time is 1. Therefore
     d' = 1 - T(t - d) / T(t). This is Simulink's Variable Transport Delay. (For a Variable Time

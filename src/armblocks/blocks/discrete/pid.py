@@ -120,8 +120,10 @@ class DiscretePID(SampledPidBlock):
     - ``clamping`` stops the integral if it drives the output further beyond the limit.
     - ``back_calculation`` adds T Kb (y - unlimited y) to the integral.
 
-    ``tracking`` adds T Kt (tracking - y) to the integral. A reset happens at the first tick after the trigger
-    has crossed zero. In a triggered subsystem, T is t(k+1) - t(k).
+    ``tracking`` adds T Kt (tracking - y) to the integral.
+
+    A reset happens at the first tick after the trigger has crossed zero. In a triggered subsystem, T is
+    t(k+1) - t(k).
     """
 
     title: ClassVar[str] = "Discrete PID Controller"

@@ -101,7 +101,7 @@ class SineWaveFunction(Block):
     title: ClassVar[str] = "Sine Wave Function"
     sign: ClassVar[FaceSign] = sine_curve(1.0)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The input rises by 2 s per second, so the sine has twice its frequency.",
+        shows="The input rises by 2 s per second, so the frequency of the output is twice the parameter.",
         inputs={"u": driver("Ramp", slope=2.0)},
     )
 
