@@ -10,7 +10,9 @@ import re
 
 _CELL = re.compile(r"<td\b.*?</td>", re.DOTALL)
 _WORD = re.compile(r'(?<=<span class="pre">)[^<]+')
-_PLACE = re.compile(r"(?<=[._(=/])(?=[A-Za-z])|(?<=[a-z])(?=[A-Z][a-z])")
+_LONG_NAME = re.compile(r"[A-Za-z]{27,}")
+_CAPITAL = re.compile(r"(?<=[a-z])(?=[A-Z][a-z])")
+_SEPARATOR = re.compile(r"(?<=[._(=/])(?=[A-Za-z])")
 
 
 def break_code_in_tables(
@@ -24,4 +26,5 @@ def break_code_in_tables(
 
 
 def _with_breaks(word: re.Match[str]) -> str:
-    return _PLACE.sub("<wbr>", word[0])
+    text = _SEPARATOR.sub("<wbr>", word[0])
+    return _LONG_NAME.sub(lambda name: _CAPITAL.sub("<wbr>", name[0]), text)

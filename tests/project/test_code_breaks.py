@@ -23,7 +23,8 @@ def test_words_in_cells_get_places_to_break() -> None:
     assert broken(code("InterpolationUsingPrelookup")) == code("Interpolation<wbr>Using<wbr>Prelookup")
 
 
-def test_numbers_and_text_outside_of_tables_are_unchanged() -> None:
+def test_numbers_short_names_and_text_outside_of_tables_are_unchanged() -> None:
+    assert broken(code("CounterLimited")) == code("CounterLimited")
     assert broken(code("1.0")) == code("1.0")
     paragraph = '<p><code><span class="pre">ab.load_robot</span></code></p>'
     assert broken(paragraph) == paragraph
