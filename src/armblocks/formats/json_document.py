@@ -119,7 +119,7 @@ def read_document(data: bytes, name: str, max_bytes: int, max_depth: int = MAX_D
 
     ``max_bytes`` and ``max_depth`` limit the size of the document and the nesting of objects and arrays.
 
-    Raises ``FormatError`` for data that are not strict JSON or exceeds the limits.
+    Raises ``FormatError`` for data that are not strict JSON or exceed the limits.
     """
     if len(data) > max_bytes:
         raise FormatError(
