@@ -12,7 +12,7 @@ _CELL = re.compile(r"<td\b.*?</td>", re.DOTALL)
 _WORD = re.compile(r'(?<=<span class="pre">)[^<]+')
 _LONG_NAME = re.compile(r"[A-Za-z]{27,}")
 _CAPITAL = re.compile(r"(?<=[a-z])(?=[A-Z][a-z])")
-_SEPARATOR = re.compile(r"(?<=[._(=/])(?=[A-Za-z])")
+_SEPARATOR = re.compile(r"(?<=\w[._(=/])(?=[A-Za-z])")
 
 
 def break_code_in_tables(

@@ -24,7 +24,7 @@ def test_words_in_cells_get_places_to_break() -> None:
 
 
 def test_numbers_short_names_and_text_outside_of_tables_are_unchanged() -> None:
-    assert broken(code("CounterLimited")) == code("CounterLimited")
-    assert broken(code("1.0")) == code("1.0")
+    for word in ("1.0", ".slx", "CounterLimited"):
+        assert broken(code(word)) == code(word)
     paragraph = '<p><code><span class="pre">ab.load_robot</span></code></p>'
     assert broken(paragraph) == paragraph

@@ -24,7 +24,7 @@ class ConnectionPort(Block):
     sign: ClassVar[FaceSign] = Words("port")
     virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A Connection Port at the top level has no effect; in a subsystem it connects a frame to the outside.",
+        shows="At the top level the block has no effect; in a subsystem it connects a frame to the outside.",
         extra_blocks=(
             driver("WorldFrame").named("world"),
             driver("MechanismConfiguration", gravity=(0.0, -9.80665, 0.0)).named("gravity"),
