@@ -30,7 +30,8 @@ export function outstandingMoves(sent: readonly SentMove[], sheet: Sheet): SentM
     (sentMove) => sentMove.document !== document || sentMove.version === null || sentMove.version > version,
   )
   const first = remaining.findIndex((sentMove) => isOnSheet(sentMove, sheet))
-  // The change is sent before the reply. The server applies moves in order: only the oldest can have arrived.
+  // The server sends the changed document before its reply, and applies moves in order: of the moves without
+  // a reply, only the oldest can be in the document.
   return first >= 0 && isContained(remaining[first]!, sheet)
     ? remaining.filter((_, k) => k !== first)
     : remaining

@@ -180,8 +180,8 @@ def flipped_box(box: Box) -> Box:
 def with_inputs(box: Box, inputs: Sequence[BoxPort]) -> Box:
     """The box with other input ports, and with its name on a side without ports, where wires do not cross it.
 
-    The side is below, above, left, right, hidden, or ``corner``, the upper right one of a block with wires
-    from above and below.
+    The side is below, above, left, right, hidden, or ``corner``: the upper right corner, for a block with
+    ports above and below.
     """
     updated = replace(box, inputs=tuple(inputs))
     return replace(updated, shown_name_side=_free_name_side(updated))

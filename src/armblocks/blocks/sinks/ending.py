@@ -35,7 +35,7 @@ class StopSimulation(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Assertion(Block):
-    """Asserts that its input is not 0: if the input becomes 0, the run fails, or it has a warning."""
+    """Asserts that its input is not 0: if it becomes 0, the run fails, or its message has a warning."""
 
     title: ClassVar[str] = "Assertion"
     example: ClassVar[WorkedExample] = WorkedExample(

@@ -172,10 +172,10 @@ class TransformTwist(Block):
     )
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("T", "pose of frame b in frame a", shape=(4, 4)), Port("V", "(v; w) in b", shape=(6,)))
+        return (Port("T", "pose of frame b in frame a", shape=(4, 4)), Port("V", "twist (v; w) in frame b", shape=(6,)))
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "(v; w) in a", shape=(6,)),)
+        return (Port("y", "twist (v; w) in frame a", shape=(6,)),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         R = u["T"][:3, :3]
