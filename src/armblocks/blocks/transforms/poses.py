@@ -172,7 +172,10 @@ class TransformTwist(Block):
     )
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("T", "pose of frame b in frame a", shape=(4, 4)), Port("V", "twist (v; w) in frame b", shape=(6,)))
+        return (
+            Port("T", "pose of frame b in frame a", shape=(4, 4)),
+            Port("V", "twist (v; w) in frame b", shape=(6,)),
+        )
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "twist (v; w) in frame a", shape=(6,)),)
