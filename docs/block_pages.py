@@ -428,7 +428,7 @@ article table.docutils:has(th:nth-child(9)) :is(th,td){padding:.25rem .12rem}
 .block-entry .symbol{justify-self:center}
 article td wbr{display:none}
 @media(max-width:46em){article table.docutils:not(:has(th:nth-child(3))) td+td code{overflow-wrap:break-word}}
-@media(max-width:46em){article table.docutils:not(:has(th:nth-child(3))) wbr{display:inline}}
+@media(max-width:46em){article table.docutils:not(:has(th:nth-child(3))) td+td wbr{display:inline}}
 @media(max-width:46em){article h1{font-size:1.45em}article h2{font-size:1.3em}article h3{font-size:1.15em}}
 @media(max-width:46em){article table.docutils:has(th:nth-child(5)){width:max-content;max-width:44rem}}
 @media(max-width:46em){article table.docutils:has(th:nth-child(7)){width:max-content;max-width:72rem}}

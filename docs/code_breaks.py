@@ -1,7 +1,7 @@
 """Places at which browsers break code in the cells of tables on small screens, such as after a dot.
 
-The style sheet enables these places in tables with two columns. Without them, browsers break the code at any
-letter.
+The style sheet enables these places in the second column of tables with two columns. Without them, browsers
+break the code at any letter.
 """
 
 from __future__ import annotations

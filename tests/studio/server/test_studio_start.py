@@ -30,7 +30,7 @@ def web(tmp_path: Path) -> Path:
 
 
 def response(web: Path, hub: FutureHub, path: str) -> tuple[int, dict[str, str]]:
-    """Status and headers of the response to an authenticated page."""
+    """Status and headers of the response to an authenticated request."""
     keys, sent = Keys(8642), list[MutableMapping[str, Any]]()
     app = studio_app(hub, keys, frozenset({HOST}), web)
     scope: dict[str, Any] = {

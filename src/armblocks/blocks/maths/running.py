@@ -51,7 +51,7 @@ class MinMaxRunningResettable(Block):
         return Words(f"{self.function}(u, y)", italic=True)
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the signal"), Port("reset", "resets the output while not 0", shape=()))
+        return (Port("u", "the signal"), Port("reset", "resets the output while it is not 0", shape=()))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the running minimum or maximum"),)
