@@ -157,7 +157,7 @@ class LinearSystem(StateSpaceModel):
         return series(self, other)
 
     def feedback(self, other: LinearSystem | float = 1.0, *, sign: int = -1) -> LinearSystem:
-        """The closed loop ``(1 - sign L)^-1 L`` with ``other`` in the feedback path."""
+        """The closed loop ``(1 - sign L K)^-1 L`` of this system L with ``other`` K in the feedback path."""
         return feedback(self, other, sign)
 
     # Export.

@@ -152,7 +152,7 @@ class FitResult(metaclass=ArgumentErrors):
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """Sentences on parameters without information, bounds, correlations, differences, the end."""
+        """Sentences on undetermined parameters, bounds, correlations, differences, the reason for the end."""
         found: list[str] = []
         if self.stopped:
             found.append(f"the search ended early: {self.message}; the values are the best so far")

@@ -39,7 +39,7 @@ from armblocks.equations import Shape
 from armblocks.errors import InputError
 
 INPUT = Port("u", "sampled signal")
-OUTPUT = Port("y", "the held signal")
+OUTPUT = Port("y", "the delayed or held signal")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -183,7 +183,9 @@ class ResettableDelay(Block):
     initial: ArrayLike = parameter(
         0.0, kind=ParameterKind.ARRAY, doc="the initial output, also after a reset, if no port gives it"
     )
-    enable_port: bool = parameter(False, doc="whether the block has an input enable, which stops it while 0")
+    enable_port: bool = parameter(
+        False, doc="whether the block has an input enable, which stops it while it is 0"
+    )
     sample_time: ArrayLike = sample_time_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
