@@ -1,7 +1,8 @@
 """Operating points at a limit or at a jump, about which a linear system holds for changes to one side only.
 
-The derivatives are compared with differences to both sides, along one change of all states and inputs. The
-error of a difference decreases with the change, except at a kink or a jump.
+The derivatives are compared with differences to both sides, along one change of all continuous states and
+inputs. The error of a difference decreases with the change, except at a kink or a jump. Sampled values are
+not changed, because they may be flags or indices.
 """
 
 from __future__ import annotations
@@ -48,10 +49,7 @@ class _Sides:
     def __init__(self, evaluated: EvaluatedSystem, point: Point) -> None:
         self.evaluated, self.system, self.point = evaluated, evaluated.system, point
         self.chosen = list(evaluated.parameters)
-        self.x, self.z, self.p = (
-            _weights(part.size) * (1.0 + np.abs(part)) for part in (point.x, point.z, point.p)
-        )
-        self.z[~evaluated.sampled] = 0.0
+        self.x, self.p = (_weights(part.size) * (1.0 + np.abs(part)) for part in (point.x, point.p))
         self.p[np.setdiff1d(np.arange(point.p.size), self.chosen)] = 0.0
         self._exclude_held_states()
 
@@ -67,7 +65,7 @@ class _Sides:
     def blocks(self, flow: Jacobians, outputs: Jacobians, update: Jacobians | None) -> list[str]:
         """The blocks at a limit or at a jump; empty if none has an effect on the given derivatives."""
         tables = [flow, outputs] if update is None else [flow, outputs, update]
-        rates = [j.x @ self.x + j.z @ self.z + j.p @ self.p[self.chosen] for j in tables]
+        rates = [j.x @ self.x + j.p @ self.p[self.chosen] for j in tables]
         rates[2:] = [rate[self.evaluated.sampled] for rate in rates[2:]]
         rate = np.concatenate(rates)
         values = self._values(self.point)
@@ -106,9 +104,7 @@ class _Sides:
     def _beside(self, step: float) -> Point:
         """The point after a change, with consistent modes and solved implicit equations."""
         here = self.point
-        point = dataclasses.replace(
-            here, x=here.x + step * self.x, z=here.z + step * self.z, p=here.p + step * self.p
-        )
+        point = dataclasses.replace(here, x=here.x + step * self.x, p=here.p + step * self.p)
         point = solved(self.evaluated, point)
         for _ in range(len(self.system.guard_directions)):
             z = self.evaluated.consistent_modes(point)
