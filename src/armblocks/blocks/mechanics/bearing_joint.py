@@ -16,7 +16,7 @@ from armblocks.robot.joints import AxisMotion, Motion
 class BearingJoint(JointBlock):
     """A shaft in a bearing: frame F translates along the z axis of frame B and rotates in all directions.
 
-    The coordinates are the translation pz (m), then the rotations rx, ry and rz (rad) about the own x, y and
+    The coordinates are the translation pz (m), then the rotations rx, ry and rz (rad) about the x, y and
     z axes of F, in this order. At ry = ±90 degrees the first and the last rotation axis coincide.
     """
 

@@ -17,7 +17,7 @@ class BushingJoint(JointBlock):
     """An elastic mount: frame F translates along all axes of frame B and rotates in all directions.
 
     The coordinates are the translations px, py and pz (m) along the axes of B, then the rotations rx, ry and
-    rz (rad) about the own x, y and z axes of F, in this order. At ry = ±90 degrees the first and the last
+    rz (rad) about the x, y and z axes of F, in this order. At ry = ±90 degrees the first and the last
     rotation axis coincide; the 6-DOF Joint has no such position.
     """
 
