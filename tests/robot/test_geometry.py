@@ -57,7 +57,8 @@ def test_a_surface_encloses_its_volume_with_outward_faces(name: str) -> None:
 
 
 def test_links_with_shapes_have_no_foot_on_the_base() -> None:
-    """Neither foot, beam nor pin; a fixed base link, such as that of a URDF file, is on a foot."""
+    """The base then has no shapes, unless a fixed link, such as the base link of a URDF file, carries all
+    others: this link is on a foot."""
     pin = RevoluteClosure(name="pin", first=Attachment(), second=Attachment(link="coupler"))
     robot = replace(four_bar(), constraints=(pin,))
     shape = (Box(size=(0.1, 0.1, 0.1)),)
