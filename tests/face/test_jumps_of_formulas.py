@@ -27,6 +27,7 @@ from armblocks.blocks import (
     Ramp,
     Rounding,
     Sign,
+    SignalGenerator,
     SineWave,
     Step,
     Sum,
@@ -34,7 +35,7 @@ from armblocks.blocks import (
     TransportDelay,
     ZeroOrderHold,
 )
-from armblocks.diagram import Block
+from armblocks.diagram import Block, DiagramBuilder
 from armblocks.equations.jump_modes import JUMPS, JumpModes
 from armblocks.errors import InputError, SimulationError
 
@@ -259,3 +260,28 @@ def test_a_jump_at_the_start_and_a_chattering_formula_are_refused() -> None:
     builder.connect(builder.add("f", Expression(formula="-k*sign(u)", names="k", values=2.0), x), x["u"])
     with pytest.raises(SimulationError, match=r"'f'.* events without end at 0\.5"):
         derivative(builder, "f.values")
+
+
+@pytest.mark.parametrize("function", ["floor", "ceil", "rem", "mod"])
+def test_a_jump_may_pass_many_integers(function: str) -> None:
+    """The derivative by a formula agrees with differences of runs of the block, which has exact events."""
+    diagrams: list[ab.Diagram] = []
+    for as_formula in (True, False):
+        builder = DiagramBuilder("sawtooth")
+        u = builder.add("saw", SignalGenerator(waveform="sawtooth", amplitude=84.4, frequency=0.7))
+        one = builder.add("one", Constant(value=1.0))
+        if as_formula:
+            formula = f"{function}(u)" if function in ("floor", "ceil") else f"{function}(u, 1)"
+            f = builder.add("f", Expression(formula=formula), u)
+        elif function in ("floor", "ceil"):
+            f = builder.add("f", Rounding(function=function), u)
+        else:
+            f = builder.add("f", Modulo(function=function), u, one)
+        builder.add("x", Integrator(), f)
+        diagrams.append(builder.build())
+    exact = ab.sensitivity(diagrams[0], "saw.amplitude", "x", **SETTINGS)["x", "saw.amplitude"]
+    h = 1e-3
+    runs = [
+        ab.simulate(diagrams[1], parameters={"saw.amplitude": 84.4 + d}, **SETTINGS)["x"] for d in (-h, h)
+    ]
+    assert np.allclose(exact, (runs[1] - runs[0]) / (2.0 * h), rtol=0.0, atol=1e-6)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 import casadi
-from casadi import SX, fabs, fmax, if_else, logic_and, sign
+from casadi import SX, fabs, fmax, fmin, if_else, logic_and, sign
 
 from armblocks.equations.remainders import OFFSET, beyond_ends, quotient_of, remainder_for_quotient
 
@@ -82,9 +82,14 @@ class JumpModes:
         return _if_number(a, mode, a)
 
     def _steps(self, mode: SX, up: SX, down: SX) -> None:
-        """The guards of an integer: at the next and at the previous integer."""
-        self._guard(up, mode + 1.0, mode, 1)
-        self._guard(down, mode, mode - 1.0, -1)
+        """The guards of an integer: at the next and at the previous integer.
+
+        A jump may pass several integers at once. A mode changes by at least one, although rounding errors at
+        an integer could give the old value.
+        """
+        target = self.consistent[-1]
+        self._guard(up, fmax(target, mode + 1.0), mode, 1)
+        self._guard(down, mode, fmin(target, mode - 1.0), -1)
 
     def _remainder(self, a: SX, b: SX) -> SX:
         """``fmod(a, b) = a - n b``; the mode is the integer n, a / b rounded toward zero."""
