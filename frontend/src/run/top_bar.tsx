@@ -165,7 +165,10 @@ function Redo() {
   )
 }
 
-/** The stop time of the model, s; the text is applied when the field loses the focus. */
+/**
+ * The stop time of the model, s; the text is applied when the field loses the focus. The studio reads it, also
+ * a formula such as `2*pi`; a notice shows why a text is refused.
+ */
 function StopTime() {
   const hasDocument = useStudio((s) => s.document !== null)
   const value = Number(useStudio((s) => s.document?.settings['stop_time']) ?? 10)
@@ -179,11 +182,12 @@ function StopTime() {
       inputMode="decimal"
       defaultValue={text}
       onKeyDown={({ key, currentTarget }) => key === 'Enter' && currentTarget.blur()}
-      onBlur={({ currentTarget }) => {
-        const seconds = Number.parseFloat(currentTarget.value)
-        currentTarget.value = `${seconds > 0 ? seconds : value} s`
-        if (hasDocument && seconds > 0 && seconds !== value)
-          void change({ kind: 'settings', values: { stop_time: seconds } })
+      onBlur={({ currentTarget: field }) => {
+        const typed = field.value.trim().replace(/([\s\d.)])s$/, '$1')
+        const showValue = () => void (field.value = text)
+        if (!hasDocument || !typed || Number(typed) === value) showValue()
+        // A new value is shown in a new field.
+        else void change({ kind: 'settings', values: { stop_time: typed } }).then(showValue)
       }}
     />
   )
