@@ -122,3 +122,52 @@ def test_the_torques_of_the_delta_robot_do_the_virtual_work_of_its_point_masses(
     torque = arm.rne(q, qd, qdd, payload=ab.Payload(mass=load))
     assert torque[columns] == pytest.approx(expected, abs=1e-4)
     assert np.abs(np.delete(torque, columns)).max() == 0.0
+
+
+def test_the_pins_of_the_palletiser_do_the_work_of_its_couplings() -> None:
+    """Virtual work: the torques of the pinned robot's drives give those of the catalogue's four axes."""
+    names = example("palletiser_linkage")
+    robot = names["pinned"](spring=False)
+    A, b = names["joint_map"](robot)
+    drives = [robot.joint_names.index(name) for name in names["DRIVES"]]
+    random = np.random.default_rng(3)
+    q, (qd, qdd) = names["START"] + random.uniform(-0.4, 0.4, (5, 4)), random.uniform(-1.0, 1.0, (2, 5, 4))
+    load = ab.Payload(mass=names["LOAD"])
+    expected = ab.load_robot("kr180_2_pa").rne(q, qd, qdd, payload=load)
+    found = ab.Arm(robot).rne(q @ A.T + b, qd @ A.T, qdd @ A.T, payload=load)[:, drives]
+    # The drive lever moves with axes 2 and 3.
+    found[:, 1] += found[:, 2]
+    assert found == pytest.approx(expected, abs=1e-8)
+
+
+def test_the_forces_of_the_palletiser_at_rest_obey_statics() -> None:
+    """Moments about the wrist give the force of the upper level rod; sensors and pins agree."""
+    names = example("palletiser_linkage")
+    robot, g, load = names["pinned"](spring=False), 9.81, names["LOAD"]
+    A, b = names["joint_map"](robot)
+    axes, mass = np.array([0.3, -1.1, 1.2, 0.5]), {link.name: link.mass for link in robot.links}
+    state, payload = (A @ axes + b, np.zeros(13), np.zeros(13)), ab.Payload(mass=load)
+    lean = axes[1] + np.pi / 2  # of the lower arm, from the vertical
+    arm = ab.Arm(robot)
+    wrenches, torques = arm.joint_wrenches(*state, payload=payload), arm.rne(*state, payload=payload)
+    rows = {link.name: row for link, row in zip(robot.links, wrenches)}
+    pins = dict(zip((closure.name for closure in robot.closures), wrenches[len(robot.links) :]))
+    # The weight of the wrist is 0.125 m before its axis, flange and load 0.25 m. The pin is 0.2025 m above.
+    moment = g * (0.125 * mass["wrist"] + 0.25 * (mass["flange"] + load))
+    assert pins["pin of upper_level_rod"][0] == pytest.approx(-moment / 0.2025, abs=1e-8)
+    for rod in names["RODS"]:
+        sensor = f"{rod}_end"
+        force = torques[robot.joint_names.index(sensor)]
+        assert force == pytest.approx(rows[sensor][0 if rod == "upper_level_rod" else 2], abs=1e-8)
+        assert np.linalg.norm(rows[sensor][:3]) == pytest.approx(np.linalg.norm(pins[f"pin of {rod}"][:3]))
+    # The base carries all weights.
+    assert rows["turret"][2] == pytest.approx(g * (sum(mass.values()) + load), abs=1e-8)
+    # Per radian of the lower arm the elbow moves by 1.25 m, the centres of bars along the arm by 0.625 m.
+    elbow = sum(mass[name] for name in ("upper_arm", "triangle", "upper_level_rod", "wrist", "flange")) + load
+    bars = sum(mass[name] for name in ("lower_arm", "drive_rod", "lower_level_rod"))
+    lower_arm = robot.joint_names.index("lower_arm")
+    work = g * np.sin(lean) * (1.25 * elbow + 0.625 * bars)
+    assert torques[lower_arm] == pytest.approx(-work, abs=1e-8)
+    sprung = ab.Arm(names["pinned"](spring=True)).rne(*state, payload=payload)
+    relief = names["STIFFNESS"] * names["ANCHOR"] * names["END"] * np.sin(lean)
+    assert sprung[lower_arm] - torques[lower_arm] == pytest.approx(relief, abs=1e-8)
