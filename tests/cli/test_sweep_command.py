@@ -23,6 +23,9 @@ def test_a_sweep_writes_a_table_and_prints_its_measures(invoke: Invoke, tmp_path
     assert len(lines) == 7 and '"PID.P","x1.initial"' in lines[0]
     again = invoke(*arguments, *SHORT, columns=120)
     assert again.exit_code == 0 and again.stdout == result.stdout
+    reported = invoke(*arguments, *SHORT, "--report", "pages", columns=120)
+    assert reported.exit_code == 0 and "report: pages/report.html" in reported.stdout
+    assert "6 runs" in (tmp_path / "pages" / "report.html").read_text()
 
 
 def test_distributions_and_runs_that_do_not_complete(invoke: Invoke) -> None:

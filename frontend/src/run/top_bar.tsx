@@ -166,8 +166,8 @@ function Redo() {
 }
 
 /**
- * The stop time of the model, s; the text is applied when the field loses the focus. The studio reads it, also
- * a formula such as `2*pi`; a notice shows why a text is refused.
+ * The stop time of the model, s; the text is applied when the field loses the focus. The studio reads it,
+ * also a formula such as `2*pi`; a notice shows why a text is refused.
  */
 function StopTime() {
   const hasDocument = useStudio((s) => s.document !== null)

@@ -82,6 +82,10 @@ def sweep(
         Path | None,
         typer.Option(help="Write the table to this .parquet or .csv file; continues an interrupted sweep."),
     ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Write report.html, with pictures and worst cases, here."),
+    ] = None,
     trust: Trust = False,
 ) -> None:
     """Run a diagram with many combinations of parameters, and print the measures of the runs."""
@@ -108,9 +112,18 @@ def sweep(
             progress=progress,
             **given,
         )
-    print_sweep(result, results_console())
+    _show(result, report)
     if not result.complete:
         raise KeyboardInterrupt
+
+
+def _show(result: SweepResult, report: Path | None) -> None:
+    """Print a sweep, and write its report if a folder is given."""
+    console = results_console()
+    print_sweep(result, console)
+    if report is not None and len(result):
+        page = result.write_report(report).page
+        console.print(f"report: {page}", highlight=False, soft_wrap=True)
 
 
 def unique(pairs: Iterable[tuple[str, Any]], option: str) -> dict[str, Any]:

@@ -21,7 +21,8 @@ from armblocks.face.model import CompiledDiagram, compile_diagram
 from armblocks.face.settings import RunSettings, check_settings, takes_settings, with_settings
 from armblocks.face.sweep_parameters import RunParameters
 from armblocks.face.sweep_programs import ProgramRecipe, Programs
-from armblocks.face.sweep_result import SweepResult, SweepSource
+from armblocks.face.sweep_result import SweepResult
+from armblocks.face.sweep_source import SweepSource
 from armblocks.simulation import SimulationResult
 from armblocks.sweeps.batch import RunRows
 from armblocks.sweeps.cluster import ClusterScheduler, connected
@@ -124,8 +125,14 @@ def sweep(
         # A sweep that is interrupted before its first part has no file to read.
         columns={} if file is not None and file.started else concatenated(collected.parts, layout),
         file=file,
-        source=SweepSource(model=model, options=options, design=layout.design),
+        source=SweepSource(model, options, layout.design, _texts(named, functions)),
     )
+
+
+def _texts(named: Mapping[str, object], functions: Mapping[str, object]) -> dict[str, str]:
+    """The texts of measures, or the names of their Python functions."""
+    calls = {name: str(getattr(call, "__name__", "function")) for name, call in functions.items()}
+    return {name: str(measure) for name, measure in named.items()} | calls
 
 
 def _wants_lanes(parameters: RunParameters) -> bool:

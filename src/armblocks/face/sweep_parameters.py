@@ -237,6 +237,14 @@ def values_of_run(diagram: Diagram, design: Design, run: int) -> dict[str, Any]:
     return values
 
 
+def parameter_unit(diagram: Diagram, name: str) -> str:
+    """The unit of a varied parameter ``block.parameter`` or ``block.parameter[k]``; empty if it has none."""
+    if not _block_of(name):
+        return ""
+    rules = {rule.name: rule.unit for rule in _found(diagram, name).own_parameters()}
+    return rules.get(_whole(name).rpartition(".")[2], "")
+
+
 def _tuned(model: CompiledDiagram, changed: Diagram) -> Variant | None:
     """The variant with the parameters of a changed diagram; ``None`` if its equations differ."""
     tuned = tuned_parameters(model.diagram, changed)

@@ -13,17 +13,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.argument_errors import ArgumentErrors
-from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError, UnknownNameError, counted
-from armblocks.face.model import CompiledDiagram
 from armblocks.face.sweep_parameters import values_of_run
 from armblocks.face.sweep_pictures import sweep_picture
+from armblocks.face.sweep_report import SweepReportFiles, write_sweep_report
 from armblocks.face.sweep_sensitivity import MorrisEffects, SobolIndices, morris_effects, sobol_indices
+from armblocks.face.sweep_source import SweepSource
 from armblocks.face.trajectory_report import save_picture
 from armblocks.pictures.picture import Picture
 from armblocks.simulation import SimulationResult
 from armblocks.sweeps.batch import COMPLETED, STATUSES
-from armblocks.sweeps.designs import Design
 from armblocks.sweeps.files import SweepFile, to_dataframe, write_table
 from armblocks.sweeps.sensitivity_designs import MORRIS, SALTELLI
 from armblocks.sweeps.statistics import rank_correlation, wilson_interval
@@ -33,15 +32,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[Any]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SweepSource:
-    """The model, the settings and the design of a sweep, for repeating single runs."""
-
-    model: CompiledDiagram
-    options: SimulationOptions
-    design: Design
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -241,6 +231,31 @@ class SweepResult(metaclass=ArgumentErrors):
         if save is not None:
             save_picture(picture, save, "SweepResult.plot")
         return picture
+
+    def write_report(
+        self,
+        folder: str | PathLike[str],
+        *,
+        worst: int = 3,
+        smallest: Sequence[str] = (),
+        limits: Mapping[str, tuple[float, float]] | None = None,
+    ) -> SweepReportFiles:
+        """Write a report of the sweep into a folder, created if absent, and return the paths.
+
+        ``report.html`` shows the measures with their percentiles, the pictures of :meth:`plot` for the first
+        six measures, sensitivity indices if the design permits them, the worst cases, the messages of runs
+        that did not complete, and the design. ``table.csv`` has all runs, unless the sweep has a file.
+        ``runs/run-17.json`` is the diagram with the parameters and settings of run 17, for each worst case
+        and for the first run with each message. The studio opens and repeats these runs bit for bit.
+
+        - ``worst``: the number of worst cases of each measure.
+        - ``smallest``: the measures whose smallest values are the worst, such as margins.
+        - ``limits``: ``{"peak": (-np.inf, 12.0)}`` adds the share of the runs from the lower to the upper
+          limit, with its confidence interval for random designs.
+
+        Raises ``UnknownNameError``, ``InputError``, and ``FormatError`` if the folder cannot be written.
+        """
+        return write_sweep_report(self, folder, worst, smallest, limits or {})
 
     def with_columns(self, columns: Mapping[str, ArrayLike]) -> SweepResult:
         """The table with further measures, such as functions of its columns: ``{"ratio": values}`` with a

@@ -15,23 +15,13 @@ from armblocks.pictures.svg import escape, svg_inline
 from armblocks.report.figures import Figure
 from armblocks.report.motion import Motion
 from armblocks.report.motion_summary import MotionSummary
-from armblocks.report.page_style import page_css
+from armblocks.report.page_frame import PageSection, fact_list, framed_page, notice_list
 from armblocks.report.page_tables import html_table, limits_table, loads_table, tool_table, value_cell
 from armblocks.robot import inertia_findings
 from armblocks.simulation.result import SimulationResult
 
-# The page loads and runs nothing: styles are in the page, pictures are data: URLs.
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
-
 _MAX_OPEN_SHEETS = 6
 """Maximum number of subsystems whose drawings are open at first; with more, all are closed."""
-
-_ICONS = {
-    "error": '<path d="M7.9 2.5h4.2L17.5 7.9v4.2L12.1 17.5H7.9L2.5 12.1V7.9z" fill="none" '
-    'stroke="currentColor" stroke-width="1.6" stroke-linejoin="round"/>',
-    "warning": '<path d="M10 2.8 18 16.8H2z" fill="none" stroke="currentColor" stroke-width="1.6" '
-    'stroke-linejoin="round"/>',
-}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -60,38 +50,23 @@ class ReportContents:
 def report_page(contents: ReportContents) -> str:
     """The whole page as HTML text."""
     name = escape(contents.diagram.name)
-    sections: list[tuple[str, str, str]] = []
+    sections: list[PageSection] = []
     motion_figures = [figure for figure in contents.figures if figure.section == "motion"]
     count = len(motion_figures) // max(len(contents.motions), 1)
     for number, (motion, summary) in enumerate(zip(contents.motions, contents.summaries)):
         arm_figures = motion_figures[number * count : (number + 1) * count]
         body = _motion(motion, summary, arm_figures)
-        sections.append((f"motion-{number + 1}", f"Motion of {escape(motion.robot.name)}", body))
+        sections.append(PageSection(f"motion-{number + 1}", f"Motion of {escape(motion.robot.name)}", body))
     displays = _displays(contents)
     if displays:
-        sections.append(("displays", "Displays", displays))
+        sections.append(PageSection("displays", "Displays", displays))
     for key, heading in (("graphs", "XY graphs"), ("scopes", "Scopes"), ("spectra", "Spectra")):
         section_figures = [figure for figure in contents.figures if figure.section == key]
         if section_figures:
-            sections.append((key, heading, _figure_list(section_figures)))
-    sections.append(("diagram", "Diagram", _diagram(contents)))
-    sections.append(("run", "Run", _run(contents)))
-    links = "".join(f'<li><a href="#{key}">{heading}</a></li>' for key, heading, _ in sections)
-    body = "".join(
-        f'<section aria-labelledby="{key}"><h2 id="{key}">{heading}</h2>{text}</section>'
-        for key, heading, text in sections
-    )
-    return (
-        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">'
-        '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{name}: report</title><style>{page_css()}</style></head><body>"
-        f'<header class="top"><h1>{name}</h1><p class="lead">{_lead(contents)}</p>'
-        f"{_facts(contents)}{_notices(contents)}"
-        f'<nav aria-label="Sections"><ul>{links}</ul></nav></header>'
-        f"<main>{body}<footer>Written by armblocks. All quantities in SI units unless a unit is given; "
-        "angles in degrees.</footer></main></body></html>\n"
-    )
+            sections.append(PageSection(key, heading, _figure_list(section_figures)))
+    sections.append(PageSection("diagram", "Diagram", _diagram(contents)))
+    sections.append(PageSection("run", "Run", _run(contents)))
+    return framed_page(name, _lead(contents), _facts(contents), _notices(contents), sections)
 
 
 def _lead(contents: ReportContents) -> str:
@@ -116,10 +91,7 @@ def _facts(contents: ReportContents) -> str:
     ]
     if run.solver == "none":
         del facts[1]
-    items = "".join(
-        f"<div><dt>{label}</dt><dd>{value} <small>{unit}</small></dd></div>" for label, value, unit in facts
-    )
-    return f'<dl class="facts">{items}</dl>'
+    return fact_list(facts)
 
 
 def _notices(contents: ReportContents) -> str:
@@ -154,15 +126,7 @@ def _notices(contents: ReportContents) -> str:
                 inertia_texts.add(str(finding))
                 notices.append(("warning", str(finding)[:1].upper() + str(finding)[1:]))
         notices += [("warning", f"{motion.robot.name}: {note}.") for note in motion.notes]
-    if not notices:
-        return ""
-    items = "".join(
-        f'<li class="{kind}"><svg viewBox="0 0 20 20" role="img" aria-label="{kind}">{_ICONS[kind]}'
-        '<path d="M10 7.2v4.2M10 13.6v.4" stroke="currentColor" stroke-width="1.8" stroke-linecap="round"/>'
-        f"</svg><span>{escape(text)}</span></li>"
-        for kind, text in notices
-    )
-    return f'<ul class="notes">{items}</ul>'
+    return notice_list(notices)
 
 
 def _figure(figure: Figure) -> str:
