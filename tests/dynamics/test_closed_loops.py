@@ -21,7 +21,7 @@ from armblocks.dynamics import (
 )
 from armblocks.dynamics.mechanism import Mechanism
 from armblocks.errors import ArmblocksError, AssemblyError, InputError, RobotError, UnknownNameError
-from armblocks.robot import Link, Motor, Prismatic, Revolute, Robot
+from armblocks.robot import Link, Motor, Prismatic, Revolute, Robot, Spherical
 from armblocks.robot.constraints import (
     Attachment,
     Coupling,
@@ -375,3 +375,6 @@ def test_assemble_refuses_other_sizes_and_unknown_joints() -> None:
         arm.assemble(qd=[np.nan, 0.0, 0.0])
     with pytest.raises(UnknownNameError, match="no joint named 'crnk'"):
         arm.assemble(locked=("crnk",))
+    ball = ab.Arm(Robot(name="ball", links=(Link(name="ball", joint=Spherical(), mass=1.0),)))
+    with pytest.raises(InputError, match="q has a quaternion of zeros"):
+        ball.assemble(np.zeros(4))

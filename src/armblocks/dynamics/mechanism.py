@@ -20,7 +20,7 @@ from armblocks.dynamics.constraint_equations import attached_frame, constraint_e
 from armblocks.dynamics.joint_motion import entries
 from armblocks.dynamics.kinematics import body_poses, constant_pose, frame_pose
 from armblocks.dynamics.reduction import reduced_columns, tree_coordinates
-from armblocks.errors import AssemblyError, RobotError, UnknownNameError
+from armblocks.errors import AssemblyError, InputError, RobotError, UnknownNameError
 from armblocks.robot.constraints import Closure, Distance, NoDisplacement, Perpendicular
 from armblocks.robot.robot import Robot
 from armblocks.robot.tree import KinematicTree
@@ -142,12 +142,19 @@ class Mechanism:
         """Coordinates near ``guess`` that satisfy the constraints; the ``locked`` joints do not move.
 
         Levenberg-Marquardt method with the exact Jacobian. If it does not converge to a solution, it starts
-        again near the guess. Raises AssemblyError with the constraint that has the largest gap, and
-        UnknownNameError for an unknown joint.
+        again near the guess. Raises AssemblyError with the constraint that has the largest gap, InputError
+        for a quaternion of zeros, and UnknownNameError for an unknown joint.
         """
         free = self._free_speeds(locked)
         random = np.random.default_rng(0)
         guess = np.asarray(self._normalise(guess).full())[:, 0]
+        if not np.isfinite(guess).all():
+            raise InputError(
+                "the start value of q has a quaternion of zeros",
+                where=f"robot '{self.robot.name}'",
+                allowed="quaternions w x y z with a direction",
+                fix="begin with arm.neutral(), whose quaternions are 1 0 0 0",
+            )
         best, smallest = guess, math.inf
         for attempt in range(RESTARTS + 1):
             start = guess
