@@ -8,6 +8,7 @@
     ├── UnknownNameError            an unknown name; suggests the nearest known names
     │   └── UnknownArgumentError    an unknown keyword argument; also an ArgumentError
     ├── RobotError                  a robot description that contradicts itself
+    │   ├── MissingFunctionError    a function that this robot does not have; also an AttributeError
     │   └── AssemblyError           no configuration satisfies the constraints
     ├── DiagramError                a diagram that cannot be built
     │   └── AlgebraicLoopError      an algebraic loop that cannot be solved
@@ -153,6 +154,13 @@ def check_type(
 
 class RobotError(ArmblocksError):
     """A robot description that is inconsistent, or lacks data that the call needs."""
+
+
+class MissingFunctionError(RobotError, AttributeError):
+    """A function that does not exist for this robot.
+
+    It is an ``AttributeError``, too, so that ``hasattr(arm, "hybrid_dynamics")`` is false.
+    """
 
 
 class AssemblyError(RobotError):

@@ -250,6 +250,7 @@ def test_functions_for_given_torques_name_the_prescribed_joint() -> None:
             call()
     with pytest.raises(RobotError, match="no joint has a prescribed motion"):
         trace_hybrid_dynamics(four_bar())
+    assert not hasattr(ab.Arm(four_bar()), "hybrid_dynamics")
     with pytest.raises(RobotError, match="the joints with motors or prescribed motions have 2 degrees"):
         trace_rne(robot.with_link("rocker", motor=Motor()))
     assert robot.with_link("rocker", mass=1.0).prescribed_joints == ("crank",)

@@ -33,7 +33,7 @@ from armblocks.dynamics.mechanism import RANK_TOLERANCE, Array, mechanism
 from armblocks.dynamics.reduction import generalised_forces, tree_speeds
 from armblocks.dynamics.robot_trace import check_moves, robot_inputs
 from armblocks.equations import Signature, TracedFunction
-from armblocks.errors import RobotError, counted
+from armblocks.errors import MissingFunctionError, RobotError, counted
 from armblocks.robot.constraints import PrescribedMotion
 from armblocks.robot.robot import Robot
 from armblocks.robot.tree import KinematicTree
@@ -194,9 +194,9 @@ def _check_independent(
 
 
 def check_prescribes(robot: Robot) -> None:
-    """Raise RobotError for a robot without prescribed motions."""
+    """Raise MissingFunctionError for a robot without prescribed motions."""
     if not robot.prescribed_joints:
-        raise RobotError(
+        raise MissingFunctionError(
             "no joint has a prescribed motion",
             where=f"robot '{robot.name}'",
             allowed=f"constraints PrescribedMotion of the joints {', '.join(robot.joint_names)}",

@@ -152,7 +152,8 @@ class NativeFunctions(metaclass=ArgumentErrors):
         prescribed joints. In closed loops the state is the consistent state nearest to ``q``, ``qd`` with the
         given motion of these joints; the results are NaN if this state is too far away.
 
-        Raises RobotError without prescribed joints, and if their motions depend on each other.
+        Raises MissingFunctionError without prescribed joints, and RobotError if their motions depend on each
+        other.
         """
         return cast("HybridFunction", self._code.loaded("hybrid_dynamics"))
 
