@@ -97,20 +97,20 @@ def puma560_multirate() -> Diagram:
     builder.add("Tracking error", Scope(), lag)
     builder.add("Currents", Scope(), motors["i"])
     builder.add("Voltages", Scope(), current)
-    builder.place(position, 200, 161, width=130)
+    builder.place(position, 186, 161, width=130)
     for name, x, y in (
         ("path", 40, 160),
-        ("1 kHz", 400, 190),
-        ("to current", 520, 189),
-        ("current error", 660, 180),
-        ("current loop", 780, 172),
-        ("motors", 960, 184),
-        ("arm", 1140, 200),
-        ("plot", 1340, 179),
-        ("position error", 1340, 60),
-        ("Tracking error", 1480, 47),
-        ("Currents", 1140, 80),
-        ("Voltages", 960, 60),
+        ("1 kHz", 366, 190),
+        ("to current", 472, 189),
+        ("current error", 590, 180),
+        ("current loop", 690, 172),
+        ("motors", 840, 184),
+        ("arm", 1000, 200),
+        ("plot", 1134, 179),
+        ("position error", 590, 340),
+        ("Tracking error", 712, 327),
+        ("Currents", 1000, 80),
+        ("Voltages", 840, 60),
     ):
         builder.place(name, x, y)
     return builder.build()
