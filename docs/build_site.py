@@ -52,7 +52,10 @@ def _sources() -> Iterator[Path]:
     for name in SOURCES:
         for path in sorted((ROOT / name).rglob("*")):
             is_generated = any(path.is_relative_to(folder) for folder in generated)
-            if path.is_file() and not is_generated and "__pycache__" not in path.parts:
+            # Checks of the code write caches, whose names are __pycache__ or begin with a dot.
+            parts = path.relative_to(ROOT).parts
+            is_cached = any(part.startswith((".", "__pycache__")) for part in parts)
+            if path.is_file() and not is_generated and not is_cached:
                 yield path
 
 

@@ -1,6 +1,7 @@
 """Version, citation, change log and the workflow of a public host agree."""
 
 import re
+import runpy
 import tomllib
 from pathlib import Path
 
@@ -33,3 +34,18 @@ def test_the_public_host_runs_the_checks_of_the_project_on_three_systems() -> No
     assert pythons[0] == oldest
     for python in pythons:
         assert f"Programming Language :: Python :: {python}" in PROJECT["classifiers"]
+
+
+def test_caches_of_checks_do_not_make_the_documentation_outdated(tmp_path: Path) -> None:
+    folder = tmp_path / "docs"
+    folder.mkdir()
+    script = folder / "build_site.py"
+    script.write_bytes((ROOT / "docs" / "build_site.py").read_bytes())
+    site = runpy.run_path(str(script))
+    before = site["digest"]()
+    for name in (".ruff_cache", "__pycache__"):
+        (folder / name).mkdir()
+        (folder / name / "entry").touch()
+    assert site["digest"]() == before
+    (folder / "page.md").touch()
+    assert site["digest"]() != before

@@ -171,8 +171,8 @@ def _endless_events(system: CompiledSystem, run: Integration) -> SimulationError
         where=system.name,
         allowed=f"{MAX_CLOSE_EVENTS} consecutive events within {CLOSE_DISTANCE:g} t of each other, "
         f"{MAX_RAPID_EVENTS} within {RAPID_DISTANCE:g} t",
-        fix=f"give '{blocks[0]}' a hysteresis, a dead band, zero_crossing=False or a state of rest "
-        "(ArmPlant, StickSlipFriction), or stop earlier",
+        fix=f"give '{blocks[0]}' a hysteresis, zero_crossing=False or a state of rest (ArmPlant, "
+        "StickSlipFriction), or stop earlier",
     )
 
 
