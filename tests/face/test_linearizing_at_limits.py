@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pytest
+from casadi import SX, fabs
 
 import armblocks as ab
 from armblocks.blocks import (
@@ -24,7 +27,33 @@ from armblocks.blocks import (
     Sum,
     UnitDelay,
 )
-from armblocks.diagram import Block, Diagram, DiagramBuilder
+from armblocks.diagram import Block, Diagram, DiagramBuilder, Port, Shapes, Signals, State
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rectifier(Block):
+    """x' = |u|, with the output x."""
+
+    title: ClassVar[str] = "Rectifier"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "input", shape=()),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the state", shape=()),)
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", (), "the integral"),)
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": fabs(u["u"])}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["x"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": SX(0.0)}
+
 
 LIMITED: dict[str, Block] = {
     "abs": Abs(),
@@ -99,3 +128,17 @@ def test_a_limiter_at_its_limit_is_constant_without_a_warning() -> None:
     assert not warned_blocks(diagram, "inflow", "tank/y")
     linear = ab.linearize(diagram, "inflow", "tank/y")
     assert np.array_equal(linear.B, [[0.0]])
+
+
+def test_a_loop_without_a_solution_beside_the_point_is_linearised() -> None:
+    # w = u + 2 max(w, 0) has the solution 0 for u = 0, and no solution for u > 0.
+    builder = DiagramBuilder("loop")
+    total = builder.add("w", Sum(signs="++"), builder.add("input", Constant(value=0.0)))
+    builder.connect(builder.add("twice", Expression(formula="if(u > 0, 2 * u, 0)"), total), total["u2"])
+    assert abs(ab.linearize(builder.build(), "input", "w").D[0, 0]) == 1.0
+
+
+def test_a_kink_inside_a_block_is_named_by_its_state() -> None:
+    builder = DiagramBuilder("tank")
+    builder.add("tank", Rectifier(), builder.add("inflow", Constant(value=0.0)))
+    assert "'tank'" in warned_blocks(builder.build(), "inflow", "tank/y")

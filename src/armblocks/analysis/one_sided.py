@@ -7,6 +7,7 @@ not changed, because they may be flags or indices.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from collections.abc import Iterable
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from armblocks.analysis.operating_point import solved
 from armblocks.equations.evaluation import EvaluatedSystem, Jacobians, Point
-from armblocks.errors import warn
+from armblocks.errors import SimulationError, warn
 
 Array = NDArray[np.float64]
 
@@ -32,8 +33,12 @@ def warn_of_one_side(
     """Warn if a linear system about a point holds to one side only.
 
     ``flow``, ``outputs`` and ``update`` (of ticks of all clocks) are the total derivatives at the point.
+    Nothing is checked if the implicit equations have no solution beside the point.
     """
-    if blocks := _Sides(evaluated, point).blocks(flow, outputs, update):
+    blocks: list[str] = []
+    with contextlib.suppress(SimulationError):
+        blocks = _Sides(evaluated, point).blocks(flow, outputs, update)
+    if blocks:
         names = ", ".join(f"'{block}'" for block in blocks[:3])
         subject, verb = ("block", "is") if len(blocks) == 1 else ("the blocks", "are")
         warn(
@@ -78,7 +83,11 @@ class _Sides:
                 )
                 limit = KINK * (1.0 + np.abs(rate)) + ROUNDING * np.abs(values / step)
                 kinks |= (far > limit) & (near > far / 2.0)
-        return self._kinked_blocks() if kinks.any() else []
+        if not kinks.any():
+            return []
+        states = [name for slot in self.system.states for name in slot.elements]
+        rows = np.flatnonzero(kinks[: len(states)]).tolist()
+        return self._kinked_blocks() or _blocks(states[k] for k in rows)
 
     def _values(self, point: Point) -> Array:
         """The flow, the outputs, and the sampled variables after ticks of all clocks."""
@@ -98,7 +107,7 @@ class _Sides:
             kinks = np.abs(before + after) > KINK * (STEP + size) + ROUNDING * np.abs(here)
             kinks |= size > KINK * (1.0 + np.abs(here))
         elements = [name for slot in self.system.signals_layout for name in slot.elements]
-        blocks = _distinct(elements[k].rpartition("/")[0] for k in np.flatnonzero(kinks).tolist())
+        blocks = _blocks(elements[k] for k in np.flatnonzero(kinks).tolist())
         return [block for block in blocks if block in set(self.system.guard_names)] or blocks
 
     def _beside(self, step: float) -> Point:
@@ -119,5 +128,6 @@ def _weights(size: int) -> Array:
     return 1.0 + np.arange(size) * GOLDEN_RATIO % 1.0
 
 
-def _distinct(names: Iterable[str]) -> list[str]:
-    return list(dict.fromkeys(names))
+def _blocks(names: Iterable[str]) -> list[str]:
+    """The blocks of some states or signals, each once."""
+    return list(dict.fromkeys(name.rpartition("/")[0] for name in names))
