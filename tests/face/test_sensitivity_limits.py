@@ -131,7 +131,7 @@ def test_a_signal_that_is_held_at_a_limit(block: Block, ends: bool, sampled: boo
 
 
 def test_a_formula_that_protects_a_division() -> None:
-    """The branch for 0 is a constant: right for an even function, wrong for the slope 1/2 of the other."""
+    """The value for u = 0 is a constant, so its derivative is right only if the formula has slope 0 there."""
 
     def diagram(formula: str) -> ab.Diagram:
         builder = ab.DiagramBuilder("protected")

@@ -314,8 +314,8 @@ class DelayHistory:
             reals[target] = reals[target + shift]
         for k in range(self.count):
             first, last = self.first_rows(counts), self.last_rows(counts)
-            first_left, last_row = first[k] - dropped_rows, last[k]
-            first[k] = select(first_left >= 0, first_left, 0)
+            shifted, last_row = first[k] - dropped_rows, last[k]
+            first[k] = select(shifted >= 0, shifted, 0)
             # A negative last row contains the number of rows in which no jump begins.
             searched = last_row + dropped_rows
             searched = select(searched < 0, searched, -1)
