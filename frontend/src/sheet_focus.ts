@@ -25,11 +25,33 @@ export function isForSheet({ target, key }: { target: EventTarget | null; key: s
   return !BUTTON_KEYS.has(key) && (key.length === 1 || isButton(focused))
 }
 
-/** Move the focus to a block. */
-export const focusBlock = (name: string): void =>
-  document
-    .querySelector<HTMLElement>(`.canvas .react-flow__node[data-id="${CSS.escape(name)}"]`)
-    ?.focus({ preventScroll: true })
+/** Move the focus to a block; returns whether the sheet shows it. */
+export function focusBlock(name: string): boolean {
+  const block = document.querySelector<HTMLElement>(
+    `.canvas .react-flow__node[data-id="${CSS.escape(name)}"]`,
+  )
+  block?.focus({ preventScroll: true })
+  return block !== null
+}
+
+/** Interval of the attempts to focus a block, ms: a closed dialog first returns the focus. */
+const ATTEMPT_MS = 50
+/** Number of attempts: a loaded computer closes a dialog and draws a new block late. */
+const ATTEMPTS = 40
+
+/**
+ * Move the focus to a block when the sheet shows it and no dialog has the focus, so that Tab and Enter act on
+ * the block. A field or a menu keeps the focus. `isWanted`: whether the block is still the one to focus.
+ */
+export function focusWhenShown(name: string, isWanted: () => boolean, attempts = ATTEMPTS): void {
+  setTimeout(() => {
+    if (!isWanted()) return
+    const { activeElement } = document
+    const isFree = isForSheet({ target: activeElement, key: 'a' })
+    const isLater = isFree ? !focusBlock(name) : activeElement?.closest('[role="dialog"]')
+    if (isLater && attempts > 1) focusWhenShown(name, isWanted, attempts - 1)
+  }, ATTEMPT_MS)
+}
 
 /** Time after which a closed field is removed, and the result of its edit is drawn, ms. */
 const RETURN_DELAY_MS = 50

@@ -2,7 +2,7 @@ import { freeBelow, freeInView, type Rectangle } from '../model/free_place'
 import type { BlockType, Place, Wire } from '../protocol'
 import { isFrame, newThroughPorts } from '../model/wires'
 import { change, freeName, namesInUse, selectIfUnchanged, useStudio } from '../store'
-import { focusBlock, isForSheet } from '../sheet_focus'
+import { focusWhenShown } from '../sheet_focus'
 import { usePlaced } from './placed_block'
 import { sheetView } from './sheet_actions'
 
@@ -26,9 +26,6 @@ interface Insertion {
   /** The preferred name; a number is appended if it is in use. */
   name?: string
 }
-
-/** Time after which a closed dialog has returned the focus, and a new block is drawn, ms. */
-const FOCUS_DELAY_MS = 50
 
 /** Names of new blocks that the sheet does not show yet. */
 const awaitedNames = new Set<string>()
@@ -73,11 +70,7 @@ export async function insertBlock(
   }).finally(() => awaitedNames.delete(name))
   if (version === undefined) return undefined
   selectIfUnchanged(selection, [name])
-  // Tab and Enter then act on the block. A field, a dialog or a menu keeps the focus.
-  setTimeout(() => {
-    const isForNextKeys = isForSheet({ target: window.document.activeElement, key: 'a' })
-    if (isForNextKeys && useStudio.getState().selection.has(name)) focusBlock(name)
-  }, FOCUS_DELAY_MS)
+  focusWhenShown(name, () => useStudio.getState().selection.has(name))
   if (!wire && !connectTo) usePlaced.setState({ name, at: undefined })
   if (reveal) sheetView.reveal?.({ ...place, width: blockType.width, height: blockType.height })
   return name

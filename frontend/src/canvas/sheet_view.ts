@@ -3,7 +3,7 @@ import { useEffect, useState, type RefObject } from 'react'
 import type { Rectangle } from '../model/free_place'
 import type { SheetBlock } from '../protocol'
 import { partsToShow, viewports } from '../documents/document_views'
-import { focusBlock } from '../sheet_focus'
+import { focusWhenShown } from '../sheet_focus'
 import { useStudio } from '../store'
 import type { SheetNode } from './sheet_graph'
 import { sheetView } from './sheet_actions'
@@ -26,14 +26,16 @@ export function useCentredBlock(flow: Flow, blocks: Record<string, SheetBlock>):
     if (!block) return
     useStudio.setState({ blockToCentre: null })
     const { place, width, height } = block
+    focusWhenShown(block.name, () => useStudio.getState().selection.has(block.name))
     // Executed after a newly opened sheet has been fitted into the window.
-    setTimeout(() => {
-      void flow.setCenter(place.x + width / 2, place.y + height / 2, {
-        zoom: Math.max(flow.getZoom(), 0.8),
-        duration: 150,
-      })
-      focusBlock(block.name)
-    }, 2 * LAYOUT_DELAY_MS)
+    setTimeout(
+      () =>
+        void flow.setCenter(place.x + width / 2, place.y + height / 2, {
+          zoom: Math.max(flow.getZoom(), 0.8),
+          duration: 150,
+        }),
+      2 * LAYOUT_DELAY_MS,
+    )
   }, [blockToCentre, blocks, flow])
 }
 

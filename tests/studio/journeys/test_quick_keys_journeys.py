@@ -74,6 +74,30 @@ def test_text_typed_directly_after_a_command_reaches_the_field_that_the_command_
     expect(sheet.get_by_role("dialog")).to_have_count(0)
 
 
+def test_a_dialog_that_is_opened_directly_after_a_search_keeps_the_focus(sheet: Page) -> None:
+    """The search moves the view to the block later, and the block had the focus before the search."""
+    select_block(sheet, "damping")
+    sheet.keyboard.press("Control+f")
+    sheet.get_by_role("textbox", name="Find").fill("damping")
+    expect(sheet.get_by_role("listbox", name="Found").get_by_role("option").first).to_contain_text("damping")
+    view = sheet.locator(".react-flow__viewport")
+    before = view.get_attribute("style")
+    sheet.keyboard.press("Enter")
+    expect(block(sheet, "damping")).to_be_focused()
+    sheet.keyboard.press("Enter")
+    field = sheet.get_by_role("dialog").get_by_role("textbox", name=re.compile("^gain"))
+    expect(field).to_be_focused()
+    wait_until(sheet, lambda: view.get_attribute("style") != before)
+    keep_view(sheet)
+    sheet.keyboard.press("Control+a")
+    sheet.keyboard.type("0.25")
+    expect(field).to_have_value("0.25")
+    expect(field).to_be_focused()
+    sheet.keyboard.press("Enter")
+    expect(sheet.get_by_role("dialog")).to_be_hidden()
+    expect(block(sheet, "damping")).to_be_focused()
+
+
 def test_escape_cancels_a_drag_of_a_block_a_wire_segment_a_new_wire_and_a_corner(sheet: Page) -> None:
     def drag(x: float, y: float, started: str) -> None:
         sheet.mouse.move(x, y)
