@@ -292,7 +292,11 @@ def main() -> None:
         for program, answer in (("MuJoCo", of_mujoco(case, centres)), ("Exudyn", of_exudyn(case, centres))):
             if answer is not None:
                 t, *errors = answer
-                print_row(name, program, t, errors, f"{t / rows[0][0]:.0f} x, {t / rows[1][0]:.0f} x")
+                print_row(name, program, t, errors, f"{ratio(t / rows[0][0])}, {ratio(t / rows[1][0])}")
+
+
+def ratio(value: float) -> str:
+    return f"{value:.0f} x" if value >= 1.0 else f"{value:.1g} x"
 
 
 def print_row(name: str, program: str, t: float, errors: list[float], factor: str = "") -> None:

@@ -2,11 +2,13 @@
 
     python benchmarks/stiff.py [--quick]
 
-All solvers use the exact Jacobian. SciPy calls it as a function, sparse for the Brusselator. CVODES in
-CasADi gets it from CasADi and uses a sparse linear solver; all of its code is C. CVODE of scikit-sundae, an
-optional package, calls the compiled derivatives of armblocks through Python. The error is the largest
-relative error at the end. Its reference is `rodas5p` at rtol 1e-11, which agrees with Radau at 1e-10 to at
-least 8 digits. The time is the wall time of a run without compilation, minimum of the repetitions.
+All solvers use the exact Jacobian, except CVODE of scikit-sundae for the Brusselator, which approximates a
+banded Jacobian by differences. SciPy calls the Jacobian as a function, for the Brusselator sparse (LSODA:
+dense). CVODES in CasADi gets it from CasADi and uses a sparse linear solver; all of its code is C. CVODE of
+scikit-sundae, an optional package, calls the compiled derivatives of armblocks through Python. The error is
+the largest relative error at the end. Its reference is `rodas5p` at rtol 1e-11, which agrees with Radau at
+1e-10 to at least 8 digits. The time is the wall time of a run without compilation, minimum of the
+repetitions.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ import { onJoints, receivePoses, useJoints, type SliderOfJoint } from './joints'
 import { PosedArm } from './posed_arm'
 import { shareCursor } from './shared_cursor'
 
-/** The messages from the notebook to this frame; see `studio/notebook.py`. */
+/** The message with the views to show. */
 interface ShowMessage {
   kind: 'show'
   dark: boolean
@@ -37,6 +37,7 @@ interface ShowMessage {
   play?: boolean
 }
 
+/** The messages from the notebook to this frame; see `studio/notebook.py`. */
 type Message =
   | ShowMessage
   | { kind: 'time'; time: number }

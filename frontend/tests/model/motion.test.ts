@@ -18,7 +18,7 @@ test('the poses of a motion are those of the nearest sample', () => {
   expect(new MotionPoses({ time: [0], rows: 1, poses: packed(values.slice(0, 12)) }).indexAt(3)).toBe(0)
 })
 
-test('shares and limits are undefined where there is no limit', () => {
+test('without a limit, the share is undefined and no limit is reached', () => {
   expect(shareOf(0.5, 2)).toBe(25)
   expect([shareOf(1, null), shareOf(1, 0)]).toEqual([undefined, undefined])
   expect([isAtLimit(1, -1, 1), isAtLimit(0.999, -1, 1), isAtLimit(-1, -1, 1)]).toEqual([true, false, true])

@@ -45,7 +45,7 @@ class LinearSystem:
 
 
 def complex_roots(rows: ArrayLike, where: str, name: str) -> Roots:
-    """Zeros or poles, as (n,) real numbers or (n, 2) rows (real, imaginary).
+    """The complex zeros or poles (n,) from (n,) real numbers or (n, 2) rows (real, imaginary).
 
     Raises ``InputError`` if a complex root lacks its conjugate.
     """

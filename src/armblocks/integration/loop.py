@@ -39,12 +39,15 @@ from armblocks.routines.routine import Program, Routine
 from armblocks.routines.values import Integer
 
 POINTERS = 13
-"""Number of arrays among the arguments of the loop; the last argument is the number of steps."""
+"""Number of arrays among the arguments of the loop; the last argument is the maximum number of steps."""
 
 
 @lru_cache(maxsize=64)
 def loop_text(tableau: Tableau, sizes: LoopSizes, pattern: JacobianPattern | None) -> Mapping[str, str]:
-    """LLVM IR of the loop ``advance`` and its functions, by symbol. Systems of equal sizes share the IR."""
+    """LLVM IR of the loop ``advance`` and its functions, by symbol.
+
+    Systems with the same tableau, sizes and pattern of the Jacobian share the IR.
+    """
     program = Program()
     layout = None if pattern is None else LinearEquationsLayout(pattern)
     define_loop(program, "advance", tableau, Workspace(tableau, sizes), sizes, layout)

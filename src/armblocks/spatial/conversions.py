@@ -2,8 +2,9 @@
 
 Names are the same as in the Robotics Toolbox. Every function takes one value or N of them: (3, 3) or (N, 3,
 3), (4, 4) or (N, 4, 4), (3,) or (N, 3). Poses and rotations may also be a :class:`Transform`, or an ``SE3``,
-``SO3``, ``UnitQuaternion`` or ``Twist3`` of spatialmath; functions that return poses or rotations then return
-objects of spatialmath, too. Angles are in rad, or with ``unit="deg"`` in degrees. NaN gives NaN.
+``SO3``, ``UnitQuaternion`` or ``Twist3`` of spatialmath, except in :func:`r2t` and :func:`rt2tr`.
+:func:`trexp` and :func:`trinterp` return objects of spatialmath if their first argument is one; the other
+functions return arrays. Angles are in rad, or with ``unit="deg"`` in degrees. NaN gives NaN.
 
 Results are accurate to rounding for all angles, including small angles and half a turn. Sources: Siciliano et
 al., Robotics, 2009, chapter 2; Lynch and Park, Modern Robotics, 2017, 3.2 and 3.3; Shepperd, J. Guidance and
@@ -92,7 +93,7 @@ def tr2eul(T: PoseLike, *, unit: str = "rad") -> Array:
 
 @with_argument_errors
 def angvec2r(angle: ArrayLike, axis: ArrayLike, *, unit: str = "rad") -> Array:
-    """The rotation (3, 3) by an angle about an axis (3,) of any length. Raises InputError for an axis 0."""
+    """The rotation (3, 3) by an angle about an axis (3,) of any length. Raises InputError for a zero axis."""
     vector = _vectors(axis, 3, "angvec2r")
     length = np.linalg.norm(vector, axis=-1, keepdims=True)
     if (length == 0.0).any():
@@ -190,9 +191,10 @@ def vex(S: ArrayLike) -> Array:
 
 @with_argument_errors
 def trexp(S: PoseLike, theta: ArrayLike = 1.0) -> PoseLike:
-    """The rotation of a rotation vector (3,), or the pose of a twist (6,) ``v, w``, times ``theta``.
+    """The rotation of ``theta`` times a rotation vector, or the pose of ``theta`` times a twist.
 
-    A twist of spatialmath gives an ``SE3``.
+    A rotation vector has the shape (3,), a twist ``v, w`` the shape (6,). A twist of spatialmath gives an
+    ``SE3``.
     """
     array, kind = _array_of(S)
     if array.shape[-1:] not in ((3,), (6,)):
@@ -306,13 +308,19 @@ def pose_array(T: PoseLike, where: str) -> Array:
         raise _shape_error(array.shape, "(3, 3) or (4, 4), or N of them", where)
     R = array[..., :3, :3]
     error = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-2, -1))
-    wrong = (error > ORTHONORMALITY) | ((np.cross(R[..., 0], R[..., 1]) * R[..., 2]).sum(axis=-1) < 0)
-    if wrong.any():
+    if (error > ORTHONORMALITY).any():
         raise InputError(
             f"a matrix is not a rotation: R'R differs from the identity by {np.max(error):.3g}",
             where=where,
             allowed=f"at most {ORTHONORMALITY:g}, and a determinant of 1",
             fix="give the matrix with more digits",
+        )
+    if ((np.cross(R[..., 0], R[..., 1]) * R[..., 2]).sum(axis=-1) < 0).any():
+        raise InputError(
+            "a matrix is not a rotation but a reflection: its determinant is -1",
+            where=where,
+            allowed="a determinant of 1",
+            fix="reverse one of the three axes",
         )
     return array
 

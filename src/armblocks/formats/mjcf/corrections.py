@@ -44,7 +44,7 @@ def _ordered_range(joint: Element) -> Iterator[Edit]:
 
 
 def _range_in_degrees(link: str, file: XmlFile) -> Iterator[Edit]:
-    """The range of the hinge of a link in a file whose angles are in rad."""
+    """The conversion of the range of a link's hinge from degrees, in a file whose angles are in rad."""
     if settings_of(file.root).angle_unit != 1.0:
         return
     for joint in file.all("joint"):

@@ -22,7 +22,8 @@ MAX_SECONDS = 300.0
 async def report_of(job: Mapping[str, Any]) -> bytes:
     """Return the report as HTML, for the job of a run (see :mod:`armblocks.studio.runs.worker`).
 
-    Raises ``SimulationError`` with the error of the run or of the report, or if the report takes too long.
+    Raises ``SimulationError`` with the error of the run or of the report, or if the report exceeds its time
+    or memory limit.
     """
     return _page(await process_reply(send_report, job, MAX_SECONDS))
 

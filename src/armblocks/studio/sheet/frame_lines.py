@@ -1,7 +1,7 @@
 """Frame lines in the studio: shown and edited as wires between frame ports.
 
-The ports of one frame are shown as wires from one of them to each of the others. A wire of this star need
-not be a line of the diagram: its removal takes its second port out of the frame.
+Each frame is shown as wires from its first port to each of its other ports. Such a wire need not be a line
+of the diagram. The removal of a wire removes its second port from the frame.
 """
 
 from __future__ import annotations
@@ -45,7 +45,8 @@ def split_wires(wires: Sequence[Wire], diagram: Diagram) -> tuple[list[Wire], li
                 f"the frame port '{frames[0]}' cannot be connected with an input or output of signals",
                 where=f"diagram '{diagram.name}'",
                 allowed="lines between two frame ports, and wires from an output to an input",
-                fix="choose a frame port at both ends; joints and sensors have inputs and outputs on request",
+                fix="choose a frame port at both ends; parameters of joints and sensors add inputs "
+                "and outputs of signals",
             )
         signals.append(wire)
     return signals, lines
@@ -61,8 +62,8 @@ def with_lines(diagram: Diagram, lines: Sequence[FrameLine]) -> Diagram:
 def without_lines(diagram: Diagram, lines: Sequence[FrameLine]) -> Diagram:
     """Return the diagram without shown lines.
 
-    The port of a line that is not the first of its frame is removed from the frame; the others remain one
-    frame.
+    Of the two ports of a line, the one that is not the first port of the frame is removed from the frame. The
+    other ports remain one frame.
     """
     for line in lines:
         first = next((refs[0] for refs in drawn_frames(diagram, boxes(diagram)) if line.first in refs), None)
