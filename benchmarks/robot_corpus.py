@@ -224,7 +224,7 @@ def stored(store: Path) -> list[Result]:
 def print_tables(results: list[Result]) -> None:
     """Print the tables in Markdown: by package and format, and the refusals."""
     print(
-        "| package | format | robots | loaded | refused | compared | agree to 1e-10 | largest difference | "
+        "| package | format | files | loaded | refused | compared | agree to 1e-10 | largest difference | "
         "slowest load |\n|---|---|---|---|---|---|---|---|---|"
     )
     robots = [result for result in results if result.reason != NOTHING]

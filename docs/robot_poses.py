@@ -82,5 +82,5 @@ _POSES: dict[str, tuple[float, ...]] = {
 
 
 def pose_of(name: str, robot: Robot) -> tuple[float, ...]:
-    """Joint positions of the robot's picture, rad or m; 0 for robots that are not listed."""
+    """Joint coordinates of the robot's picture, rad or m; neutral ones for robots that are not listed."""
     return _POSES.get(name, tuple(robot.neutral.tolist()))

@@ -15,7 +15,10 @@ export const SCROLLED = {
   styles: { dropdown: { maxHeight: 220, overflowY: 'auto' } },
 } as const
 
-/** An option of a list. If none is highlighted when it appears, the chosen one is, or else the first one. */
+/**
+ * An option of a list. If no option is highlighted when this option appears, the selected option is
+ * highlighted, or the first option if none is selected.
+ */
 function Option({ option, checked }: ComboboxLikeRenderOptionInput<ComboboxItem>) {
   const { store } = useComboboxContext()
   useEffect(() => {

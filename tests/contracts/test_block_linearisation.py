@@ -36,12 +36,12 @@ def with_perturbation(diagram: Diagram) -> Diagram:
     """The worked example with a Constant of 0 added to the signal at the first input of its block."""
     target = PortRef(diagram.name, diagram.blocks[diagram.name].input_ports()[0].name)
     source = diagram.drivers[target]
-    wires = [wire for wire in diagram.connections if wire.target != target]
-    wires += [Connection(source, PortRef("perturbed", "u1"))]
-    wires += [Connection(PortRef("perturbation", "y"), PortRef("perturbed", "u2"))]
-    wires += [Connection(PortRef("perturbed", "y"), target)]
+    connections = [connection for connection in diagram.connections if connection.target != target]
+    connections += [Connection(source, PortRef("perturbed", "u1"))]
+    connections += [Connection(PortRef("perturbation", "y"), PortRef("perturbed", "u2"))]
+    connections += [Connection(PortRef("perturbed", "y"), target)]
     blocks = {**diagram.blocks, "perturbation": Constant(value=0.0), "perturbed": Sum()}
-    return dataclasses.replace(diagram, blocks=blocks, connections=tuple(wires), layout={})
+    return dataclasses.replace(diagram, blocks=blocks, connections=tuple(connections), layout={})
 
 
 def packed_values(layout: Signature, values: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -50,7 +50,7 @@ def packed_values(layout: Signature, values: Mapping[str, np.ndarray]) -> np.nda
 
 
 def derivative_at_zero(f: Callable[[float], np.ndarray]) -> np.ndarray:
-    """Return df/ds at s = 0 by fourth-order central differences: h = 1e-3 s has an error of order 1e-12."""
+    """Return df/ds at s = 0 by fourth-order central differences; for h = 1e-3 the error is about 1e-12."""
     h = 1e-3
     return (8 * (f(h) - f(-h)) - (f(2 * h) - f(-2 * h))) / (12 * h)
 

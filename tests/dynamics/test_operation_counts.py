@@ -1,7 +1,7 @@
-"""The operations of the compiled equations of three arms, which general joints must not increase.
+"""The numbers of operations in the compiled equations of three arms.
 
-They are those of the table in ``benchmarks/RESULTS.md``. A change of the numbers is a change of the speed: a
-lower number may replace a higher one here, with the table.
+Support for general joint types must not increase them. The numbers of puma560 and kr180 are also in a table
+in ``benchmarks/RESULTS.md``. If a number decreases, update it here and in that table.
 """
 
 import pytest
@@ -29,7 +29,8 @@ COUNTS = {
     ("kr180_2_pa", "inertia"): (23, 29, 19, 0, 6),
     ("kr180_2_pa", "gravload"): (7, 5, 6, 0, 6),
 }
-"""Multiplies, adds, fused multiply-adds, divisions, elementary functions, of the robots without friction."""
+"""Numbers of multiplies, adds, fused multiply-adds, divisions with square roots, and elementary functions;
+robots without friction."""
 
 
 @pytest.mark.parametrize(("robot", "name"), COUNTS)

@@ -205,6 +205,7 @@ def test_jtraj_is_a_motion_at_any_time() -> None:
         (lambda: ab.ctraj(np.eye(3), np.eye(4), 5), "T0 is not a pose"),
         (lambda: ab.ctraj(np.eye(4), 2 * np.eye(4), 5), "T1 is not a pose"),
         (lambda: ab.ctraj(np.eye(4), np.eye(4), [0, 2]), "s is between 0 and 2"),
+        (lambda: ab.ctraj(np.eye(4), np.eye(4), [0, np.nan]), "s is not a vector .*path parameters from 0"),
         (lambda: ab.ctraj(np.eye(4), np.eye(4), 1), "ctraj: t = 1 sample"),
         (lambda: ab.mstraj([[1.0]], 1.0, None, [0.0], 0.1, "fast"), "mstraj: tacc = 'fast'"),
         (lambda: ab.mstraj([[1.0]], None, [0.0], [0.0], 0.1, 0), "tsegment = .*one per segment"),

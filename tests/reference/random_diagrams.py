@@ -26,7 +26,8 @@ LIMITS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Switching values of blocks, which sources reach exactly."""
 PERIODS = (0.0625, 0.125, 0.25, 0.1, 0.3, (0.125, 0.0625), (0.2, 0.1))
 EXCLUDED = (
-    # These use files, call Python, end the run, or define the structure, which the generator builds itself.
+    # Blocks for files, Python code and ends of runs; the generator builds the structure itself. A manual
+    # switch needs a user, and a spectrum is computed after the run.
     "FromFile Trajectory ToFile PythonFunction CalledPythonFunction StopSimulation Assertion Spectrum "
     "ManualSwitch Goto From BusCreator BusSelector BusAssignment Merge Inport Outport Subsystem "
     "EnabledSubsystem TriggeredSubsystem EnabledTriggeredSubsystem ResettableSubsystem "
@@ -233,7 +234,7 @@ class RecipeGenerator:
         return choices[int(r.integers(len(choices)))]
 
     def sine(self, amplitude: float) -> dict[str, Any]:
-        """Return a sine that may touch a switching value, but not at a tick, where rounding would decide."""
+        """Return a sine that may touch a switching value, but not at a tick: rounding changes such events."""
         r = self.random
         frequency = float(r.choice([math.pi, 2 * math.pi, 2.0, r.uniform(0.5, 9.0)]))
         phase = float(r.choice([0.0, math.pi / 2, r.uniform(0, 6)]))
@@ -325,7 +326,7 @@ class RecipeGenerator:
         return None
 
     def parameters(self, name: str) -> dict[str, Any]:
-        """Return parameters of the worked example with random changes."""
+        """Return the parameters of the worked example, or the defaults, with random changes."""
         kind = BLOCKS[name]
         values = (
             {k: v for k, v in kind.example.parameters.items() if k != "robot"}
@@ -407,7 +408,7 @@ class RecipeGenerator:
             self.add_event_block(nodes, signals)
 
     def control(self, nodes: list[Node], signals: list[Signal], scalars: Sequence[Signal]) -> Signal:
-        """Return a scalar signal, or the sum of a late signal and another one: both may jump together."""
+        """Return a scalar signal, or the difference of a late signal and it: both may jump together."""
         r = self.random
         chosen = scalars[int(r.integers(len(scalars)))]
         if r.random() < 0.5:
@@ -419,7 +420,10 @@ class RecipeGenerator:
         return chosen
 
     def add_event_block(self, nodes: list[Node], signals: list[Signal]) -> None:
-        """Add a block with an event after the latest signal, which must not react to intermediate values."""
+        """Connect a block with an event to the latest signal.
+
+        The block must not react to values of unfinished event iterations.
+        """
         r, latest_signal = self.random, signals[-1]
         if latest_signal.shape == () and r.random() < 0.7:
             kind, limit = (("HitCrossing", "offset"), ("Relay", "on_point"))[int(r.integers(2))]
@@ -507,8 +511,8 @@ class RecipeGenerator:
     def comparison(self, nodes: list[Node], signals: list[Signal]) -> None:
         """Add blocks with events for the difference of two switching blocks in series or in parallel.
 
-        At a jump the two blocks reach their values in different iterations; no event may see the differences
-        between them.
+        At a jump the two blocks reach their values in different iterations. The difference of their outputs
+        between these iterations must not cause an event.
         """
         r = self.random
         scalars = [s for s in signals if s.shape == ()]
@@ -586,7 +590,7 @@ def random_recipe(seed: int, size: int = 10) -> Recipe:
 
 
 def reductions(recipe: Recipe) -> Iterator[Recipe]:
-    """Yield recipes reduced by one step: fewer nodes, simpler nodes, or fewer parameters."""
+    """Yield recipes reduced by one step: fewer or simpler nodes, fewer parameters, or half the stop time."""
     for nodes in _smaller(recipe.nodes):
         yield replace(recipe, nodes=nodes)
     if recipe.stop > 0.5:
@@ -605,7 +609,7 @@ def _smaller(nodes: tuple[Node, ...]) -> Iterator[tuple[Node, ...]]:
         if node.kind == "Outport":
             continue
         for source in dict.fromkeys(node.inputs.values()):
-            yield _fed_instead(others, node.name, source)
+            yield _with_source_replaced(others, node.name, source)
         if node.kind != "Constant":
             constant = Node(node.name, "Constant", {"value": 1.0})
             yield tuple(
@@ -620,7 +624,7 @@ def _smaller(nodes: tuple[Node, ...]) -> Iterator[tuple[Node, ...]]:
             yield (*nodes[:k], replace(node, inside=inside), *nodes[k + 1 :])
 
 
-def _fed_instead(nodes: tuple[Node, ...], name: str, source: str) -> tuple[Node, ...]:
+def _with_source_replaced(nodes: tuple[Node, ...], name: str, source: str) -> tuple[Node, ...]:
     def other(ref: str) -> str:
         return source if ref.rpartition("/")[0] == name else ref
 

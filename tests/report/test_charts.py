@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from armblocks.pictures.numbers import axis_number, axis_numbers, nice_ticks
@@ -14,7 +14,7 @@ from armblocks.pictures.style import Tone
 from armblocks.pictures.text_width import text_width
 from armblocks.pictures.thinning import thin_out
 from armblocks.report.charts.path_chart import path_chart
-from armblocks.report.charts.scale import padded_range
+from armblocks.report.charts.scale import Scale, padded_range
 from armblocks.report.charts.time_chart import Panel, Trace, separated_positions, time_chart
 
 
@@ -171,3 +171,16 @@ def test_start_and_end_have_different_marks() -> None:
 def test_the_axis_range_of_a_constant_is_not_empty(values: list[float]) -> None:
     low, high = padded_range(np.array(values), 0.1)
     assert high - low > 0.1
+
+
+@given(st.lists(st.floats(allow_nan=False), min_size=1, max_size=4), st.integers(1, 8))
+@example([-1e308, 1e308], 4)
+@example([0.0, 5e-324], 4)
+def test_all_finite_values_are_within_their_axis(values: list[float], count: int) -> None:
+    low, high = padded_range(np.array(values), 0.08)
+    scale = Scale(low, high, 300.0, 0.0)
+    positions = scale.array(np.array([value for value in values if np.isfinite(value)]))
+    assert ((positions >= -1e-9) & (positions <= 300.0 + 1e-9)).all()
+    ticks = nice_ticks(low, high, count)
+    assert 1 <= len(ticks) <= 6 * count
+    assert all(low - 1e-9 * (high - low) <= tick <= high + 1e-9 * (high - low) for tick in ticks)

@@ -217,6 +217,18 @@ def test_a_run_of_one_instant_has_a_report(tmp_path: Path) -> None:
     assert files.figures == () and files.page.exists()
 
 
+@pytest.mark.parametrize("amplitude", [1.7e308, 1e-320])
+def test_signals_of_any_size_have_a_report(tmp_path: Path, amplitude: float) -> None:
+    builder = DiagramBuilder("sizes")
+    wave = builder.add("wave", SineWave(frequency=2.0))
+    scaled = builder.add("scaled", Gain(gain=amplitude), wave)
+    builder.add("scope", Scope(), scaled)
+    builder.add("xy", XYGraph(), wave, scaled)
+    model = builder.build()
+    files = write_report(tmp_path, model, ab.simulate(model, stop_time=5.0), formats=["svg"])
+    assert re.search(r"[ ,\"](nan|inf)", files.page.read_text()) is None
+
+
 def test_an_exceeded_limit_is_described_and_highlighted(tmp_path: Path, puma560: Robot) -> None:
     limited_robot = puma560.with_link(
         "link1", joint=dataclasses.replace(puma560.links[0].joint, limits=JointLimits(position=(-0.1, 0.2)))

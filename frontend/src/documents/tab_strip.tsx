@@ -74,7 +74,9 @@ function useIsDirty(document: string): boolean {
 
 function DocumentTab({ tab, label, inFront }: { tab: Tab; label: string; inFront: boolean }) {
   const dirty = useIsDirty(tab.document)
-  const menu = useMenuHandlers((at) => openMenu(`Document ${label}`, at, menuEntries(tab, label, dirty)))
+  const menu = useMenuHandlers((at) =>
+    openMenu(`Document ${label}`, at, menuEntries(tab, label, dirty, inFront)),
+  )
   const Icon = tab.kind === 'robot' ? IconRobot : IconSchema
   return (
     <button
@@ -104,7 +106,7 @@ function DocumentTab({ tab, label, inFront }: { tab: Tab; label: string; inFront
       <span
         className="close"
         aria-hidden
-        title={`Close ${label} (Alt+W)`}
+        title={`Close ${label}${inFront ? ' (Alt+W)' : ''}`}
         onClick={(event) => {
           event.stopPropagation()
           void closeDocument(tab.document)
@@ -144,7 +146,7 @@ function focusTab({ document: key }: Tab): void {
   requestAnimationFrame(() => document.getElementById(`tab-${key}`)?.focus())
 }
 
-function menuEntries(tab: Tab, label: string, dirty: boolean) {
+function menuEntries(tab: Tab, label: string, dirty: boolean, inFront: boolean) {
   const { documents } = useStudio.getState()
   const unsaved = new Set(documents.filter((known) => known.dirty).map(({ document }) => document))
   const others = useTabs
@@ -157,7 +159,7 @@ function menuEntries(tab: Tab, label: string, dirty: boolean) {
       run: () => void ask({ kind: 'save', document: tab.document }),
     },
     null,
-    { title: 'Close', keys: 'Alt+W', run: () => void closeDocument(tab.document) },
+    { title: 'Close', keys: inFront ? 'Alt+W' : undefined, run: () => void closeDocument(tab.document) },
     {
       title: 'Close the other saved documents',
       enabled: others.length > 0,

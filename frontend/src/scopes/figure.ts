@@ -72,17 +72,6 @@ export function ticks(min: number, max: number, maxCount: number): number[] {
   return multiples(steps[0]!)
 }
 
-/** A range with a margin. */
-export function withMargin(min: number, max: number): [number, number] {
-  if (!(max >= min)) return [0, 1]
-  if (max - min <= 1e-12 * Math.max(Math.abs(min), Math.abs(max))) {
-    const marginWidth = 0.1 * Math.abs(max) || 1
-    return [min - marginWidth, max + marginWidth]
-  }
-  const marginWidth = 0.06 * (max - min)
-  return [min - marginWidth, max + marginWidth]
-}
-
 /** Left edge of the plot, px. */
 const LEFT = 58
 

@@ -1,5 +1,6 @@
 import uPlot from 'uplot'
 import { scheduleFrame, onFrame } from '../frames'
+import { withGrowthMargin, withMargin } from '../model/axis_range'
 import { fittedLabel } from '../model/axis_texts'
 import { IncrementalDrawing } from '../model/incremental_drawing'
 import { sharedDashes } from '../model/shared_lines'
@@ -16,7 +17,7 @@ import { mayDraw } from '../run/pace'
 import { useRuns } from '../run/runs'
 import { samples } from '../samples'
 import { useStudio } from '../store'
-import { withMargin, type Figure } from './figure'
+import type { Figure } from './figure'
 import { listenOnPlot, listenOnValueAxis, type Values } from './plot_gestures'
 import { colour } from './plot_marks'
 import { MIN_PX, plotOptions, TIME_AXIS_HEIGHT } from './plot_options'
@@ -26,8 +27,6 @@ import { visibleTimes, useWindow } from './window'
 
 /** Number of samples per pixel above which only minimum and maximum are drawn. */
 const DENSE_SAMPLES = 3
-/** Margin by which a vertical axis is extended beyond the values during a run, as a fraction of its range. */
-const GROWTH_MARGIN = 0.15
 
 /** The displayed range in the unit of the signals (`null`: all values), and a callback for changes of it. */
 export interface ValueRange {
@@ -303,13 +302,4 @@ function rangeOf(plots: PlotColumns[], unitFactor: number, from: number, to: num
         if (value > high) high = value
       }
   return withMargin(low * unitFactor, high * unitFactor)
-}
-
-/** Extend a range that is too small, with a margin in the direction of growth: each change redraws all. */
-function withGrowthMargin(
-  [low, high]: [number, number],
-  [before, after]: [number, number],
-): [number, number] {
-  const margin = GROWTH_MARGIN * (Math.max(high, after) - Math.min(low, before))
-  return [low < before ? low - margin : before, high > after ? high + margin : after]
 }

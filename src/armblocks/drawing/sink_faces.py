@@ -56,10 +56,15 @@ def scope(area: FaceArea, trend: Trend | None) -> list[Mark]:
 def _curve(box: FaceArea, x: _Array, y: _Array, all_values: Sequence[_Array], index: int) -> Mark:
     low, high = (float(f(np.concatenate(all_values))) for f in (np.nanmin, np.nanmax))
     left, right = float(np.nanmin(x)), float(np.nanmax(x))
-    px = box.x + (x - left) / ((right - left) or 1.0) * box.width
-    fraction = (y - low) / (high - low) if high > low else np.full(len(y), 0.5)
-    py = box.y + (1 - fraction) * box.height
+    px = box.x + _fraction(x, left, right, constant=0.0) * box.width
+    py = box.y + (1 - _fraction(y, low, high, constant=0.5)) * box.height
     return Polyline(np.column_stack([px, py]), stroke=trace_tone(index), width=1.3)
+
+
+def _fraction(values: _Array, low: float, high: float, *, constant: float) -> _Array:
+    """The values as fractions of a range; ``constant`` for an empty range."""
+    half = 0.5 * high - 0.5 * low  # finite for all finite ends
+    return (0.5 * values - 0.5 * low) / half if half > 0.0 else np.full(len(values), constant)
 
 
 def xy_graph(area: FaceArea, trend: Trend | None) -> list[Mark]:

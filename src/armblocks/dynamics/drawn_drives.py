@@ -7,7 +7,7 @@ the bias (gravity, velocity terms, loads) and the Jacobian J of the closures,
     J_f qdd_f = - dJ/dt qd - J_p qdd_p,
     tau_p = M_pf qdd_f + M_pp qdd_p + bias_p - J_p' multipliers.
 
-Source: Featherstone, *Rigid Body Dynamics Algorithms*, 9.2 (hybrid dynamics) and 8.3 (loop constraints).
+Source: Featherstone, *Rigid Body Dynamics Algorithms*, 9.1 (hybrid dynamics) and 8.2 (loop constraints).
 Unlike :mod:`armblocks.dynamics.prescribed_motion`, single degrees of freedom of a joint may be driven.
 """
 
@@ -104,7 +104,7 @@ class DrawnDrives:
         return generalised_forces(coordinates, bias) if coupled else bias
 
     def _free_motion(self, M: SX, J: SX, force: SX, rates: SX) -> tuple[SX, SX]:
-        """``x`` with ``M_ff x = force + J_f' multipliers`` and ``J_f x = rates``."""
+        """``x`` and the multipliers: ``M_ff x = force + J_f' multipliers`` and ``J_f x = rates``."""
         free, count = self._free, J.shape[0]
         if not free:
             return SX(0, 1), SX(0, 1)
@@ -149,7 +149,7 @@ def _inertia_matrix(tree: KinematicTree, q: SX) -> SX:
 
 
 def drives_are_independent(robot: Robot, q: Array, driven: Sequence[int]) -> bool:
-    """Whether the speeds ``driven`` (indices in qd) determine all others at the assembled ``q`` (nq,)."""
+    """Whether the speeds ``driven`` (indices in qd) can be chosen freely at the assembled ``q`` (nq,)."""
     relations = list(independent_relations(robot, q))
     if not relations:
         return True

@@ -8,7 +8,7 @@ M, the bias (gravity, springs, velocity terms) and the Jacobian J of the closure
     tau_p = M_pf qdd_f + M_pp qdd_p + bias_p + friction_p - J_p' multipliers.
 
 The equations have one solution if J_f has the rank of J: the prescribed joints move independently of each
-other. Source: Featherstone, *Rigid Body Dynamics Algorithms*, 9.2 (hybrid dynamics) and 8.3.
+other. Source: Featherstone, *Rigid Body Dynamics Algorithms*, 9.1 (hybrid dynamics) and 8.2.
 """
 
 from __future__ import annotations

@@ -13,6 +13,19 @@ from armblocks.robot.plausibility import warn_of_degrees
 Array = NDArray[np.float64]
 
 
+def displacement(name: str, value: ArrayLike, where: str) -> Array:
+    """A displacement (3,) of finite numbers, m."""
+    vector = as_array(value)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise InputError(
+            f"{name} = {value!r}",
+            where=where,
+            allowed="three finite numbers x, y, z, m",
+            fix=f"give three finite numbers for {name}",
+        )
+    return vector
+
+
 def joint_vector(name: str, value: ArrayLike, where: str) -> Array:
     """A vector of finite numbers (n,); one number gives (1,)."""
     vector = as_array(value)

@@ -24,15 +24,16 @@ def nice_step(target: float) -> float:
 def nice_ticks(low: float, high: float, count: int, *, degrees: bool = False) -> list[float]:
     """Round values within ``low`` .. ``high`` in about ``count`` steps; large ranges of
     degrees in fractions of a revolution."""
-    target = (high - low) / max(count, 1)
+    half_range = 0.5 * high - 0.5 * low  # finite for all finite ends
+    target = half_range / (0.5 * max(count, 1))
     below = nice_step(target / 2.5)
     steps = [nice_step(below * factor) for factor in (1.0, 1.5, 3.0, 6.0)]
-    if degrees and high - low > 60:
+    if degrees and half_range > 30.0:
         steps = [15.0, 30.0, 45.0, 90.0, 180.0, 360.0, *(s for s in steps if s > 360)]
     step = min(steps, key=lambda s: abs(math.log(s / target)))
     first = math.ceil(low / step - 1e-9)
     last = math.floor(high / step + 1e-9)
-    return [k * step + 0.0 for k in range(first, last + 1)]
+    return [k * step + 0.0 for k in range(first, last + 1) if math.isfinite(k * step)]
 
 
 def log_ticks(low: float, high: float) -> tuple[list[float], list[float]]:

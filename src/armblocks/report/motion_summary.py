@@ -158,7 +158,7 @@ def summarise(
 
 
 SHOWN_AS_ZERO = 64.0 * float(np.finfo(np.float64).eps)
-"""Values of a joint below this fraction of the largest joint's value are rounding errors."""
+"""Values of a joint up to this fraction of the largest value of all joints are rounding errors."""
 _COMPARED_QUANTITIES = (
     ("position_min", "position_max"),
     ("position_margin",),
@@ -170,15 +170,15 @@ _COMPARED_QUANTITIES = (
     ("power_peak",),
     ("work_done", "work_taken"),
 )
-"""Joint quantities that are computed from the motion of all joints."""
+"""Joint quantities that are compared with those of all joints; names in one tuple are one quantity."""
 
 
 def shown_summary(summary: MotionSummary) -> MotionSummary:
     """The summary for display: values that are rounding errors relative to the largest value of the same
     quantity and unit are 0.
 
-    The torque of a joint is a sum of forces on the whole arm. If they cancel, the result has the rounding
-    error of the largest force.
+    The torque of a joint is a sum of contributions of all bodies of the arm. If they cancel, the result has
+    the rounding error of the largest contribution.
     """
     joints: list[JointSummary] = []
     for joint in summary.joints:

@@ -39,7 +39,7 @@ def limits_table(summary: MotionSummary) -> str:
             allowed = _span(joint.position_limits[0] * factor, joint.position_limits[1] * factor)
         share = None if joint.speed_share is None else 100 * joint.speed_share
         cells = [
-            _cell(_range(joint.position_min, joint.position_max, factor) + unit_html),
+            _cell(_range(joint.position_min, joint.position_max, factor, unit_html)),
             _cell(allowed),
             _limit_cell(joint.position_margin, factor, exceeded.get((joint.name, LimitKind.POSITION))),
             _limit_cell(joint.speed_peak, factor, exceeded.get((joint.name, LimitKind.SPEED))),
@@ -153,9 +153,9 @@ def _optional(value: float | None, factor: float = 1.0) -> str:
     return "" if value is None else table_number(value * factor)
 
 
-def _range(low: float | None, high: float | None, factor: float) -> str:
-    """The range of a coordinate; empty for ball joints, which have no range."""
-    return "" if low is None or high is None else _span(low * factor, high * factor)
+def _range(low: float | None, high: float | None, factor: float, unit_html: str) -> str:
+    """The range of a coordinate and its unit; empty for ball joints, which have no range."""
+    return "" if low is None or high is None else _span(low * factor, high * factor) + unit_html
 
 
 def _span(low: float, high: float) -> str:

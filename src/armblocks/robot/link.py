@@ -71,8 +71,8 @@ class Link(metaclass=ArgumentErrors):
       them.
     - ``geometry``: the shapes of the drawing; ``None``: they are derived from the kinematics.
 
-    Raises RobotError for wrong shapes. :class:`armblocks.robot.Robot` checks the values, because its messages
-    name the robot and the link.
+    Raises RobotError for wrong shapes, and InputError for a wrong shape of ``centre_of_mass``.
+    :class:`armblocks.robot.Robot` checks the values, because its messages name the robot and the link.
     """
 
     name: str
@@ -116,7 +116,8 @@ class Link(metaclass=ArgumentErrors):
     def pose(self, q: ArrayLike | None = None) -> Transform:
         """``T_parent_link`` at the joint coordinates ``q`` (nq,), rad or m; a number for one coordinate.
 
-        Without ``q`` it is the pose at ``joint.neutral``. Raises InputError for a wrong number of values.
+        Without ``q`` it is the pose at ``joint.neutral``. Raises InputError for a wrong number of values, and
+        RobotError for values that are not numbers.
         """
         if q is None:
             return self.before @ self.joint.motion(self.joint.neutral) @ self.after

@@ -70,7 +70,7 @@ class IntegerLanes(Value):
     __hash__ = object.__hash__
 
     def unsigned_quotient(self, divisor: int) -> IntegerLanes:
-        """The unsigned quotient."""
+        """The quotient, rounded down, of the 64 bits as an unsigned integer and ``divisor``."""
         return self._integer(Operation.DIVIDE_UNSIGNED, self, divisor)
 
     def from_bits(self) -> Lanes:
@@ -98,5 +98,5 @@ class LaneArray(NumberArray[Lanes]):
 
     @property
     def reals(self) -> Reals:
-        """The same memory as single doubles: the number of lane ``k`` of row ``i`` is ``i lanes + k``."""
+        """The same memory as single doubles: lane ``k`` of row ``i`` has the index ``i * lanes + k``."""
         return self.start.reals

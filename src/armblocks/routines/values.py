@@ -264,7 +264,7 @@ class Integer(Value):
         return self._integer(Operation.SHIFT_RIGHT, self, bits)
 
     def unsigned_quotient(self, divisor: Integer | int) -> Integer:
-        """The unsigned quotient."""
+        """The quotient, rounded down, of the 64 bits as an unsigned integer and ``divisor``."""
         return self._integer(Operation.DIVIDE_UNSIGNED, self, divisor)
 
     def unsigned_remainder(self, divisor: Integer | int) -> Integer:

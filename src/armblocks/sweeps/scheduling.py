@@ -44,7 +44,10 @@ def default_threads() -> int:
 
 
 class Scheduler:
-    """Computes runs in ``threads`` threads. Ctrl-C ends the computation after the tasks in progress."""
+    """Computes runs in ``threads`` threads.
+
+    Ctrl-C cancels the waiting tasks; tasks in progress end at their next check of ``interrupted``.
+    """
 
     def __init__(self, groups_of: GroupsOf, threads: int) -> None:
         self._groups_of = groups_of

@@ -20,7 +20,7 @@ def wilson_interval(successes: int, count: int, confidence: float) -> tuple[floa
     share, weight = successes / count, z * z / count
     centre = (share + 0.5 * weight) / (1.0 + weight)
     half = z / (1.0 + weight) * math.sqrt(share * (1.0 - share) / count + 0.25 * weight / count)
-    # At the ends the limits are exactly 0 and 1.
+    # Without successes the lower limit is 0, without failures the upper one is 1; rounding could change them.
     low = 0.0 if successes == 0 else max(0.0, centre - half)
     high = 1.0 if successes == count else min(1.0, centre + half)
     return low, high

@@ -46,7 +46,7 @@ def test_a_run_continued_after_going_back_equals_the_original_run(name: str) -> 
     np.testing.assert_array_equal(rest.signals, original.signals[:, remaining:])
 
 
-def test_every_instant_is_reachable_with_a_bounded_number_of_checkpoints(
+def test_every_sample_is_reachable_with_a_bounded_number_of_snapshots(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("armblocks.studio.runs.history.MAX_BYTES", 20_000)
@@ -60,7 +60,7 @@ def test_every_instant_is_reachable_with_a_bounded_number_of_checkpoints(
         assert row - 5 < history.recorded <= row
 
 
-def test_tuned_values_apply_from_the_instant_of_return() -> None:
+def test_tuned_values_apply_from_the_time_to_which_the_run_returns() -> None:
     model = CompiledDiagram(load_diagram("van_der_pol_pid", BLOCKS))
     history = RunHistory(model)
     history.run.advance(2.0)

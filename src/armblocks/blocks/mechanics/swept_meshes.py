@@ -32,7 +32,7 @@ def extruded_mesh(polygon: Polygon, length: float, material: Material) -> Mesh:
 def revolved_mesh(polygon: Polygon, angle: float, material: Material) -> Mesh:
     """A counter-clockwise polygon of points (x, z) with x >= 0, revolved about z by ``angle``.
 
-    The sweep is from ``-angle / 2`` to ``angle / 2`` about the x axis; 2 pi is a full revolution.
+    The sweep is symmetric to the xz plane: from ``-angle / 2`` to ``angle / 2``. 2 pi is a full revolution.
     """
     n, full = len(polygon), angle == math.tau
     segments = SEGMENTS if full else max(2, math.ceil(SEGMENTS * angle / math.tau))

@@ -14,7 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 from armblocks.errors import InputError, RobotError, UnknownNameError, counted
 from armblocks.face.arm import Arm
 from armblocks.face.arm_measures import axis_rows
-from armblocks.face.trajectory_arguments import as_array, check_same_length, joint_limits, joint_vector
+from armblocks.face.trajectory_arguments import (
+    as_array,
+    check_same_length,
+    displacement,
+    joint_limits,
+    joint_vector,
+)
 from armblocks.robot import Robot
 from armblocks.robot.joints.motions import AxisMotion
 
@@ -76,13 +82,13 @@ def _within(name: str, value: ArrayLike, ends: Sequence[float], where: str) -> t
     pair = as_array(value)
     low, high = ends
     margin = 1e-9 * max(1.0, *(abs(end) for end in ends if math.isfinite(end)), 1.0)
-    good = pair.shape == (2,) and bool(np.isfinite(pair).all()) and pair[0] <= pair[1]
-    if not good or pair[0] < low - margin or pair[1] > high + margin:
+    is_range = pair.shape == (2,) and bool(np.isfinite(pair).all()) and pair[0] <= pair[1]
+    if not is_range or pair[0] < low - margin or pair[1] > high + margin:
         raise InputError(
             f"the range of {name} is {value!r}",
             where=f"ranges of {where}",
             allowed=f"(lowest, highest) within the limits {low:g} to {high:g}, rad or m",
-            fix="give a smaller range",
+            fix="give a range within the limits" if is_range else "give two finite numbers, the lowest first",
         )
     return float(pair[0]), float(pair[1])
 
@@ -193,8 +199,7 @@ def load_arguments(
         for joint in arm.robot.coupled_joints
         if len(joint.factors) > 1 and joint.limits.torque is not None
     ]
-    place = joint_vector("centre", centre, where)
-    check_same_length(np.zeros(3), {"centre of the payload": place}, where, "x, y, z")
+    place = displacement("centre", centre, where)
     motion: list[Array] = []
     for name, value in (("qd", qd), ("qdd", qdd)):
         vector = np.zeros(arm.n) if value is None else joint_vector(name, value, where)

@@ -30,8 +30,9 @@ def msh_corners(data: bytes, name: str) -> NDArray[np.float64]:
     points = np.frombuffer(data, "<f4", 3 * vertices, _HEADER).reshape(-1, 3).astype(np.float64)
     rows = np.frombuffer(data, "<i4", 3 * faces, _HEADER + 4 * (words - 3 * faces)).reshape(-1, 3)
     if rows.min() < 0 or rows.max() >= vertices:
+        wrong = int(rows.min()) if rows.min() < 0 else int(rows.max())
         raise FormatError(
-            f"a face has the vertex number {int(rows.max())}",
+            f"a face has the vertex number {wrong}",
             where=name,
             allowed=f"0 to {vertices - 1}",
             fix="convert the mesh to STL",

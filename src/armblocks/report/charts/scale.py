@@ -21,16 +21,21 @@ class Scale:
     end: float
 
     def __call__(self, value: float) -> float:
-        return self.start + (value - self.low) * self.factor
+        return self.start + (0.5 * value - 0.5 * self.low) * self._double_factor
 
     @property
     def factor(self) -> float:
         """px per unit."""
-        return (self.end - self.start) / (self.high - self.low)
+        return 0.5 * self._double_factor
+
+    @property
+    def _double_factor(self) -> float:
+        """px per two units: half the length of a range is finite for all finite ends."""
+        return (self.end - self.start) / (0.5 * self.high - 0.5 * self.low)
 
     def array(self, values: _Array) -> _Array:
         """The positions of an array of numbers, px."""
-        return self.start + (values - self.low) * self.factor
+        return self.start + (0.5 * values - 0.5 * self.low) * self._double_factor
 
 
 @dataclass(frozen=True)
@@ -55,15 +60,24 @@ class LogScale:
         return self.start + (np.log10(values) - math.log10(self.low)) * self.factor
 
 
+_LARGEST = float(np.finfo(np.float64).max)
+_SHORTEST_RANGE = 1e-300
+"""Length below which a range is shown as one value: px per unit would not be finite."""
+
+
 def padded_range(values: _Array, fraction: float) -> tuple[float, float]:
-    """The range of the finite values, extended by ``fraction`` of its length at both ends; never
-    empty."""
+    """The range of the finite values, extended by ``fraction`` of its length at both ends.
+
+    The ends are finite, and the range is never empty.
+    """
     finite = values[np.isfinite(values)]
     if len(finite) == 0:
         return -1.0, 1.0
     low, high = float(finite.min()), float(finite.max())
     # Rounding noise around a constant is not magnified.
-    if high - low <= 1e-9 * max(abs(low), abs(high)) or high == low:
-        half = max(abs(low), abs(high)) * 0.5 or 1.0
-        return low - half, high + half
-    return low - fraction * (high - low), high + fraction * (high - low)
+    largest = max(abs(low), abs(high))
+    if 0.5 * high - 0.5 * low <= max(0.5e-9 * largest, _SHORTEST_RANGE):
+        extension = 0.5 * largest if largest > _SHORTEST_RANGE else 1.0
+    else:
+        extension = 2.0 * fraction * (0.5 * high - 0.5 * low)
+    return max(low - extension, -_LARGEST), min(high + extension, _LARGEST)

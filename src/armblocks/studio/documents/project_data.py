@@ -51,7 +51,7 @@ class ProjectData(DataFiles):
     # -- tables ----------------------------------------------------------------------------------------------
 
     def columns(self, path: Path) -> ColumnFile:
-        """The columns of a file; a file that has not changed is read once. Raises ``ArmblocksError``."""
+        """The columns of a file; the latest files are cached until they change. Raises ``ArmblocksError``."""
         with self._reading:
             try:
                 status = path.stat()

@@ -1,8 +1,8 @@
 """The pool of worker processes: each is used once, and the next worker is started in advance.
 
 On Linux, a worker is forked from a process that has imported all modules for a run and does nothing else
-(Python's fork server): it starts within milliseconds and shares that memory. On other systems every worker
-imports the modules itself, in advance.
+(Python's fork server). The worker starts within milliseconds and shares the memory of these modules. On other
+systems every worker imports the modules itself, in advance.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class Worker:
         sender.close()
 
     def end(self) -> None:
-        """Kill the process. Its end of the pipe is closed, which a thread that reads the pipe notices."""
+        """Kill the process. Its end of the pipe closes: a thread that reads the pipe gets an EOFError."""
         self.process.kill()
 
 
