@@ -1,4 +1,4 @@
-"""CAD exports of Simscape Multibody for a robot at a position, written from its numbers alone.
+"""CAD exports of Simscape Multibody, computed from the parameters and a configuration of a robot.
 
 The part of each link has the frame of the link, in millimetres and grams. Some parts are in a subassembly
 with a pose of its own.
@@ -77,7 +77,7 @@ class Export:
         return f'<{kind} name="{name} joint">{frames}</{kind}>'
 
     def mate(self, kind: str, ends: list[tuple[str, Array]], inside: bool) -> str:
-        """Mates that leave the freedom of a joint: of its axis as a line, and of planes."""
+        """Mates that leave the freedom of the joint: concentric axes and planes; for a weld, planes only."""
         (base, T), (follower, F) = ends
         moved = np.linalg.inv(self.poses[base] @ T) @ self.poses[follower] @ F
 
@@ -176,7 +176,7 @@ class Export:
 
 
 def axis_and_angle(R: Array) -> tuple[Array, float]:
-    """The axis and the angle of a rotation, from the eigenvector of 1."""
+    """The axis and the angle of a rotation; the axis is the eigenvector for the eigenvalue 1."""
     values, vectors = np.linalg.eig(R)
     axis = np.real(vectors[:, int(np.argmin(np.abs(values - 1)))])
     axis /= np.linalg.norm(axis)

@@ -13,7 +13,7 @@ RANDOM = np.random.default_rng(8)
 
 
 def by_linear_program(rows: Rows, limit: np.ndarray, start: float, end: float) -> np.ndarray | None:
-    """The largest squared speeds at all points at once: the maximum of their sum."""
+    """The squared speeds with the largest sum, by a linear program; ``None`` if it is infeasible."""
     R, N = rows.alpha.shape
     A, b = [], []
     for i in range(N):
@@ -83,12 +83,11 @@ def test_an_infeasible_point_is_named() -> None:
     low, high = np.full((1, N), -1.0), np.full((1, N), 1.0)
     zero = np.zeros((1, N))
     blocked_low, blocked_high = np.full((1, N), -1.0), np.full((1, N), 1.0)
-    blocked_low[0, 6] = 0.5  # no speed satisfies 0.5 <= 0
+    blocked_low[0, 6] = 0.5  # 5 x[7] >= 0.5, but x[7] <= 0.05
     blocked_high[0, 6] = 0.6
     rows = Rows(
         *(np.concatenate(p) for p in ((-half, zero), (half, half), (low, blocked_low), (high, blocked_high)))
     )
-    # The second row is x1 N / 2 >= 0.5 in segment 6 only, above the limit of x.
     profile = fastest_profile(rows, np.full(N + 1, 0.05), 0.0, 0.0)
     assert profile.failed == 6
     assert by_linear_program(rows, np.full(N + 1, 0.05), 0.0, 0.0) is None

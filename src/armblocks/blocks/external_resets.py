@@ -20,10 +20,8 @@ EXTERNAL_RESETS = ("none", *EDGES, *LEVELS)
 INITIAL_SOURCES = ("internal", "external", "external at resets")
 """Source of the initial value: the parameter; a port; or the parameter at the start and a port at resets."""
 
-PREVIOUS_SIGN = State(
-    "previous", (), "sign of the trigger at the previous tick: 1 or 0; -1 before the first tick"
-)
-"""The state of a sampled block that holds the previous sign of its trigger."""
+PREVIOUS_SIGN = State("previous", (), "trigger state at the previous tick: 1 or 0; -1 before the first tick")
+"""The state of a sampled block that holds its previous :func:`trigger_state`."""
 
 
 def external_reset_parameter(default: str) -> Any:

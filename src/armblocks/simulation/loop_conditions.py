@@ -19,7 +19,7 @@ and the last."""
 MAX_CONDITION = 1e8
 """Condition number above which fewer than half of a double's 16 digits are correct."""
 ITERATIONS = 12
-"""Iterations of the power method; its two bounds then differ by a few per cent for most matrices."""
+"""Iterations of the power method. Its bound is then near the spectral radius of most matrices."""
 MAX_NAMES = 3
 """Maximum number of signals that a warning names."""
 
@@ -47,11 +47,11 @@ def warnings_of_loops(system: CompiledSystem, parts: Sequence[Rows]) -> list[str
 
 
 def loop_conditions(matrices: Array) -> Array:
-    """Condition numbers (k,) of loops ``x = M x + c``; 0 where singular. ``matrices``: ``M - 1`` (k, n, n).
+    """Upper bounds (k,) of condition numbers of loops ``x = M x + c``; 0 where singular.
 
-    The condition number is the spectral radius of ``|(1 - M)^-1| (1 + |M|)``. It bounds the error of a
-    signal, as a multiple of the rounding errors of all terms, for the best choice of the signals' units
-    (Bauer, *Numer. Math.* 5 (1963) 73-87).
+    ``matrices`` (k, n, n) are ``M - 1``. The condition number is the spectral radius of ``|(1 - M)^-1| (1 +
+    |M|)``. It bounds the error of a signal, as a multiple of the rounding errors of all terms, for the best
+    choice of the signals' units (Bauer, *Numer. Math.* 5 (1963) 73-87).
     """
     n = matrices.shape[-1]
     numbers = np.zeros(len(matrices))

@@ -107,7 +107,7 @@ def test_a_run_is_tuned_and_rewound_and_the_tuned_value_kept(opened: Opened) -> 
     page.get_by_role("combobox", name="Speed").select_option("as fast as possible")
     page.get_by_role("button", name="Resume").click()
     expect(page.locator(".run-state")).to_contain_text("done", ignore_case=True)
-    # The tuned value applies from the instant of return.
+    # The tuned value applies from the time to which the run has returned.
     expect(page.locator(".display-value")).to_have_text(re.compile(r"^(3\.000|2\.999)$"))
     page.get_by_role("button", name="Keep in the model").click()
     expect(page.get_by_text("not in the model")).to_be_hidden()
@@ -134,7 +134,7 @@ def test_two_runs_are_compared(opened: Opened) -> None:
     charts = page.locator(".signal-inspector .chart")
     expect(charts).to_have_count(2)
     expect(charts.locator("figcaption b")).to_have_text([re.compile("Run"), re.compile("Run")])
-    one, other = (saved_picture(page, chart) for chart in charts.all())
+    one, other = (axis_numbers(page, chart) for chart in charts.all())
     assert one == other, "both charts have the same axes"
     page.get_by_role("combobox", name="View").select_option("Difference")
     model = lag_model("compared")
@@ -272,8 +272,8 @@ def test_parameter_sets_are_updated_renamed_and_removed_in_their_dialog(opened: 
     expect(dialog).to_have_count(0)
 
 
-def saved_picture(page: Page, chart: Locator) -> list[str]:
-    """The labels of the axes of a chart."""
+def axis_numbers(page: Page, chart: Locator) -> list[str]:
+    """The numbers at the axes of a chart, from its exported SVG file."""
     with page.expect_download() as downloading:
         chart.get_by_role("button", name=re.compile("^Export")).click()
         page.get_by_role("menuitem", name="Picture as SVG").click()
@@ -333,7 +333,7 @@ def test_a_triggered_scope_shows_the_window_about_each_crossing(opened: Opened) 
     bar.get_by_role("combobox", name="Trigger on").select_option(label="pulse")
     for field, text in (("Level", "0.5"), ("Window", "0.5"), ("Trigger at", "25")):
         bar.get_by_role("textbox", name=field).fill(text)
-    # Jumps through the level trigger once, at their exact times.
+    # Each jump across the level is one trigger, at the exact time of the jump.
     expect(bar.locator(".shown-trigger")).to_contain_text("3 of 3 at 9.00300 s")
     bar.get_by_role("button", name="Previous trigger").click()
     expect(bar.locator(".shown-trigger")).to_contain_text("2 of 3 at 5.00300 s")
