@@ -66,8 +66,8 @@ def dynamics_section(repeats: int) -> list[str]:
     lines += table(head, comparison_rows(comparisons))
     lines += [
         "",
-        "Time of one evaluation, median of the repetitions. The speed-up is the median of their ratios. The "
-        "robots have no friction, because Pinocchio does not model it.",
+        "Time of one evaluation, median of the repetitions. The speed-up is the median over the repetitions "
+        "of the ratio of the two times. The robots have no friction, because Pinocchio does not model it.",
     ]
     lines += [
         "",

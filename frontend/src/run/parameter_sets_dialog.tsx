@@ -29,7 +29,7 @@ export function ParameterSets() {
   )
 }
 
-/** An edit of the whole model; a refusal is shown as a notice. */
+/** Apply an edit to the whole model. Returns whether it was accepted; a refusal is shown as a notice. */
 async function applyToModel(edit: Edit): Promise<boolean> {
   const document = useStudio.getState().document?.state.document
   if (document === undefined) return false

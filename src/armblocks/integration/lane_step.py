@@ -60,7 +60,7 @@ class LaneStep:
             self.r.call(self.loop.end_runs, self.memory, self.addresses, self.failed.value, status)
 
     def _valid_lanes(self) -> Mask:
-        """The running lanes whose arguments the vector functions support; the other lanes fail."""
+        """The running lanes whose arguments the vector functions support; the other running lanes fail."""
         unsupported = self.method.unsupported.value & self.running.bits()
         memory, r, loop = self.memory, self.r, self.loop
         with r.when(unsupported != 0, rarely=True):

@@ -1,6 +1,6 @@
 """Remainders of division, exact.
 
-For a quotient below 2**53, one fused multiply-add gives the exact remainder, possibly plus or minus the
+For a quotient below 2**53, one fused multiply-add gives the exact remainder, or the remainder minus the
 divisor. Larger quotients need long division with integers, in one lane.
 """
 
@@ -23,7 +23,10 @@ def modulo(body: Body, x: str, y: str) -> str:
 
 
 def remainder(body: Body, x: str, y: str) -> str:
-    """The IEEE 754 remainder x - n y, n = x / y to the nearest even integer. NaN for y = 0, infinite x."""
+    """The IEEE 754 remainder x - n y; n is the integer nearest to x / y, even for a tie.
+
+    NaN for y = 0 or infinite x.
+    """
     a, b = body.absolute(x), body.absolute(y)
     rest = _modulo(body, a, body.add(b, b))  # if 2 b overflows, the result is a
     first_step = body.select(_exceeds_half(body, rest, b, "ogt"), body.subtract(rest, b), rest)

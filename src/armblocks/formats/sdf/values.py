@@ -69,7 +69,7 @@ def pose_of(pose: Element | None, context: FileContext, old: bool = False) -> Re
 
     Six numbers: ``x y z roll pitch yaw``, with ``R = Rz(yaw) Ry(pitch) Rx(roll)``, angles in rad or with
     ``degrees="true"`` in degrees. Seven numbers with ``rotation_format="quat_xyzw"``: ``x y z qx qy qz qw``.
-    ``old``: the file is older than SDF 1.7, whose attribute ``frame`` became ``relative_to``.
+    ``old``: the file is older than SDF 1.7, in which ``relative_to`` replaced the attribute ``frame``.
     """
     if pose is None:
         return RelativePose()

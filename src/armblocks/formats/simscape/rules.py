@@ -8,7 +8,7 @@ from __future__ import annotations
 from armblocks.formats.file_findings import Rule
 
 JOINT_CODE = "simscape-joint"
-"""The code of a joint, or of mates, with other degrees of freedom than one rotation or one translation."""
+"""The code of a joint, or of mates, whose motion is not one rotation, one translation or none."""
 LOOP_CODE = "simscape-loop"
 """The code of a closed loop."""
 

@@ -46,7 +46,7 @@ UNKNOWN = Rule(
 )
 MESH = Rule(
     code="urdf-mesh",
-    allowed="STL, OBJ, COLLADA and GLB meshes that can be found",
+    allowed="STL, OBJ, COLLADA, GLB and MSH meshes that can be found",
     remedy="give the folder of the package with packages={…}, or convert the mesh to STL or OBJ",
 )
 SHAPE = Rule(
