@@ -20,7 +20,9 @@ EXTERNAL_RESETS = ("none", *EDGES, *LEVELS)
 INITIAL_SOURCES = ("internal", "external", "external at resets")
 """Source of the initial value: the parameter; a port; or the parameter at the start and a port at resets."""
 
-PREVIOUS_SIGN = State("previous", (), "trigger state at the previous tick: 1 or 0; -1 before the first tick")
+PREVIOUS_TRIGGER = State(
+    "previous", (), "trigger state at the previous tick: 1 or 0; -1 before the first tick"
+)
 """The state of a sampled block that holds its previous :func:`trigger_state`."""
 
 
@@ -52,15 +54,15 @@ def trigger_state(external_reset: str, trigger: SX) -> SX:
     return trigger != 0.0 if external_reset in LEVELS else trigger > 0.0
 
 
-def fires_at_tick(external_reset: str, trigger: SX, previous_side: SX) -> SX:
-    """Whether a sampled block is reset at this tick; ``previous_side`` is the state ``PREVIOUS_SIGN``."""
-    side = trigger_state(external_reset, trigger)
-    rises, falls = logic_and(side, previous_side == 0.0), logic_and(side == 0.0, previous_side == 1.0)
+def fires_at_tick(external_reset: str, trigger: SX, previous: SX) -> SX:
+    """Whether a sampled block is reset at this tick; ``previous`` is the state ``PREVIOUS_TRIGGER``."""
+    state = trigger_state(external_reset, trigger)
+    rises, falls = logic_and(state, previous == 0.0), logic_and(state == 0.0, previous == 1.0)
     reset_conditions = {
         "rising": rises,
         "falling": falls,
         "either": logic_or(rises, falls),
-        "level": logic_or(side, falls),
-        "level hold": side,
+        "level": logic_or(state, falls),
+        "level hold": state,
     }
     return if_else(reset_conditions[external_reset], 1.0, 0.0)

@@ -14,7 +14,7 @@ from casadi import SX, fmax, fmin, if_else
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.external_resets import (
-    PREVIOUS_SIGN,
+    PREVIOUS_TRIGGER,
     external_reset_parameter,
     fires_at_tick,
     initial_source_parameter,
@@ -113,7 +113,7 @@ class DiscreteIntegrator(Block):
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         x = State("x", self.output_shapes(inputs)["y"], "the integral")
-        return (x, PREVIOUS_SIGN) if self._has_resets else (x,)
+        return (x, PREVIOUS_TRIGGER) if self._has_resets else (x,)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         share = included_fraction(self.method)

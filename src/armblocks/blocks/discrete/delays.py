@@ -13,7 +13,7 @@ from casadi import SX, if_else, logic_or, repmat, vertcat
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.external_resets import (
-    PREVIOUS_SIGN,
+    PREVIOUS_TRIGGER,
     external_reset_parameter,
     fires_at_tick,
     initial_source_parameter,
@@ -210,7 +210,7 @@ class ResettableDelay(Block):
         shape = self.output_shapes(inputs)["y"]
         history = State("x", (self.length, math.prod(shape)), "the last inputs, oldest first")
         held = (State("held", shape, "the output at the previous tick"),)
-        return (history, PREVIOUS_SIGN, *(held if self.enable_port else ()))
+        return (history, PREVIOUS_TRIGGER, *(held if self.enable_port else ()))
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         oldest = x["x"][0, :].T
