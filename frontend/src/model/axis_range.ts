@@ -16,7 +16,8 @@ export function withMargin(min: number, max: number): Range {
   const largest = Math.max(Math.abs(low), Math.abs(high))
   const length = high - low
   const isConstant = length <= Math.max(1e-12 * largest, SHORTEST)
-  const margin = isConstant ? (largest > SHORTEST ? 0.1 * Math.abs(high) || 1 : 1) : 0.06 * length
+  const marginOfConstant = largest > SHORTEST ? 0.1 * largest : 1
+  const margin = isConstant ? marginOfConstant : 0.06 * length
   return [finite(low - margin), finite(high + margin)]
 }
 

@@ -61,8 +61,8 @@ class LogScale:
 
 
 _LARGEST = float(np.finfo(np.float64).max)
-_SHORTEST_RANGE = 1e-300
-"""Length below which a range is shown as one value: px per unit would not be finite."""
+_SHORTEST_HALF = 1e-300
+"""Half the length below which a range is shown as one value: px per unit would not be finite."""
 
 
 def padded_range(values: _Array, fraction: float) -> tuple[float, float]:
@@ -76,8 +76,9 @@ def padded_range(values: _Array, fraction: float) -> tuple[float, float]:
     low, high = float(finite.min()), float(finite.max())
     # Rounding noise around a constant is not magnified.
     largest = max(abs(low), abs(high))
-    if 0.5 * high - 0.5 * low <= max(0.5e-9 * largest, _SHORTEST_RANGE):
-        extension = 0.5 * largest if largest > _SHORTEST_RANGE else 1.0
+    half = 0.5 * high - 0.5 * low  # finite for all finite ends
+    if half <= max(0.5e-9 * largest, _SHORTEST_HALF):
+        extension = 0.5 * largest if largest > _SHORTEST_HALF else 1.0
     else:
-        extension = 2.0 * fraction * (0.5 * high - 0.5 * low)
+        extension = 2.0 * fraction * half
     return max(low - extension, -_LARGEST), min(high + extension, _LARGEST)
