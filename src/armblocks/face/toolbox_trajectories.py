@@ -236,12 +236,12 @@ def ctraj(T0: ArrayLike | Transform, T1: ArrayLike | Transform, s: ArrayLike | i
         fractions = np.atleast_1d(as_array(s))
         is_vector = fractions.ndim == 1 and fractions.size > 0 and bool(np.isfinite(fractions).all())
         if not is_vector or fractions.min() < 0.0 or fractions.max() > 1.0:
-            between = f"s is between {fractions.min():g} and {fractions.max():g}" if is_vector else ""
+            what, fix = "s is not a vector of finite numbers", "give a vector of path parameters"
+            if is_vector:
+                what = f"s is between {fractions.min():g} and {fractions.max():g}"
+                fix = "divide the times by the duration"
             raise InputError(
-                between or "s is not a vector of finite numbers",
-                where="ctraj",
-                allowed="path parameters from 0 (pose T0) to 1 (pose T1)",
-                fix="divide the times by the duration" if is_vector else "give a vector of path parameters",
+                what, where="ctraj", allowed="path parameters from 0 (pose T0) to 1 (pose T1)", fix=fix
             )
     poses = np.zeros((len(fractions), 4, 4))
     poses[:, 3, 3] = 1.0
