@@ -131,7 +131,7 @@ def test_a_signal_that_is_held_at_a_limit(block: Block, ends: bool, sampled: boo
 
 
 def test_a_formula_that_protects_a_division() -> None:
-    """The value for u = 0 is a constant, so its derivative is right only if the formula has slope 0 there."""
+    """For u = 0 the value is a constant. Its derivative is right only if the formula has the derivative 0."""
 
     def diagram(formula: str) -> ab.Diagram:
         builder = ab.DiagramBuilder("protected")

@@ -1,6 +1,7 @@
 """The arm with stick-slip friction, end stops, a variable payload and a force at the tip.
 
-The equations are in :mod:`armblocks.dynamics.lockable_joints`, which names the sources.
+The equations are in :mod:`armblocks.dynamics.lockable_joints`, which names the sources. The file is long,
+because the guards, modes and resets of friction and stops depend on each other.
 """
 
 from __future__ import annotations
